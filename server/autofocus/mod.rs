@@ -1,0 +1,39 @@
+//! Autofocus: focus metrics and the policies that decide which way to turn the lens. Knows no camera, lens or database.
+
+mod registry;
+
+pub use registry::{PolicyEntry, PolicyError, PolicyName, Registry};
+
+use std::sync::Arc;
+
+use crate::imaging::Patch;
+use crate::lens::FocalPower;
+
+/// Step of the paper's policies in focal power.
+pub const STEP: f64 = 0.05;
+
+/// Decides, frame by frame, which focal power to ask for next.
+pub trait Policy: Send {
+    /// One step. What comes back is not trusted: the control loop checks it.
+    fn step(&mut self, seen: &Observation<'_>) -> Decision;
+}
+
+/// What a policy sees: one patch, and the focal power that it was exposed at.
+#[derive(Debug, Clone, Copy)]
+pub struct Observation<'a> {
+    /// The patch.
+    pub patch: &'a Patch,
+    /// Focal power the patch was exposed at.
+    pub focal_power: FocalPower,
+}
+
+/// What a policy answers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Decision {
+    /// Focal power to go to; checked by the control loop, so a plain number.
+    pub target: f64,
+    /// The focus metric that the policy computed, if it has one.
+    pub metric: Option<f64>,
+    /// Probability of each of equally wide slices of 0..=1 to hold the optimum, if the policy has a belief.
+    pub belief: Option<Arc<[f32]>>,
+}

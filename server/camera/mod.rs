@@ -1,0 +1,88 @@
+//! Cameras: where frames come from. Knows no policy.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::clock::Moment;
+use crate::imaging::{MosaicFrame, RgbImage};
+use crate::lens::FocalPower;
+
+/// A source of frames at its own pace.
+///
+/// An implementation guarantees that [`Camera::next_frame`] returns within `timeout` plus one frame's time; that frame
+/// numbers rise strictly, gaps being frames lost; and that after an error it goes on trying to come back by itself, so
+/// the caller just asks again.
+pub trait Camera: Send {
+    /// Waits for the next frame.
+    ///
+    /// # Errors
+    /// When none came within `timeout`, or the device failed.
+    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError>;
+
+    /// What the camera is, and how it does.
+    fn health(&self) -> CameraHealth;
+}
+
+/// One exposure.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Counts up from 1 while the server runs; a gap is a lost frame.
+    pub number: u64,
+    /// End of the exposure, taken once, here; every later stage carries it on.
+    pub exposed_at: Moment,
+    /// The picture.
+    pub image: FrameImage,
+    /// What only a simulation knows. For reports; no policy sees it.
+    pub truth: Option<Truth>,
+}
+
+/// A frame's picture, shared, never copied.
+#[derive(Debug, Clone)]
+pub enum FrameImage {
+    /// Raw samples of the hyperspectral sensor.
+    Mosaic(Arc<MosaicFrame>),
+    /// A colour picture, from footage.
+    Rgb(Arc<RgbImage>),
+}
+
+/// What a simulated camera knows about its own frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// The focal power at which the patch would be sharpest.
+    pub optimal: FocalPower,
+    /// The focal power the frame was exposed at.
+    pub exposed: FocalPower,
+}
+
+/// A camera's state, in words and figures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CameraHealth {
+    /// Name for people, for example `brain phantom (simulated)`.
+    pub name: Arc<str>,
+    /// Whether the picture is not of the real world at this moment: said on every page.
+    pub simulated: bool,
+    /// Whether frames are coming.
+    pub working: bool,
+    /// One sentence: what is the case and, if it is bad, what to do.
+    pub message: Arc<str>,
+    /// Frames a second over the last second, as measured.
+    pub fps: f64,
+    /// Frames lost since the start.
+    pub lost: u64,
+}
+
+/// Why there is no frame.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CameraError {
+    /// Nothing came in time.
+    #[error("no frame within {0:?}")]
+    Timeout(Duration),
+    /// The device went away or failed; it is being looked for again.
+    #[error("the camera failed: {0}")]
+    Failed(String),
+    /// The source cannot be used at all: said at start.
+    #[error("{0}")]
+    BadSource(String),
+}

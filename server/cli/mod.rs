@@ -1,0 +1,36 @@
+//! The command line: one file a command; wires the rooms together.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Keeps a hyperspectral video exoscope in focus and runs blinded trials of its autofocus policies.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {}
+
+/// A command's failure: one clear sentence that says what to do.
+pub type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Runs the command that the process's arguments name. Exit code 0 success, 1 failure, 2 wrong usage.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(arguments.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("parfocal: {failure}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    match command {}
+}

@@ -1,0 +1,153 @@
+//! Control: the loop camera -> patch -> policy -> lens, its watchdog and its telemetry. Waits for no viewer, disk or
+//! database.
+
+mod slot;
+
+pub use slot::LatestSlot;
+
+use std::sync::Arc;
+
+use crate::ids::SegmentId;
+use serde::Serialize;
+use tokio::sync::{mpsc, watch};
+
+use crate::autofocus::PolicyName;
+use crate::camera::{CameraHealth, Frame};
+use crate::clock::Moment;
+use crate::imaging::{ContentArea, PatchArea};
+use crate::lens::{FocalPower, LensHealth};
+
+/// Who drives the lens.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drive {
+    /// Nobody: the lens stays where it is put.
+    Manual(FocalPower),
+    /// A fresh instance of a policy, from `start` if given, else from where the lens is.
+    Policy {
+        /// Which.
+        name: PolicyName,
+        /// Focal power to begin at.
+        start: Option<FocalPower>,
+    },
+    /// Whoever drives keeps still: the lens holds, the policy is not asked (a paused session).
+    Hold,
+}
+
+/// What the loop is told. Sending never blocks; the loop looks between two frames.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Command {
+    /// Change who drives, and mark every later step as belonging to `segment`.
+    Drive {
+        /// The new driver.
+        drive: Drive,
+        /// The trial segment that later steps belong to.
+        segment: Option<SegmentId>,
+    },
+    /// The content area found by the imaging thread, or that none is seen.
+    ContentArea(Option<ContentArea>),
+}
+
+/// One step of the loop: what telemetry keeps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepRecord {
+    /// Frame's number.
+    pub frame: u64,
+    /// End of the exposure.
+    pub exposed_at: Moment,
+    /// Trial segment, if one is running.
+    pub segment: Option<SegmentId>,
+    /// Policy that was asked, if any.
+    pub policy: Option<PolicyName>,
+    /// Focal power asked of the lens after this frame.
+    pub asked: FocalPower,
+    /// Focal power that the frame was exposed at, as far as the lens knows.
+    pub measured: Option<FocalPower>,
+    /// The policy's focus metric.
+    pub metric: Option<f64>,
+    /// Duration of the policy's step, microseconds.
+    pub policy_micros: u32,
+    /// From end of exposure to the lens command, microseconds.
+    pub latency_micros: u32,
+    /// Why the loop held the lens instead of following the policy, if it did.
+    pub held: Option<Hold>,
+    /// The optimum, where a simulation knows it.
+    pub optimal: Option<FocalPower>,
+}
+
+/// Why the last good focal power is being held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Hold {
+    /// The policy panicked; a fresh instance is being made.
+    PolicyPanicked,
+    /// The policy asked for something that is no focal power.
+    PolicyNonsense,
+    /// The policy took longer than a frame.
+    PolicySlow,
+    /// The lens did not take the command.
+    LensFailed,
+    /// No frame came.
+    CameraFailed,
+    /// Paused on request.
+    Paused,
+}
+
+/// A frame with everything the loop knew when it was done with it. Goes to the imaging thread.
+#[derive(Debug, Clone)]
+pub struct ControlledFrame {
+    /// The frame.
+    pub frame: Frame,
+    /// Where the patch was.
+    pub patch: PatchArea,
+    /// Content area in use.
+    pub content_area: Option<ContentArea>,
+    /// The step taken on it.
+    pub record: StepRecord,
+    /// The policy's belief, if it has one.
+    pub belief: Option<Arc<[f32]>>,
+}
+
+/// The loop as the operator sees it; published a few times a second and at every change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ControlStatus {
+    /// The camera.
+    pub camera: CameraHealth,
+    /// The lens.
+    pub lens: LensHealth,
+    /// Policy in charge, if one is.
+    pub policy: Option<PolicyName>,
+    /// Last focal power asked for.
+    pub focal_power: FocalPower,
+    /// Why the lens is being held, if it is.
+    pub held: Option<Hold>,
+    /// The hold in words, and what to do.
+    pub message: Option<Arc<str>>,
+    /// Loop steps a second over the last second.
+    pub steps_per_second: f64,
+    /// Steps since the start.
+    pub steps: u64,
+    /// Telemetry records dropped because the writer fell behind.
+    pub telemetry_dropped: u64,
+    /// Median latency from exposure to lens command over the last second, microseconds.
+    pub latency_p50_micros: u32,
+    /// 99th percentile of the same.
+    pub latency_p99_micros: u32,
+}
+
+/// What the rest of the server holds of the loop.
+#[derive(Clone)]
+pub struct ControlHandle {
+    /// Commands in.
+    pub commands: mpsc::UnboundedSender<Command>,
+    /// Status out.
+    pub status: watch::Receiver<Arc<ControlStatus>>,
+    /// The latest frame out, for the imaging thread.
+    pub frames: Arc<LatestSlot<ControlledFrame>>,
+}
+
+impl ControlHandle {
+    /// Tells the loop something; what is sent after the loop's end is dropped.
+    pub fn send(&self, command: Command) {
+        let _ = self.commands.send(command);
+    }
+}

@@ -1,0 +1,1 @@
+//! HTTP: routes, pages, streams, roles. Holds no trial rule.

@@ -1,0 +1,44 @@
+//! Identifiers: one type each, so that none is taken for another.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+macro_rules! identifier {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
+        #[serde(transparent)]
+        pub struct $name(pub Uuid);
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.0.fmt(f)
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = uuid::Error;
+
+            fn from_str(text: &str) -> Result<Self, uuid::Error> {
+                text.parse().map($name)
+            }
+        }
+    };
+}
+
+identifier!(
+    /// A trial session. Random.
+    SessionId
+);
+identifier!(
+    /// One segment of a session. Random, so that two segments of one policy share nothing.
+    SegmentId
+);
+identifier!(
+    /// Made by a browser for one comment or answer: the same again is the same thing, however often it is sent.
+    IdempotencyKey
+);

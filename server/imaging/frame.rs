@@ -1,0 +1,137 @@
+//! Pictures in memory: the sensor's mosaic, and the RGB and gray pictures made from it.
+
+/// Rows and columns of one mosaic cell; a cell holds one sample of each of the 16 bands.
+pub const CELL: usize = 4;
+
+/// One exposure of a snapshot mosaic sensor: `width * height` samples, row by row, 10 bit in u16.
+/// Band of a sample = 4 * (row % 4) + column % 4.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MosaicFrame {
+    width: usize,
+    height: usize,
+    samples: Vec<u16>,
+}
+
+/// A picture whose size and data do not fit.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// Width or height is not a positive multiple of 4.
+    #[error("a mosaic frame must be a positive multiple of 4 wide and high, not {width}x{height}")]
+    BadSize {
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+    },
+    /// The number of samples is not width times height.
+    #[error("a {width}x{height} picture needs {expected} values, but {found} were given")]
+    WrongLength {
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Values a picture of this size has.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+}
+
+impl MosaicFrame {
+    /// A frame of `samples`, row by row.
+    ///
+    /// # Errors
+    /// When a side is not a positive multiple of 4, or the number of samples does not fit.
+    pub fn new(width: usize, height: usize, samples: Vec<u16>) -> Result<Self, FrameError> {
+        if width == 0 || height == 0 || !width.is_multiple_of(CELL) || !height.is_multiple_of(CELL) {
+            return Err(FrameError::BadSize { width, height });
+        }
+        check_length(width, height, 1, samples.len())?;
+        Ok(Self { width, height, samples })
+    }
+
+    /// Width in sensor pixels.
+    #[must_use]
+    pub const fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in sensor pixels.
+    #[must_use]
+    pub const fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Width in mosaic cells, which is the width of one band.
+    #[must_use]
+    pub const fn band_width(&self) -> usize {
+        self.width / CELL
+    }
+
+    /// Height in mosaic cells, which is the height of one band.
+    #[must_use]
+    pub const fn band_height(&self) -> usize {
+        self.height / CELL
+    }
+
+    /// All samples, row by row.
+    #[must_use]
+    pub fn samples(&self) -> &[u16] {
+        &self.samples
+    }
+
+    /// Takes the samples back out, to reuse their memory.
+    #[must_use]
+    pub fn into_samples(self) -> Vec<u16> {
+        self.samples
+    }
+}
+
+/// An 8-bit sRGB picture, `[r, g, b]` pixels interleaved, row by row.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct RgbImage {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// `3 * width * height` bytes.
+    pub data: Vec<u8>,
+}
+
+impl RgbImage {
+    /// A picture of `data`.
+    ///
+    /// # Errors
+    /// When the number of bytes does not fit the size.
+    pub fn new(width: usize, height: usize, data: Vec<u8>) -> Result<Self, FrameError> {
+        check_length(width, height, 3, data.len())?;
+        Ok(Self { width, height, data })
+    }
+}
+
+/// A gray picture on the 0..255 scale, row by row.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct GrayImage {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// `width * height` values, 0..=255, not rounded.
+    pub data: Vec<f32>,
+}
+
+impl GrayImage {
+    /// A picture of `data`.
+    ///
+    /// # Errors
+    /// When the number of values does not fit the size.
+    pub fn new(width: usize, height: usize, data: Vec<f32>) -> Result<Self, FrameError> {
+        check_length(width, height, 1, data.len())?;
+        Ok(Self { width, height, data })
+    }
+}
+
+fn check_length(width: usize, height: usize, channels: usize, found: usize) -> Result<(), FrameError> {
+    let expected = width * height * channels;
+    if found == expected { Ok(()) } else { Err(FrameError::WrongLength { width, height, expected, found }) }
+}

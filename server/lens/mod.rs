@@ -1,0 +1,107 @@
+//! Lenses: focal power, and what drives it. Knows no image.
+
+mod focal_power;
+
+pub use focal_power::{FocalPower, OutOfRange};
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::clock::Moment;
+
+/// A focus-tunable lens.
+///
+/// An implementation guarantees that [`Lens::set`], [`Lens::measured`] and [`Lens::health`] return within a
+/// millisecond whatever the device does: a driver that talks to a port does so on a thread of its own. A lens that
+/// failed goes on trying to come back by itself; the caller just keeps setting.
+pub trait Lens: Send {
+    /// Asks the lens to go to `target`; returns without waiting for it to get there.
+    ///
+    /// # Errors
+    /// When the command was not taken: the lens is gone, refuses, or its queue stalls. The lens stays where it was.
+    fn set(&mut self, target: FocalPower) -> Result<(), LensError>;
+
+    /// The focal power last known to be real (read back, or modelled from what was asked), if any is known.
+    fn measured(&self) -> Option<FocalPower>;
+
+    /// How the lens is, in words for the operator.
+    fn health(&self) -> LensHealth;
+
+    /// What the device is: may talk to it, and block for up to a second.
+    ///
+    /// # Errors
+    /// When the device does not answer.
+    fn info(&mut self) -> Result<LensInfo, LensError>;
+
+    /// Dead time and settling time, for attributing a frame to the focal power that it was exposed at.
+    fn dynamics(&self) -> LensDynamics;
+
+    /// What a simulated camera looks through: the true focal power of the glass over time. Real lenses, whose glass
+    /// cannot be known, answer with a model fed by what was asked.
+    fn optics(&self) -> Arc<dyn Optics>;
+}
+
+/// The glass itself, as the light sees it. Cheap, thread-safe, never blocks.
+pub trait Optics: Send + Sync {
+    /// True focal power at `moment`.
+    fn focal_power_at(&self, moment: Moment) -> FocalPower;
+}
+
+/// A lens's state, in words.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LensHealth {
+    /// Name for people, for example `simulated lens`.
+    pub name: Arc<str>,
+    /// Whether no real glass moves: said on every page.
+    pub simulated: bool,
+    /// Whether commands are being taken.
+    pub working: bool,
+    /// One sentence: what is the case and, if it is bad, what to do.
+    pub message: Arc<str>,
+}
+
+/// What a lens says of itself (`parfocal lens info --json`; part of the contract).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LensInfo {
+    /// Driver's name, for example `Optotune Lens Driver 4` or `simulated`.
+    pub driver: String,
+    /// Firmware type and version.
+    pub firmware: String,
+    /// Serial number.
+    pub serial: String,
+    /// Least dioptres that can be asked for; focal power 0.
+    pub min_dioptre: f64,
+    /// Most dioptres; focal power 1.
+    pub max_dioptre: f64,
+    /// Temperature of the lens.
+    pub temperature_celsius: Option<f64>,
+    /// Control mode, for example `focal power`.
+    pub mode: String,
+    /// Status conditions in words; empty when all is well.
+    pub status: Vec<String>,
+}
+
+/// How a lens answers a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LensDynamics {
+    /// From command to first movement.
+    pub delay: Duration,
+    /// From first movement to within 5 % of the step.
+    pub settling: Duration,
+}
+
+/// Why a lens did not do as it was told.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LensError {
+    /// No device, or it went away.
+    #[error("the lens does not answer: {0}")]
+    Gone(String),
+    /// The device said no.
+    #[error("the lens refused: {0}")]
+    Refused(String),
+    /// The specification given on the command line makes no sense.
+    #[error("{0}")]
+    BadSpec(String),
+}

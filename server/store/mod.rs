@@ -1,0 +1,1 @@
+//! Store: everything SQLite; the only place with SQL. Decides nothing.

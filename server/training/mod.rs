@@ -1,0 +1,1 @@
+//! Training: focal-time scans, replay memory, DQN, evaluation. Knows no web.

@@ -1,0 +1,251 @@
+//! What each role may see of a session. [`SurgeonView`] has no field for a policy, its order or its timing, and the code
+//! that serves surgeons sees no other.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::ids::{IdempotencyKey, SegmentId, SessionId};
+
+/// Where a session stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// Made, not started.
+    Ready,
+    /// The full-screen notice "setting k of n" waits for the surgeon's tap.
+    Notice,
+    /// The surgeon inspects; the segment's clock runs.
+    Inspecting,
+    /// The questions after a segment.
+    Questions,
+    /// The questions at the end.
+    Closing,
+    /// Every answer is in.
+    Completed,
+    /// Ended early, with a reason.
+    Aborted,
+}
+
+/// A session as the surgeon's browser gets it. Everything in it is the same whatever the policy.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SurgeonView {
+    /// The session; random.
+    pub session: SessionId,
+    /// Where it stands.
+    pub phase: Phase,
+    /// Whether it is paused in that phase (by the operator, or by a restart of the server).
+    pub paused: bool,
+    /// Whether this is practice.
+    pub practice: bool,
+    /// The protocol's title for surgeons.
+    pub title: String,
+    /// The segment in progress: random, never shared by two segments.
+    pub segment: Option<SegmentId>,
+    /// Setting in progress, from 1; 0 before the first.
+    pub setting: usize,
+    /// Settings in all.
+    pub settings: usize,
+    /// Seconds of inspection left in the segment at the time of sending.
+    pub remaining_seconds: Option<f64>,
+    /// The prompt to show now, if one is due ("How does the focus feel now?").
+    pub prompt: Option<String>,
+    /// One-tap comments.
+    pub quick_comments: Vec<String>,
+    /// The questions to show in `Questions` and `Closing`.
+    pub questions: Vec<Question>,
+    /// Answers already kept for those questions, by question id.
+    pub answers: BTreeMap<String, AnswerValue>,
+    /// Comments kept so far in this session.
+    pub comments: usize,
+}
+
+/// A question of the protocol.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Question {
+    /// Id, unique in the protocol.
+    pub id: String,
+    /// The question as read by the surgeon.
+    pub text: String,
+    /// What sort of answer it takes.
+    #[serde(flatten)]
+    pub kind: QuestionKind,
+    /// Whether it can be left out.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+/// Sorts of answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum QuestionKind {
+    /// Free text.
+    Text,
+    /// A point from 1 to `points`.
+    Likert {
+        /// 5 or 7.
+        points: u8,
+        /// What 1 means.
+        low: String,
+        /// What the highest point means.
+        high: String,
+    },
+    /// All settings of the session put in order, best first.
+    Ranking,
+    /// The System Usability Scale: ten items of 1..=5.
+    Sus,
+}
+
+/// An answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(untagged)]
+pub enum AnswerValue {
+    /// A Likert point.
+    Point(u8),
+    /// A ranking of settings (from 1), best first; or the ten SUS items.
+    Points(Vec<u8>),
+    /// Text.
+    Text(String),
+}
+
+/// A comment as a surgeon's browser sends it.
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+pub struct NewComment {
+    /// Idempotency key, made by the browser: the same key again is the same comment.
+    pub key: IdempotencyKey,
+    /// Session that the surgeon's page was showing.
+    pub session: SessionId,
+    /// Segment that the page was showing.
+    pub segment: Option<SegmentId>,
+    /// Number of the frame that was on screen.
+    pub frame: Option<u64>,
+    /// Milliseconds since 1970 by the browser's clock.
+    pub client_millis: Option<i64>,
+    /// What was said.
+    #[serde(flatten)]
+    pub said: Said,
+}
+
+/// What was said.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", content = "text", rename_all = "kebab-case")]
+pub enum Said {
+    /// Typed.
+    Text(String),
+    /// One of the protocol's quick comments.
+    Quick(String),
+    /// "Mark this moment".
+    Mark,
+}
+
+/// An answer as a surgeon's browser sends it. The same question again replaces the answer; the old one stays in the log.
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+pub struct NewAnswer {
+    /// Idempotency key.
+    pub key: IdempotencyKey,
+    /// Session.
+    pub session: SessionId,
+    /// Segment; none for the questions at the end.
+    pub segment: Option<SegmentId>,
+    /// Question id.
+    pub question: String,
+    /// The answer.
+    pub value: AnswerValue,
+}
+
+/// Something that moves a session on. `segment` names the one that the page was showing, so that a stale tab or a double
+/// click moves nothing twice.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "action", rename_all = "kebab-case")]
+pub enum Action {
+    /// Operator: begin; the first notice is shown.
+    Start,
+    /// Surgeon: tapped the notice of `segment`; its clock starts.
+    Acknowledge {
+        /// The segment.
+        segment: SegmentId,
+    },
+    /// Surgeon or operator: enough of `segment`; on to its questions, or the next notice.
+    FinishSegment {
+        /// The segment.
+        segment: SegmentId,
+    },
+    /// Surgeon: done with the questions of `segment`, or with the closing ones.
+    FinishQuestions {
+        /// The segment; none for the closing questions.
+        segment: Option<SegmentId>,
+    },
+    /// Operator: hold everything.
+    Pause {
+        /// Why.
+        reason: String,
+    },
+    /// Operator, or surgeon after a restart of the server: go on.
+    Resume,
+    /// Operator: end now.
+    Abort {
+        /// Why.
+        reason: String,
+    },
+    /// Researcher: tell which policies ran. On a session still under way this is emergency unblinding.
+    Unblind {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Who acts; kept with every event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// In the trial.
+    Surgeon,
+    /// At the device.
+    Operator,
+    /// Runs the study.
+    Researcher,
+    /// The server itself: a time limit, a restart.
+    System,
+}
+
+/// The session under way as the operator sees it. No policy either: the operator stands beside the surgeon.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct OperatorView {
+    /// What the surgeon sees.
+    #[serde(flatten)]
+    pub surgeon: SurgeonView,
+    /// Participant's code.
+    pub participant: String,
+    /// Protocol's name.
+    pub protocol: String,
+    /// The latest comments, newest first.
+    pub latest_comments: Vec<CommentLine>,
+    /// The latest events in words, newest first.
+    pub log: Vec<LogLine>,
+}
+
+/// A comment for reading.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CommentLine {
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: jiff::Timestamp,
+    /// Setting, from 1.
+    pub setting: Option<usize>,
+    /// What was said.
+    #[serde(flatten)]
+    pub said: Said,
+}
+
+/// An event in words.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct LogLine {
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: jiff::Timestamp,
+    /// Who.
+    pub by: Role,
+    /// What happened.
+    pub text: String,
+}
