@@ -1,0 +1,36 @@
+# The two commands that matter: `make run` and `make test`. Each sets up what is missing first.
+
+# Where `make run` listens, and what it adds to `parfocal serve`:
+#   make run BIND=0.0.0.0:8080 ARGS='--camera footage:clip.mp4'
+BIND ?= 127.0.0.1:8080
+ARGS ?=
+
+.PHONY: run test check lint unit bench fuzz
+
+run:
+	@.ci/setup build
+	@cargo build --release --quiet
+	@exec target/release/parfocal serve --bind $(BIND) $(ARGS)
+
+test:
+	@.ci/setup test
+	@$(MAKE) --no-print-directory check
+
+# The checks alone, on a machine that is already set up.
+check: lint unit
+
+lint:
+	cargo fmt --check
+	cargo clippy --all-targets --locked -- --deny warnings
+	cargo deny --locked check licenses bans sources
+
+unit:
+	cargo test --locked
+
+# Speed: each figure that the README states comes from here.
+bench:
+	cargo bench
+
+# A minute on each parser of bytes from outside (needs a nightly toolchain and cargo-fuzz).
+fuzz:
+	cd fuzz && for target in $$(cargo +nightly fuzz list); do cargo +nightly fuzz run $$target -- -max_total_time=60 || exit 1; done
