@@ -1,5 +1,7 @@
 //! Cameras: where frames come from. Knows no policy.
 
+pub mod walk;
+
 use std::sync::Arc;
 use std::time::Duration;
 
