@@ -1,7 +1,9 @@
 //! Autofocus: focus metrics and the policies that decide which way to turn the lens. Knows no camera, lens or database.
 
+mod metrics;
 mod registry;
 
+pub use metrics::{mgm, mlr};
 pub use registry::{PolicyEntry, PolicyError, PolicyName, Registry};
 
 use std::sync::Arc;
