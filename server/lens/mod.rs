@@ -1,8 +1,14 @@
 //! Lenses: focal power, and what drives it. Knows no image.
 
 mod focal_power;
+mod response;
+mod simulated;
+mod spec;
 
 pub use focal_power::{FocalPower, OutOfRange};
+pub use response::Response;
+pub use simulated::{SimulatedFault, SimulatedFaults, SimulatedLens};
+pub use spec::open;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -41,6 +47,19 @@ pub trait Lens: Send {
     /// What a simulated camera looks through: the true focal power of the glass over time. Real lenses, whose glass
     /// cannot be known, answer with a model fed by what was asked.
     fn optics(&self) -> Arc<dyn Optics>;
+
+    /// The focal power as the device itself tells it now: may talk to it, and block for up to a second.
+    ///
+    /// # Errors
+    /// When the device does not answer.
+    fn read_back(&mut self) -> Result<FocalPower, LensError> {
+        self.measured().ok_or_else(|| LensError::Gone(self.health().message.to_string()))
+    }
+
+    /// The switch for its faults, if the lens is a simulated one.
+    fn faults(&self) -> Option<SimulatedFaults> {
+        None
+    }
 }
 
 /// The glass itself, as the light sees it. Cheap, thread-safe, never blocks.
@@ -98,6 +117,9 @@ pub enum LensError {
     /// No device, or it went away.
     #[error("the lens does not answer: {0}")]
     Gone(String),
+    /// It is there, but commands wait to be carried out.
+    #[error("the lens takes no commands: {0}")]
+    Stalled(String),
     /// The device said no.
     #[error("the lens refused: {0}")]
     Refused(String),
