@@ -1,8 +1,12 @@
 //! Autofocus: focus metrics and the policies that decide which way to turn the lens. Knows no camera, lens or database.
 
+mod fixed;
+mod hill_climber;
 mod metrics;
 mod registry;
 
+pub use fixed::Fixed;
+pub use hill_climber::HillClimber;
 pub use metrics::{mgm, mlr};
 pub use registry::{PolicyEntry, PolicyError, PolicyName, Registry};
 

@@ -1,21 +1,22 @@
 //! The registry: every policy by its name, the same everywhere.
 
 use std::fmt;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::Policy;
+use super::{Fixed, HillClimber, Policy, mgm, mlr};
 
-/// A policy's name, as in the contract; valid once a [`Registry`] has taken it.
+/// A policy's name, as in the contract; valid once a [`Registry`] has taken it. Cheap to clone.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct PolicyName(String);
+pub struct PolicyName(Arc<str>);
 
 impl PolicyName {
     /// A name, known or not.
     #[must_use]
     pub fn new(name: &str) -> Self {
-        Self(name.to_owned())
+        Self(name.into())
     }
 
     /// The name as text.
@@ -40,6 +41,8 @@ pub struct PolicyEntry {
     pub summary: &'static str,
     /// Whether it can run now; a learned policy cannot without its weights.
     pub available: bool,
+    /// Why it cannot run and what to do, if it cannot.
+    pub reason: Option<String>,
 }
 
 /// Why a policy could not be had.
@@ -63,22 +66,152 @@ pub enum PolicyError {
     },
 }
 
-/// All policies. Clone freely; learned weights are shared.
+/// All policies. Clone freely; what their constructors hold (learned weights) is shared.
 #[derive(Clone, Default)]
-pub struct Registry {}
+pub struct Registry {
+    policies: Vec<Registered>,
+}
+
+#[derive(Clone)]
+struct Registered {
+    name: PolicyName,
+    summary: &'static str,
+    source: Source,
+}
+
+#[derive(Clone)]
+enum Source {
+    Constructor(Arc<dyn Fn() -> Box<dyn Policy> + Send + Sync>),
+    Missing(Arc<str>),
+}
 
 impl Registry {
+    /// The contract's policies in the contract's order.
+    #[must_use]
+    pub fn standard() -> Self {
+        const UNTRAINED: &str = "its weights are missing: make them with `parfocal train`";
+        Self::default()
+            .with("fixed", "the lens stays where it is", || Box::new(Fixed::default()))
+            .with("mgm-hill-climber", "climbs the mean gradient magnitude, a step a frame", || {
+                Box::new(HillClimber::new(mgm))
+            })
+            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || Box::new(HillClimber::new(mlr)))
+            .without("mgm-learned", "learned optimiser of the mean gradient magnitude", UNTRAINED)
+            .without("mlr-learned", "learned optimiser of the mean local ratio", UNTRAINED)
+            .without("cnn-learned", "learned end to end from the last eight patches", UNTRAINED)
+    }
+
+    /// This registry with policy `name` made by `build`, in the place of one of that name or else at the end.
+    #[must_use]
+    pub fn with(
+        self,
+        name: &str,
+        summary: &'static str,
+        build: impl Fn() -> Box<dyn Policy> + Send + Sync + 'static,
+    ) -> Self {
+        self.put(name, summary, Source::Constructor(Arc::new(build)))
+    }
+
+    /// This registry with policy `name` listed but not to be had, for `reason`, which says what to do.
+    #[must_use]
+    pub fn without(self, name: &str, summary: &'static str, reason: &str) -> Self {
+        self.put(name, summary, Source::Missing(reason.into()))
+    }
+
+    fn put(mut self, name: &str, summary: &'static str, source: Source) -> Self {
+        let new = Registered { name: PolicyName::new(name), summary, source };
+        match self.policies.iter_mut().find(|old| old.name == new.name) {
+            Some(old) => *old = new,
+            None => self.policies.push(new),
+        }
+        self
+    }
+
     /// Every policy, in the contract's order.
     #[must_use]
     pub fn entries(&self) -> Vec<PolicyEntry> {
-        todo!()
+        let entry = |policy: &Registered| {
+            let reason = match &policy.source {
+                Source::Constructor(_) => None,
+                Source::Missing(reason) => Some(reason.to_string()),
+            };
+            PolicyEntry { name: policy.name.clone(), summary: policy.summary, available: reason.is_none(), reason }
+        };
+        self.policies.iter().map(entry).collect()
     }
 
     /// A fresh instance of policy `name`, with nothing remembered.
     ///
     /// # Errors
     /// When there is no such policy or it cannot run.
-    pub fn build(&self, _name: &PolicyName) -> Result<Box<dyn Policy>, PolicyError> {
-        todo!()
+    pub fn build(&self, name: &PolicyName) -> Result<Box<dyn Policy>, PolicyError> {
+        let policy = self.policies.iter().find(|policy| policy.name == *name);
+        match policy.map(|policy| &policy.source) {
+            Some(Source::Constructor(build)) => Ok(build()),
+            Some(Source::Missing(reason)) => {
+                Err(PolicyError::Unavailable { name: name.clone(), reason: reason.to_string() })
+            }
+            None => {
+                let known: Vec<_> = self.policies.iter().map(|policy| policy.name.as_str()).collect();
+                Err(PolicyError::Unknown { name: name.clone(), known: known.join(", ") })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::autofocus::Observation;
+    use crate::imaging::{PATCH_SIDE, Patch};
+    use crate::lens::FocalPower;
+
+    fn names(registry: &Registry) -> Vec<String> {
+        registry.entries().iter().map(|entry| entry.name.to_string()).collect()
+    }
+
+    #[test]
+    fn the_standard_registry_has_the_contracts_names_in_the_contracts_order() {
+        let contract = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-learned", "mlr-learned", "cnn-learned"];
+        assert_eq!(names(&Registry::standard()), contract);
+    }
+
+    #[test]
+    fn an_entry_is_available_exactly_when_it_can_be_built() {
+        let registry = Registry::standard();
+        for entry in registry.entries() {
+            assert_eq!(registry.build(&entry.name).is_ok(), entry.available, "{}", entry.name);
+            assert_eq!(entry.reason.is_none(), entry.available, "{}", entry.name);
+        }
+    }
+
+    #[test]
+    fn instances_share_no_memory() {
+        let (registry, fixed) = (Registry::standard(), PolicyName::new("fixed"));
+        let patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
+        for start in [0.2, 0.7] {
+            let focal_power = FocalPower::new(start).unwrap();
+            let decision = registry.build(&fixed).unwrap().step(&Observation { patch: &patch, focal_power });
+            assert!((decision.target - start).abs() < f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_is_answered_with_the_known_ones() {
+        let registry = Registry::default().with("a", "", || Box::new(Fixed::default())).without(
+            "b",
+            "",
+            "it is not here: fetch it",
+        );
+        let error = |name| registry.build(&PolicyName::new(name)).err().map(|error| error.to_string());
+        assert_eq!(error("c").as_deref(), Some("there is no policy 'c'; there are: a, b"));
+        assert_eq!(error("b").as_deref(), Some("policy 'b' cannot run: it is not here: fetch it"));
+    }
+
+    #[test]
+    fn a_policy_registered_again_keeps_its_place() {
+        let registry = Registry::standard().with("mgm-learned", "trained", || Box::new(Fixed::default()));
+        assert_eq!(names(&registry), names(&Registry::standard()));
+        assert!(registry.build(&PolicyName::new("mgm-learned")).is_ok());
     }
 }

@@ -1,5 +1,7 @@
 //! The command line: one file a command; wires the rooms together.
 
+mod policies;
+
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -13,7 +15,10 @@ struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {}
+enum Command {
+    /// List the autofocus policies and whether each can run.
+    Policies(policies::Arguments),
+}
 
 /// A command's failure: one clear sentence that says what to do.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -32,5 +37,7 @@ pub fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> Result<(), Failure> {
-    match command {}
+    match command {
+        Command::Policies(arguments) => policies::run(&arguments),
+    }
 }
