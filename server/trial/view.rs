@@ -37,6 +37,8 @@ pub struct SurgeonView {
     pub phase: Phase,
     /// Whether it is paused in that phase (by the operator, or by a restart of the server).
     pub paused: bool,
+    /// Whether the surgeon may let it go on: after a restart of the server, not after a pause by the operator.
+    pub may_resume: bool,
     /// Whether this is practice.
     pub practice: bool,
     /// The protocol's title for surgeons.
