@@ -1,5 +1,6 @@
 //! Cameras: where frames come from. Knows no policy.
 
+pub mod phantom;
 pub mod walk;
 
 use std::sync::Arc;

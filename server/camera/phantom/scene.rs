@@ -1,0 +1,235 @@
+//! A brain's surface in a craniotomy, generated from a seed: what it is made of at each texel, and its relief.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "texel values, clamped to their range"
+)]
+
+use multiversion::multiversion;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::cortex::{Cortex, Folding};
+use super::field::Field;
+use super::spectra::{ARTERIAL, ENDMEMBERS, LAMP, PALE, VENOUS, endmembers_in_band};
+use super::vessels::{Density, Vessels};
+use crate::imaging::GrayImage;
+
+/// Side of the square surface in texels; one texel is about one pixel of a band at the usual working distance.
+pub const SIDE: usize = 1024;
+
+/// Value of a texel's abundance that stands for 1: headroom for mirrored lamps of 8 times white.
+pub(super) const UNIT: f32 = 8191.0;
+
+/// What one texel is made of: abundances of the endmembers, in units of 1/8191, lit by the lamp.
+pub(super) type Texel = [u16; ENDMEMBERS];
+
+/// A brain's surface, sharp and without noise.
+pub struct Scene {
+    /// `SIDE * SIDE` texels, row by row.
+    pub(super) texels: Vec<Texel>,
+    /// Height towards the camera of every second texel in both directions, in texels.
+    pub(super) relief: Field,
+}
+
+/// What makes one brain look other than the next.
+#[derive(Debug, Clone, Copy)]
+struct Character {
+    folding: Folding,
+    density: Density,
+    blood: f32,
+    saturation: f32,
+    mottling: f32,
+    wetness: f32,
+    roughness: f32,
+    lamp: [f32; 2],
+}
+
+impl Character {
+    fn draw(rng: &mut impl Rng) -> Self {
+        let mut between = |low: f32, high: f32| low + (high - low) * rng.random::<f32>();
+        let folding = Folding { gyrus: between(62.0, 118.0), alignment: between(0.0, 0.55) };
+        let density = Density {
+            arteries: between(5.0, 11.0) as usize,
+            veins: between(3.0, 7.0) as usize,
+            fine: between(250.0, 700.0) as usize,
+        };
+        let angle = between(0.0, std::f32::consts::TAU);
+        let tilt = between(0.1, 0.3);
+        Self {
+            folding,
+            density,
+            blood: between(0.12, 0.34),
+            saturation: between(0.55, 0.8),
+            mottling: between(0.6, 1.5),
+            wetness: between(0.4, 1.3),
+            roughness: between(0.6, 1.3),
+            lamp: [tilt * angle.cos(), tilt * angle.sin()],
+        }
+    }
+}
+
+impl Scene {
+    /// The scene of a seed: the same seed gives the same scene, another one another brain.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let character = Character::draw(&mut rng);
+        let cortex = Cortex::fold(SIDE, character.folding, &mut rng);
+        let vessels = Vessels::grow(SIDE, character.density, &cortex.crown, &mut rng);
+        let mut noise = |cell| Field::noise(SIDE, cell, &mut rng);
+        let (tint, patches, coarse, fine, rough) = (noise(90), noise(40), noise(17), noise(4), noise(7));
+        let mut surface = cortex.height.clone();
+        raise(&mut surface.data, &vessels.bulge.data, &rough.data, 0.3 * character.roughness);
+        let mut texels = vec![Texel::default(); SIDE * SIDE];
+        for (y, out) in texels.chunks_exact_mut(SIDE).enumerate() {
+            let rows = Rows {
+                surface: [y.saturating_sub(1), y, (y + 1).min(SIDE - 1)].map(|y| surface.row(y)),
+                open: cortex.open.row(y),
+                rim: cortex.rim.row(y),
+                crown: cortex.crown.row(y),
+                arteries: vessels.arteries.row(y),
+                veins: vessels.veins.row(y),
+                tint: tint.row(y),
+                patches: patches.row(y),
+                coarse: coarse.row(y),
+                fine: fine.row(y),
+            };
+            paint_row(out, &rows, &character);
+        }
+        let relief = Field::from_fn(SIDE / 2, |x, y| cortex.height.data[2 * y * SIDE + 2 * x]);
+        Self { texels, relief }
+    }
+
+    /// The middle of the scene as the gray picture a perfect lens would give: `width` x `height` texels (at most
+    /// [`SIDE`] each; more is cut), linear in light, on the 0..255 scale, exposed so that 1 pixel in 50 is above 200.
+    #[must_use]
+    pub fn sharp_gray(&self, width: usize, height: usize) -> GrayImage {
+        let weights = mean_reflectance();
+        let mut picture = self.middle(width, height, |texel| mix(texel, weights));
+        let scale = 200.0 / percentile_98(&picture.data).max(1e-6);
+        picture.data.iter_mut().for_each(|value| *value = (*value * scale).min(255.0));
+        picture
+    }
+
+    /// The middle of the scene, each texel through `value`.
+    fn middle(&self, width: usize, height: usize, value: impl Fn(Texel) -> f32) -> GrayImage {
+        let (width, height) = (width.min(SIDE), height.min(SIDE));
+        let (left, top) = ((SIDE - width) / 2, (SIDE - height) / 2);
+        let rows = self.texels.chunks_exact(SIDE).skip(top).take(height);
+        let data = rows.flat_map(|row| row[left..left + width].iter().map(|&texel| value(texel))).collect();
+        GrayImage { width, height, data }
+    }
+}
+
+/// Adds the vessels' bulge and a share of the roughness to the surface.
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn raise(surface: &mut [f32], bulge: &[f32], rough: &[f32], share: f32) {
+    for ((height, bulge), rough) in surface.iter_mut().zip(bulge).zip(rough) {
+        *height += bulge + share * rough;
+    }
+}
+
+/// One row of everything a texel's look follows from.
+struct Rows<'a> {
+    surface: [&'a [f32]; 3],
+    open: &'a [f32],
+    rim: &'a [f32],
+    crown: &'a [f32],
+    arteries: &'a [f32],
+    veins: &'a [f32],
+    tint: &'a [f32],
+    patches: &'a [f32],
+    coarse: &'a [f32],
+    fine: &'a [f32],
+}
+
+/// Paints a row: blood by place, light by slope, the mirrored lamp where the slope meets it.
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn paint_row(out: &mut [Texel], rows: &Rows<'_>, character: &Character) {
+    let side = out.len();
+    let [above, here, below] = rows.surface.map(|row| &row[..side]);
+    let (open, rim, crown) = (&rows.open[..side], &rows.rim[..side], &rows.crown[..side]);
+    let (arteries, veins, tint) = (&rows.arteries[..side], &rows.veins[..side], &rows.tint[..side]);
+    let (patches, coarse, fine) = (&rows.patches[..side], &rows.coarse[..side], &rows.fine[..side]);
+    for x in 0..side {
+        let (left, right) = (x.saturating_sub(1), (x + 1).min(side - 1));
+        let slope = [0.5 * (here[right] - here[left]), 0.5 * (below[x] - above[x])];
+        let steepness = slope[0] * slope[0] + slope[1] * slope[1];
+        let light = open[x] * (0.35 + 0.65 / (1.0 + steepness).sqrt());
+        let mottling = character.mottling * (0.035 * coarse[x] + 0.03 * fine[x] + 0.02 * patches[x]);
+        let brain = (character.blood * (1.25 - 0.35 * crown[x]) + mottling).clamp(0.02, 0.9);
+        let dura = (0.06 + 0.5 * mottling).clamp(0.0, 0.5);
+        let blood = brain + rim[x] * (dura - brain);
+        let saturation = (character.saturation + 0.05 * tint[x]).clamp(0.3, 0.97);
+        let (artery, vein) = (arteries[x] * (1.0 - 0.7 * rim[x]), veins[x] * (1.0 - 0.7 * rim[x]));
+        let tissue = (1.0 - artery) * (1.0 - vein);
+        let toward = [slope[0] - character.lamp[0], slope[1] - character.lamp[1]];
+        let miss = toward[0] * toward[0] + toward[1] * toward[1];
+        let wet = character.wetness * (0.55 + 0.5 * patches[x]).clamp(0.0, 1.6) * (1.0 - 0.9 * rim[x]) * open[x];
+        let sharp = 1.0 / (1.0 + 45.0 * miss);
+        let sheen = 1.0 / (1.0 + 5.0 * miss);
+        let mut texel = [0.0; ENDMEMBERS];
+        texel[PALE] = light * tissue * (1.0 - blood);
+        texel[ARTERIAL] = light * (tissue * blood * saturation + artery * (1.0 - vein));
+        texel[VENOUS] = light * (tissue * blood * (1.0 - saturation) + vein);
+        texel[LAMP] = wet * (1.7 * sharp * sharp * sharp * sharp + 0.03 * sheen * sheen);
+        out[x] = texel.map(|value| (value * UNIT) as u16);
+    }
+}
+
+/// Mean reflectance of the endmembers over the sensor's bands.
+fn mean_reflectance() -> [f32; ENDMEMBERS] {
+    let mut sum = [0.0; ENDMEMBERS];
+    for (centre, fwhm) in super::sensor::BANDS {
+        let band = endmembers_in_band(centre, fwhm);
+        sum.iter_mut().zip(band).for_each(|(sum, value)| *sum += value);
+    }
+    sum.map(|sum| (sum / super::sensor::BANDS.len() as f64) as f32)
+}
+
+fn mix(texel: Texel, weights: [f32; ENDMEMBERS]) -> f32 {
+    texel.iter().zip(weights).map(|(&abundance, weight)| f32::from(abundance) / UNIT * weight).sum()
+}
+
+/// Value that 1 in 50 exceeds, from every 16th value.
+fn percentile_98(values: &[f32]) -> f32 {
+    let mut some: Vec<f32> = values.iter().step_by(16).copied().collect();
+    if some.is_empty() {
+        return 0.0;
+    }
+    let index = some.len() * 49 / 50;
+    *some.select_nth_unstable_by(index, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_gives_one_scene_and_another_seed_another() {
+        let (one, same, other) = (Scene::new(1), Scene::new(1), Scene::new(2));
+        assert!(one.texels == same.texels);
+        let (one, other) = (one.sharp_gray(512, 272).data, other.sharp_gray(512, 272).data);
+        assert!(correlation(&one, &other).abs() < 0.3);
+    }
+
+    #[test]
+    fn a_sharp_picture_uses_the_gray_scale() {
+        let picture = Scene::new(3).sharp_gray(512, 272);
+        assert_eq!((picture.width, picture.height, picture.data.len()), (512, 272, 512 * 272));
+        let above = picture.data.iter().filter(|value| **value > 200.0).count() as f32 / picture.data.len() as f32;
+        assert!((0.01..0.03).contains(&above), "{above}");
+        assert!(picture.data.iter().all(|value| (0.0..=255.0).contains(value)));
+    }
+
+    fn correlation(a: &[f32], b: &[f32]) -> f32 {
+        let mean = |v: &[f32]| v.iter().sum::<f32>() / v.len() as f32;
+        let (mean_a, mean_b) = (mean(a), mean(b));
+        let covariance =
+            |x: &[f32], mx, y: &[f32], my| -> f32 { x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum() };
+        covariance(a, mean_a, b, mean_b) / (covariance(a, mean_a, a, mean_a) * covariance(b, mean_b, b, mean_b)).sqrt()
+    }
+}
