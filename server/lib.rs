@@ -18,6 +18,7 @@ pub mod trial;
 pub mod store;
 
 pub mod conductor;
+pub mod live;
 
 pub mod http;
 

@@ -1,6 +1,7 @@
 //! The command line: one file a command; wires the rooms together.
 
 mod policies;
+mod serve;
 
 use std::process::ExitCode;
 
@@ -18,6 +19,8 @@ struct Arguments {
 enum Command {
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
+    /// Start the server: the live view, the control loop and the trial.
+    Serve(serve::Arguments),
 }
 
 /// A command's failure: one clear sentence that says what to do.
@@ -39,5 +42,6 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> Result<(), Failure> {
     match command {
         Command::Policies(arguments) => policies::run(&arguments),
+        Command::Serve(arguments) => serve::run(&arguments),
     }
 }

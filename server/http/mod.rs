@@ -1,1 +1,99 @@
 //! HTTP: routes, pages, streams, roles. Holds no trial rule.
+
+pub mod assets;
+pub mod error;
+mod health;
+pub mod keys;
+mod live;
+mod live_operator;
+mod live_surgeon;
+mod metrics;
+mod mjpeg;
+mod openapi;
+mod operator;
+mod researcher;
+pub mod roles;
+pub mod security;
+mod state;
+mod surgeon;
+
+pub use metrics::Metrics;
+pub use state::{App, AppState};
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::http::StatusCode;
+use axum::serve::ListenerExt;
+use axum::{Extension, Router, middleware};
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+use tower::ServiceBuilder;
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::limit::RequestBodyLimitLayer;
+use tower_http::timeout::TimeoutLayer;
+use tower_http::trace::TraceLayer;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+
+use error::Error;
+
+/// The largest body that is read: a comment of the greatest length in JSON, with room.
+const BODY_LIMIT: usize = 256 * 1024;
+
+/// The longest that a handler may take to begin its answer; streams begin at once.
+const TIMEOUT: Duration = Duration::from_secs(20);
+
+/// Every route with everything around it.
+pub fn router(app: AppState) -> Router {
+    let document = openapi::Finished::default();
+    let (router, api) = OpenApiRouter::with_openapi(openapi::Document::openapi())
+        .merge(roles::routes())
+        .merge(surgeon::routes())
+        .merge(operator::routes())
+        .merge(researcher::routes())
+        .merge(live::routes())
+        .merge(mjpeg::routes())
+        .merge(health::routes())
+        .merge(metrics::routes())
+        .merge(assets::routes())
+        .merge(openapi::routes())
+        .split_for_parts();
+    let _ = document.set(api.to_json().unwrap_or_default());
+    // From the outside in.
+    let layers = ServiceBuilder::new()
+        .layer(TraceLayer::new_for_http().make_span_with(span))
+        .layer(middleware::from_fn(security::headers))
+        .layer(middleware::from_fn(error::render))
+        .layer(CatchPanicLayer::custom(|_| axum::response::IntoResponse::into_response(Error::Internal)))
+        .layer(middleware::from_fn_with_state(Arc::clone(&app), security::guard))
+        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, TIMEOUT))
+        .layer(RequestBodyLimitLayer::new(BODY_LIMIT))
+        .layer(Extension(document));
+    router.fallback(|| async { StatusCode::NOT_FOUND }).layer(layers).with_state(app)
+}
+
+/// The path alone: a query may hold a key.
+fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
+    tracing::debug_span!("request", method = %request.method(), path = request.uri().path())
+}
+
+/// Serves `app` on `listener` until `app.shutdown` turns true and what is under way is answered.
+///
+/// # Errors
+/// When the listener fails.
+pub async fn run(listener: TcpListener, app: AppState) -> std::io::Result<()> {
+    let mut shutdown = app.shutdown.clone();
+    let listener = listener.tap_io(|stream| {
+        // A frame is of use now or never: it does not wait for more to fill a packet.
+        let _ = stream.set_nodelay(true);
+    });
+    let service = router(app).into_make_service_with_connect_info::<SocketAddr>();
+    axum::serve(listener, service).with_graceful_shutdown(async move { ended(&mut shutdown).await }).await
+}
+
+/// Waits until the server is to end.
+pub(crate) async fn ended(shutdown: &mut watch::Receiver<bool>) {
+    let _ = shutdown.wait_for(|end| *end).await;
+}

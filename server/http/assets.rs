@@ -1,0 +1,81 @@
+//! Static files, part of the program. Their addresses hold a hash of all of them: they can be kept forever, and a new
+//! version of the program is never mixed with old files.
+
+use std::sync::LazyLock;
+
+use axum::extract::Path;
+use axum::http::StatusCode;
+use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, HeaderMap, IF_NONE_MATCH};
+use axum::response::{IntoResponse, Response};
+use sha2::{Digest, Sha256};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::Error;
+
+struct Asset {
+    name: &'static str,
+    body: &'static [u8],
+}
+
+macro_rules! assets {
+    ($($name:literal),* $(,)?) => {
+        [$(Asset { name: $name, body: include_bytes!(concat!("../../web/static/", $name)) }),*]
+    };
+}
+
+/// Every file of `web/static/`, by name.
+static ASSETS: &[Asset] = &assets!["live.js", "overlay.js", "style.css", "viewer.js"];
+
+/// Hash of all files, in hexadecimal.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let mut hash = Sha256::new();
+    for asset in ASSETS {
+        hash.update(asset.name);
+        hash.update(asset.body.len().to_le_bytes());
+        hash.update(asset.body);
+    }
+    hex::encode(&hash.finalize()[..8])
+});
+
+/// Address of static file `name`. Files that import each other by relative addresses find each other.
+#[must_use]
+pub fn url(name: &str) -> String {
+    format!("/static/{}/{name}", *VERSION)
+}
+
+/// A static file: a script, a style sheet, an icon.
+#[utoipa::path(get, path = "/static/{version}/{name}", tag = "assets",
+    params(("version" = String, Path, description = "hash of all static files"), ("name" = String, Path, description = "file name")),
+    responses((status = 200, description = "The file"), (status = 404, description = "No such file", body = super::error::ErrorBody)))]
+async fn asset(Path((version, name)): Path<(String, String)>, headers: HeaderMap) -> Result<Response, Error> {
+    let asset = ASSETS
+        .iter()
+        .find(|asset| asset.name == name)
+        .ok_or_else(|| Error::NotFound(format!("There is no file {name}.")))?;
+    // A page of an older program asks by the older hash: it gets what there is, and keeps it for no longer than needed.
+    let cache = if version == *VERSION { "public, max-age=31536000, immutable" } else { "no-cache" };
+    let etag = format!("\"{}\"", *VERSION);
+    let common = [(CACHE_CONTROL, cache.to_owned()), (ETAG, etag.clone())];
+    if headers.get(IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == etag.as_bytes()) {
+        return Ok((StatusCode::NOT_MODIFIED, common).into_response());
+    }
+    Ok((common, [(CONTENT_TYPE, content_type(&name))], asset.body).into_response())
+}
+
+fn content_type(name: &str) -> &'static str {
+    match name.rsplit('.').next() {
+        Some("js") => "text/javascript; charset=utf-8",
+        Some("css") => "text/css; charset=utf-8",
+        Some("svg") => "image/svg+xml",
+        Some("png") => "image/png",
+        Some("woff2") => "font/woff2",
+        Some("webmanifest") => "application/manifest+json",
+        _ => "application/octet-stream",
+    }
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(asset))
+}

@@ -1,0 +1,180 @@
+//! Errors as people meet them: a page with a way on for a browser, `{"error": "…"}` for a program.
+
+use askama::Template;
+use axum::Json;
+use axum::body::to_bytes;
+use axum::extract::Request;
+use axum::http::header::{ACCEPT, CONTENT_LENGTH, CONTENT_TYPE};
+use axum::http::{HeaderMap, StatusCode};
+use axum::middleware::Next;
+use axum::response::{Html, IntoResponse, Response};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::assets;
+use crate::conductor::ConductError;
+use crate::trial::view::Role;
+
+/// Why a request was not done. The text is for the person who reads it.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum Error {
+    /// There is no such thing.
+    #[error("{0}")]
+    NotFound(String),
+    /// It does not fit the present state; nothing was changed.
+    #[error("{0}")]
+    Conflict(String),
+    /// The request makes no sense.
+    #[error("{0}")]
+    Invalid(String),
+    /// The browser has not been let in to this role.
+    #[error("This page is for the {}. Open it with the {}'s link, which the server printed when it started.", role_name(*.0), role_name(*.0))]
+    NeedsRole(Role),
+    /// The key in the link is not one of this server's.
+    #[error("This link is not, or no longer, valid. Ask for the link that the server printed when it last started.")]
+    WrongKey,
+    /// A request that another site made.
+    #[error("This request came from another site and was not done. Go back to the page and try again from there.")]
+    CrossSite,
+    /// A name that the server does not go by.
+    #[error(
+        "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, start it with --bind 0.0.0.0:8080."
+    )]
+    WrongHost,
+    /// Disk or database failed; nothing was acknowledged.
+    #[error("Could not be saved: {0}")]
+    Storage(String),
+    /// The server's own fault.
+    #[error("The server failed at this request; what was saved before is safe. The server's log says more.")]
+    Internal,
+}
+
+/// A failure as programs get it.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ErrorBody {
+    /// What happened and what to do.
+    pub error: String,
+}
+
+impl Error {
+    /// The status that goes with it.
+    #[must_use]
+    pub const fn status(&self) -> StatusCode {
+        match self {
+            Self::NotFound(_) => StatusCode::NOT_FOUND,
+            Self::Conflict(_) => StatusCode::CONFLICT,
+            Self::Invalid(_) => StatusCode::UNPROCESSABLE_ENTITY,
+            Self::NeedsRole(_) | Self::WrongKey | Self::CrossSite => StatusCode::FORBIDDEN,
+            Self::WrongHost => StatusCode::MISDIRECTED_REQUEST,
+            Self::Storage(_) => StatusCode::INSUFFICIENT_STORAGE,
+            Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+        }
+    }
+}
+
+impl From<ConductError> for Error {
+    fn from(error: ConductError) -> Self {
+        match error {
+            ConductError::NotFound(text) => Self::NotFound(text),
+            ConductError::Conflict(text) => Self::Conflict(text),
+            ConductError::Invalid(text) => Self::Invalid(text),
+            ConductError::Storage(text) => Self::Storage(text),
+        }
+    }
+}
+
+impl IntoResponse for Error {
+    /// Leaves the error with the response; [`render`] makes the body once it knows who asked.
+    fn into_response(self) -> Response {
+        let mut response = self.status().into_response();
+        response.extensions_mut().insert(self);
+        response
+    }
+}
+
+#[derive(Template)]
+#[template(path = "error.html")]
+struct ErrorPage<'a> {
+    stylesheet: String,
+    title: &'a str,
+    message: &'a str,
+    /// Whether to load the page once more: a browser that followed another site's link keeps strict cookies back the
+    /// first time, and sends them when our own page asks.
+    reload: bool,
+}
+
+/// Gives every failed response its body: a page for a browser on its way to a page, JSON for everyone else.
+pub async fn render(request: Request, next: Next) -> Response {
+    let page = wants_page(request.headers());
+    let from_elsewhere = request.headers().get("sec-fetch-site").is_some_and(|site| site == "cross-site");
+    let response = next.run(request).await;
+    let status = response.status();
+    if !status.is_client_error() && !status.is_server_error() {
+        return response;
+    }
+    let (mut parts, body) = response.into_parts();
+    let error = parts.extensions.remove::<Error>();
+    let message = match &error {
+        Some(error) => error.to_string(),
+        None => message_of(status, &parts.headers, body).await,
+    };
+    parts.headers.remove(CONTENT_LENGTH);
+    parts.headers.remove(CONTENT_TYPE);
+    if !page {
+        return (parts, Json(ErrorBody { error: message })).into_response();
+    }
+    let html = ErrorPage {
+        stylesheet: assets::url("style.css"),
+        title: title_of(status),
+        message: &message,
+        reload: from_elsewhere && matches!(error, Some(Error::NeedsRole(_))),
+    };
+    match html.render() {
+        Ok(html) => (parts, Html(html)).into_response(),
+        Err(_) => (parts, message).into_response(),
+    }
+}
+
+fn wants_page(headers: &HeaderMap) -> bool {
+    headers.get(ACCEPT).and_then(|accept| accept.to_str().ok()).is_some_and(|accept| accept.contains("text/html"))
+}
+
+/// The words of a failure that another layer made: its own if it gave any, else what the status means.
+async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::Body) -> String {
+    let is_text = headers.get(CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"text/plain"));
+    if is_text
+        && let Ok(bytes) = to_bytes(body, 4096).await
+        && let Ok(text) = String::from_utf8(bytes.into())
+        && !text.is_empty()
+    {
+        return text;
+    }
+    match status {
+        StatusCode::NOT_FOUND => "There is nothing at this address.".into(),
+        StatusCode::METHOD_NOT_ALLOWED => "This address does not take this kind of request.".into(),
+        StatusCode::PAYLOAD_TOO_LARGE => "What was sent is too large.".into(),
+        StatusCode::REQUEST_TIMEOUT => "The server took too long; try again.".into(),
+        other => other.canonical_reason().unwrap_or("The request failed.").into(),
+    }
+}
+
+fn title_of(status: StatusCode) -> &'static str {
+    match status {
+        StatusCode::NOT_FOUND => "Nothing here",
+        StatusCode::FORBIDDEN | StatusCode::MISDIRECTED_REQUEST => "Not open to this browser",
+        StatusCode::CONFLICT => "That does not fit just now",
+        status if status.is_server_error() => "The server failed",
+        _ => "That did not work",
+    }
+}
+
+/// A role's name in a sentence.
+#[must_use]
+pub const fn role_name(role: Role) -> &'static str {
+    match role {
+        Role::Surgeon => "surgeon",
+        Role::Operator => "operator",
+        Role::Researcher => "researcher",
+        Role::System => "server",
+    }
+}

@@ -1,0 +1,192 @@
+//! The three roles' keys: unguessable, kept in the data folder, compared in constant time.
+
+use std::fs;
+use std::io::Write;
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use subtle::ConstantTimeEq;
+
+use crate::trial::view::Role;
+
+/// Name of the key file in the data folder.
+const FILE: &str = "keys.toml";
+
+/// Bytes of a key: 128 bits cannot be guessed.
+const KEY_BYTES: usize = 16;
+
+const HEADER: &str = "# Keys of the three roles' links. Whoever has a key has the role. Delete this file and restart to\n\
+                      # make new keys; every browser then has to be let in anew.\n\n";
+
+/// Roles that have a key.
+pub const ROLES: [Role; 3] = [Role::Surgeon, Role::Operator, Role::Researcher];
+
+/// Why there are no keys.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyError {
+    /// The file could not be read or written.
+    #[error("cannot keep the roles' keys in {}: {source}; check the folder's permissions and free space", path.display())]
+    Io {
+        /// The key file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is not what was written.
+    #[error("{} is damaged ({reason}); delete it to make new keys", path.display())]
+    Damaged {
+        /// The key file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The system has no randomness to give.
+    #[error("the system gave no random numbers: {0}")]
+    Random(getrandom::Error),
+}
+
+/// One key for each role, in hexadecimal.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Keys {
+    surgeon: String,
+    operator: String,
+    researcher: String,
+}
+
+impl Keys {
+    /// The keys kept in `data_dir`; made on first use, readable by their owner alone.
+    ///
+    /// # Errors
+    /// When the file cannot be read or written, or is damaged.
+    pub fn load_or_create(data_dir: &Path) -> Result<Self, KeyError> {
+        let path = data_dir.join(FILE);
+        let io = |source| KeyError::Io { path: path.clone(), source };
+        match fs::read_to_string(&path) {
+            Ok(text) => {
+                fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
+                Self::parse(&text).map_err(|reason| KeyError::Damaged { path, reason })
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                let keys = Self::random()?;
+                keys.write(&path).map_err(io)?;
+                Ok(keys)
+            }
+            Err(error) => Err(io(error)),
+        }
+    }
+
+    /// New keys, kept nowhere.
+    ///
+    /// # Errors
+    /// When the system gives no random numbers.
+    pub fn random() -> Result<Self, KeyError> {
+        let key = || {
+            let mut bytes = [0; KEY_BYTES];
+            getrandom::fill(&mut bytes).map_err(KeyError::Random)?;
+            Ok(hex::encode(bytes))
+        };
+        Ok(Self { surgeon: key()?, operator: key()?, researcher: key()? })
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let keys: Self = toml::from_str(text).map_err(|error| error.message().to_owned())?;
+        for role in ROLES {
+            if hex::decode(keys.of(role)).ok().is_none_or(|bytes| bytes.len() < KEY_BYTES) {
+                return Err("each key must be at least 32 hexadecimal digits".into());
+            }
+        }
+        Ok(keys)
+    }
+
+    /// Written aside and moved into place, so that a full disk leaves no half of a file.
+    fn write(&self, path: &Path) -> std::io::Result<()> {
+        let text = toml::to_string(self).map_err(std::io::Error::other)?;
+        let aside = path.with_extension("toml.new");
+        let mut file = fs::OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&aside)?;
+        file.write_all(HEADER.as_bytes())?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()?;
+        fs::rename(aside, path)
+    }
+
+    /// The key of `role`; empty, and opening nothing, for [`Role::System`].
+    #[must_use]
+    pub fn of(&self, role: Role) -> &str {
+        match role {
+            Role::Surgeon => &self.surgeon,
+            Role::Operator => &self.operator,
+            Role::Researcher => &self.researcher,
+            Role::System => "",
+        }
+    }
+
+    /// The role that `key` opens. Takes as long whatever is offered.
+    #[must_use]
+    pub fn role_of(&self, key: &str) -> Option<Role> {
+        let mut found = None;
+        for role in ROLES {
+            if bool::from(self.of(role).as_bytes().ct_eq(key.as_bytes())) {
+                found = Some(role);
+            }
+        }
+        found
+    }
+
+    /// What the cookie of `role` holds: derived from the key one way, so that a cookie seen gives no link away, and the
+    /// same after a restart, so that a tablet stays let in.
+    #[must_use]
+    pub fn token(&self, role: Role) -> String {
+        let digest = Sha256::new().chain_update(b"parfocal cookie 1:").chain_update(self.of(role)).finalize();
+        hex::encode(digest)
+    }
+
+    /// Whether `token` is the cookie of `role`.
+    #[must_use]
+    pub fn opens(&self, role: Role, token: &str) -> bool {
+        role != Role::System && bool::from(self.token(role).as_bytes().ct_eq(token.as_bytes()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_made_once_for_their_owner_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let first = Keys::load_or_create(dir.path()).unwrap();
+        let again = Keys::load_or_create(dir.path()).unwrap();
+        for role in ROLES {
+            assert_eq!(first.of(role), again.of(role));
+            assert_eq!(first.of(role).len(), 32);
+            assert_eq!(first.role_of(again.of(role)), Some(role));
+            assert!(first.opens(role, &again.token(role)));
+            assert!(!first.opens(role, first.of(role)), "the key itself is no cookie");
+        }
+        let mode = fs::metadata(dir.path().join(FILE)).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+    }
+
+    #[test]
+    fn what_is_no_key_opens_nothing() {
+        let keys = Keys::random().unwrap();
+        for wrong in ["", "0", &keys.of(Role::Operator)[1..], &keys.of(Role::Operator).to_uppercase()[..31]] {
+            assert_eq!(keys.role_of(wrong), None);
+        }
+        assert!(!keys.opens(Role::Operator, &keys.token(Role::Surgeon)));
+        assert!(!keys.opens(Role::System, &keys.token(Role::System)));
+    }
+
+    #[test]
+    fn a_damaged_file_is_said_to_be_damaged() {
+        let dir = tempfile::tempdir().unwrap();
+        for text in ["", "surgeon = 3", "surgeon = \"\"\noperator = \"\"\nresearcher = \"\"\n"] {
+            fs::write(dir.path().join(FILE), text).unwrap();
+            let error = Keys::load_or_create(dir.path()).err().expect("damaged").to_string();
+            assert!(error.contains("keys.toml") && error.contains("delete it"), "{error}");
+        }
+    }
+}

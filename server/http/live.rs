@@ -1,0 +1,280 @@
+//! `/live`: the WebSocket that carries pictures and state to one page.
+//!
+//! Binary messages are frames: a header's length (u16, little-endian), the header (JSON), the JPEG. Text messages are
+//! JSON with a `type`: `session` when the session changes, `status` when the devices' state does. The page answers each
+//! frame that it has drawn, and only then gets the next, which is by then the latest: so no queue forms anywhere, however
+//! slow the link. A page that says it is hidden gets no frames.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
+use axum::extract::{Query, State};
+use axum::response::Response;
+use bytes::{BufMut, Bytes, BytesMut};
+use serde::{Deserialize, Serialize};
+use tokio::sync::watch;
+use tokio::time::{MissedTickBehavior, interval, timeout};
+use utoipa::IntoParams;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::error::Error;
+use super::live_operator::ForOperator;
+use super::live_surgeon::ForSurgeon;
+use super::roles::Roles;
+use super::{App, AppState, ended};
+use crate::control::ControlStatus;
+use crate::live::{EncodedFrame, Watcher};
+use crate::trial::view::Role;
+
+/// A page that has been silent for two of these is gone.
+const HEARTBEAT: Duration = Duration::from_secs(5);
+
+/// A message that has not left by then never will.
+const SEND_LIMIT: Duration = Duration::from_secs(10);
+
+/// Pages send acknowledgements, nothing longer.
+const LARGEST_REQUEST: usize = 1024;
+
+/// Who is at the other end, and so what may be sent: one implementation a role, each with types of its own.
+pub(super) trait Audience: Send + Sync + 'static {
+    /// What goes with each picture.
+    type Header: Serialize + Send;
+    /// The session under way.
+    type Session: Serialize + Send + Sync + 'static;
+    /// The state of the devices.
+    type Status: Serialize + PartialEq + Send;
+
+    /// What goes with `frame`, which is `age_ms` old.
+    fn header(frame: &EncodedFrame, age_ms: f64) -> Self::Header;
+    /// Where the session is followed.
+    fn sessions(app: &App) -> watch::Receiver<Option<Arc<Self::Session>>>;
+    /// The state of the devices.
+    fn status(status: &ControlStatus, app: &App) -> Self::Status;
+}
+
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct LiveQuery {
+    /// The role to be served as, of those that the browser holds; else the one that may see least.
+    role: Option<Role>,
+}
+
+/// What a page says.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "type", rename_all = "kebab-case")]
+enum Said {
+    /// This frame is on screen.
+    Drawn { frame: u64 },
+    /// Whether the page can be seen.
+    Visible { visible: bool },
+}
+
+/// What a page is told in text.
+#[derive(Serialize)]
+#[serde(tag = "type", rename_all = "kebab-case")]
+enum Told<S, T> {
+    Session { view: Option<S> },
+    Status(T),
+}
+
+/// Pictures and state, as they come (WebSocket).
+#[utoipa::path(get, path = "/live", tag = "stream", params(LiveQuery), responses(
+    (status = 101, description = "WebSocket: binary messages are frames, text messages are state"),
+    (status = 403, description = "The role is not held", body = super::error::ErrorBody)))]
+async fn live(
+    State(app): State<AppState>,
+    roles: Roles,
+    Query(query): Query<LiveQuery>,
+    upgrade: WebSocketUpgrade,
+) -> Result<Response, Error> {
+    let role = roles.choose(query.role)?;
+    let upgrade = upgrade.max_message_size(LARGEST_REQUEST).read_buffer_size(LARGEST_REQUEST * 4);
+    Ok(upgrade.on_upgrade(async move |socket| match role {
+        Role::Operator | Role::Researcher => attend::<ForOperator>(socket, app).await,
+        Role::Surgeon | Role::System => attend::<ForSurgeon>(socket, app).await,
+    }))
+}
+
+/// Serves one page until it leaves or the server ends.
+async fn attend<A: Audience>(mut socket: WebSocket, app: AppState) {
+    let mut desk = Desk::<A>::new(app);
+    while let Ok(Some(message)) = desk.next_message(&mut socket).await {
+        let last = matches!(message, Message::Close(_));
+        if !matches!(timeout(SEND_LIMIT, socket.send(message)).await, Ok(Ok(()))) || last {
+            break;
+        }
+    }
+}
+
+/// The page has left.
+struct Left;
+
+/// What is known of one page, and what it has yet to be told.
+struct Desk<A: Audience> {
+    app: AppState,
+    /// Set while the page can be seen.
+    watcher: Option<Watcher>,
+    /// The frame sent and not yet drawn.
+    in_flight: Option<u64>,
+    sessions: watch::Receiver<Option<Arc<A::Session>>>,
+    statuses: watch::Receiver<Arc<ControlStatus>>,
+    /// The last status told, so that only changes are.
+    told: Option<A::Status>,
+    shutdown: watch::Receiver<bool>,
+    heartbeat: tokio::time::Interval,
+    /// Heartbeats since the page was last heard.
+    silent: u32,
+}
+
+impl<A: Audience> Desk<A> {
+    fn new(app: AppState) -> Self {
+        let mut heartbeat = interval(HEARTBEAT);
+        heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut sessions = A::sessions(&app);
+        sessions.mark_changed();
+        let mut statuses = app.control.status.clone();
+        statuses.mark_changed();
+        Self {
+            watcher: Some(app.live.watch()),
+            in_flight: None,
+            sessions,
+            statuses,
+            told: None,
+            shutdown: app.shutdown.clone(),
+            heartbeat,
+            silent: 0,
+            app,
+        }
+    }
+
+    /// The next message for the page; `Ok(None)` never comes before one is due.
+    async fn next_message(&mut self, socket: &mut WebSocket) -> Result<Option<Message>, Left> {
+        loop {
+            let message = tokio::select! {
+                () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
+                heard = socket.recv() => match heard {
+                    Some(Ok(message)) => self.hear(&message)?,
+                    _ => return Err(Left),
+                },
+                Ok(()) = self.sessions.changed() => self.session(),
+                Ok(()) = self.statuses.changed() => self.status(),
+                frame = next_frame(&mut self.watcher), if self.in_flight.is_none() => self.frame(frame.as_deref()),
+                _ = self.heartbeat.tick() => self.beat()?,
+            };
+            if message.is_some() {
+                return Ok(message);
+            }
+        }
+    }
+
+    fn hear(&mut self, message: &Message) -> Result<Option<Message>, Left> {
+        self.silent = 0;
+        let text = match message {
+            Message::Text(text) => text.as_str(),
+            Message::Close(_) => return Err(Left),
+            Message::Binary(_) => return Ok(Some(close(close_code::UNSUPPORTED, "text is expected"))),
+            Message::Ping(_) | Message::Pong(_) => return Ok(None),
+        };
+        match serde_json::from_str(text) {
+            Ok(Said::Drawn { frame }) if self.in_flight == Some(frame) => self.in_flight = None,
+            Ok(Said::Drawn { .. }) => {}
+            Ok(Said::Visible { visible: false }) => self.watcher = None,
+            Ok(Said::Visible { visible: true }) => {
+                self.in_flight = None;
+                self.watcher.get_or_insert_with(|| self.app.live.watch());
+            }
+            Err(_) => return Ok(Some(close(close_code::POLICY, "this is no message of a page"))),
+        }
+        Ok(None)
+    }
+
+    fn session(&mut self) -> Option<Message> {
+        // Whether a policy may be named depends on the session.
+        self.statuses.mark_changed();
+        let view = self.sessions.borrow_and_update().clone();
+        tell(&Told::<_, A::Status>::Session { view: view.as_deref() })
+    }
+
+    fn status(&mut self) -> Option<Message> {
+        let status = A::status(&self.statuses.borrow_and_update(), &self.app);
+        if self.told.as_ref() == Some(&status) {
+            return None;
+        }
+        let message = tell(&Told::<&A::Session, _>::Status(&status));
+        self.told = Some(status);
+        message
+    }
+
+    fn frame(&mut self, frame: Option<&EncodedFrame>) -> Option<Message> {
+        let Some(frame) = frame else {
+            self.watcher = None;
+            return None;
+        };
+        let age = self.app.clock.now().since(frame.picture.exposed_at);
+        let message = pack(&A::header(frame, tenth_millis(age)), &frame.picture.jpeg)?;
+        self.in_flight = Some(frame.picture.number);
+        self.app.metrics.frames_sent.inc();
+        self.app.metrics.bytes_sent.inc_by(message.len() as u64);
+        Some(Message::Binary(message))
+    }
+
+    fn beat(&mut self) -> Result<Option<Message>, Left> {
+        self.silent += 1;
+        if self.silent > 2 { Err(Left) } else { Ok(Some(Message::Ping(Bytes::new()))) }
+    }
+}
+
+/// The next frame of a page that can be seen; of one that cannot, none ever.
+async fn next_frame(watcher: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
+    match watcher {
+        Some(watcher) => watcher.next().await,
+        None => std::future::pending().await,
+    }
+}
+
+fn close(code: u16, reason: &'static str) -> Message {
+    Message::Close(Some(CloseFrame { code, reason: reason.into() }))
+}
+
+fn tell(told: &impl Serialize) -> Option<Message> {
+    let text = serde_json::to_string(told).inspect_err(|error| tracing::error!(%error, "state cannot be told")).ok()?;
+    Some(Message::Text(text.into()))
+}
+
+/// A frame's message: header length, header, JPEG.
+fn pack(header: &impl Serialize, jpeg: &[u8]) -> Option<Bytes> {
+    let header = serde_json::to_vec(header).ok()?;
+    let length = u16::try_from(header.len()).ok()?;
+    let mut message = BytesMut::with_capacity(2 + header.len() + jpeg.len());
+    message.put_u16_le(length);
+    message.put_slice(&header);
+    message.put_slice(jpeg);
+    Some(message.freeze())
+}
+
+/// Milliseconds with one decimal.
+fn tenth_millis(age: Duration) -> f64 {
+    (age.as_secs_f64() * 1e4).round() / 10.0
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(live))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_packed_as_documented() {
+        let message = pack(&serde_json::json!({"frame": 7}), &[0xff, 0xd8]).unwrap();
+        assert_eq!(&message[..], b"\x0b\x00{\"frame\":7}\xff\xd8");
+    }
+
+    #[test]
+    fn an_age_is_told_in_tenths_of_a_millisecond() {
+        assert!((tenth_millis(Duration::from_micros(1_260)) - 1.3).abs() < 1e-9);
+    }
+}

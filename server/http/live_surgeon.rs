@@ -1,0 +1,99 @@
+//! What a surgeon's page gets on `/live`. These types have no field for a policy, its focal power, metric or timing, and
+//! their form is the same whatever runs.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use tokio::sync::watch;
+use utoipa::ToSchema;
+
+use super::App;
+use super::live::Audience;
+use crate::control::{ControlStatus, Hold};
+use crate::imaging::PatchArea;
+use crate::live::{EncodedFrame, Picture};
+use crate::trial::view::SurgeonView;
+
+/// A surgeon's page.
+pub(super) struct ForSurgeon;
+
+/// What goes with each picture.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(super) struct SurgeonFrame {
+    /// Frame's number.
+    frame: u64,
+    /// Milliseconds from the end of the exposure to sending.
+    age: f64,
+    /// Width in pixels.
+    width: usize,
+    /// Height in pixels.
+    height: usize,
+    /// Where the focus is looked for.
+    #[schema(value_type = Object)]
+    patch: PatchArea,
+    /// The bright circle, if one is seen.
+    area: Option<Circle>,
+}
+
+/// A circle in pixels of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub(super) struct Circle {
+    x: f64,
+    y: f64,
+    radius: f64,
+}
+
+impl SurgeonFrame {
+    /// What goes with `picture`, which is `age` milliseconds old.
+    pub(super) fn new(picture: &Picture, age: f64) -> Self {
+        Self {
+            frame: picture.number,
+            age,
+            width: picture.width,
+            height: picture.height,
+            patch: picture.patch,
+            area: picture.content_area.map(|area| Circle { x: area.x, y: area.y, radius: area.radius }),
+        }
+    }
+}
+
+/// The devices as a surgeon needs to know them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub(super) struct SurgeonStatus {
+    /// Whether the picture is not of the real world.
+    camera_simulated: bool,
+    /// Whether no real glass moves.
+    lens_simulated: bool,
+    /// What is the matter, if anything: the same words whatever runs.
+    notice: Option<&'static str>,
+}
+
+impl SurgeonStatus {
+    fn new(status: &ControlStatus) -> Self {
+        let notice = match status.held {
+            _ if !status.camera.working => Some("The camera is not delivering pictures."),
+            Some(Hold::CameraFailed) => Some("The camera is not delivering pictures."),
+            Some(Hold::Paused) | None => None,
+            Some(_) => Some("The focus is being held for the moment."),
+        };
+        Self { camera_simulated: status.camera.simulated, lens_simulated: status.lens.simulated, notice }
+    }
+}
+
+impl Audience for ForSurgeon {
+    type Header = SurgeonFrame;
+    type Session = SurgeonView;
+    type Status = SurgeonStatus;
+
+    fn header(frame: &EncodedFrame, age_ms: f64) -> SurgeonFrame {
+        SurgeonFrame::new(&frame.picture, age_ms)
+    }
+
+    fn sessions(app: &App) -> watch::Receiver<Option<Arc<SurgeonView>>> {
+        app.surgeon_view.clone()
+    }
+
+    fn status(status: &ControlStatus, _: &App) -> SurgeonStatus {
+        SurgeonStatus::new(status)
+    }
+}

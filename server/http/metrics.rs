@@ -1,0 +1,78 @@
+//! `/metrics`: counters for Prometheus. For operator and researcher; nothing in it is told apart by policy.
+
+use std::sync::atomic::AtomicU64;
+
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+use prometheus_client::encoding::text::encode;
+use prometheus_client::metrics::counter::{ConstCounter, Counter};
+use prometheus_client::metrics::gauge::ConstGauge;
+use prometheus_client::registry::{Registry, Unit};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::error::Error;
+use super::roles::Roles;
+use super::{App, AppState};
+use crate::trial::view::Role;
+
+/// What HTTP itself counts.
+#[derive(Debug, Clone, Default)]
+pub struct Metrics {
+    /// Frames sent to viewers.
+    pub frames_sent: Counter<u64, AtomicU64>,
+    /// Bytes of those.
+    pub bytes_sent: Counter<u64, AtomicU64>,
+}
+
+/// The server's counters in the `OpenMetrics` text format.
+#[utoipa::path(get, path = "/metrics", tag = "service", responses(
+    (status = 200, description = "Counters", content_type = "application/openmetrics-text"),
+    (status = 403, description = "For operator and researcher", body = super::error::ErrorBody)))]
+async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoResponse, Error> {
+    roles.choose(Some(Role::Operator)).or_else(|_| roles.choose(Some(Role::Researcher)))?;
+    let mut text = String::new();
+    encode(&mut text, &collect(&app)).map_err(|_| Error::Internal)?;
+    Ok(([(CONTENT_TYPE, "application/openmetrics-text; version=1.0.0; charset=utf-8")], text))
+}
+
+fn collect(app: &App) -> Registry {
+    let status = app.control.status.borrow();
+    let counts = app.live.counts();
+    let mut registry = Registry::with_prefix("parfocal");
+    let counters = [
+        ("steps", "Steps of the control loop", status.steps),
+        ("frames_lost", "Frames that the camera lost", status.camera.lost),
+        ("frames_skipped", "Frames that the imaging thread had no time for", app.control.frames.overwritten()),
+        ("frames_encoded", "Frames made into JPEG", counts.encoded()),
+        ("telemetry_dropped", "Telemetry records dropped because the writer fell behind", status.telemetry_dropped),
+    ];
+    for (name, help, value) in counters {
+        registry.register(name, help, ConstCounter::new(value));
+    }
+    registry.register_with_unit("jpeg", "JPEG made", Unit::Bytes, ConstCounter::new(counts.jpeg_bytes()));
+    registry.register("frames_sent", "Frames sent to viewers", app.metrics.frames_sent.clone());
+    registry.register_with_unit("stream", "Frames sent to viewers", Unit::Bytes, app.metrics.bytes_sent.clone());
+    registry.register("viewers", "Viewers that want pictures now", ConstGauge::new(counts.viewers()));
+    let gauges = [
+        ("steps_per_second", "Steps of the control loop over the last second", status.steps_per_second),
+        ("camera_fps", "Frames a second from the camera", status.camera.fps),
+        ("latency_p50_seconds", "Median time from exposure to lens command", seconds(status.latency_p50_micros)),
+        ("latency_p99_seconds", "99th percentile of the same", seconds(status.latency_p99_micros)),
+        ("camera_working", "Whether the camera delivers frames", f64::from(u8::from(status.camera.working))),
+        ("lens_working", "Whether the lens takes commands", f64::from(u8::from(status.lens.working))),
+    ];
+    for (name, help, value) in gauges {
+        registry.register(name, help, ConstGauge::new(value));
+    }
+    registry
+}
+
+fn seconds(micros: u32) -> f64 {
+    f64::from(micros) / 1e6
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(metrics))
+}

@@ -1,0 +1,130 @@
+//! Security of every response and request: headers with a nonce per response, no requests from other sites, no names
+//! that are not ours.
+
+use std::net::IpAddr;
+
+use axum::extract::{FromRequestParts, Request, State};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, HOST, HeaderName, HeaderValue, ORIGIN, REFERRER_POLICY, UPGRADE,
+    X_CONTENT_TYPE_OPTIONS,
+};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, Method};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use super::AppState;
+use super::error::Error;
+
+/// The nonce that inline scripts and styles of this response must carry.
+#[derive(Debug, Clone)]
+pub struct Nonce(pub String);
+
+impl<S: Sync> FromRequestParts<S> for Nonce {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Error> {
+        parts.extensions.get::<Self>().cloned().ok_or(Error::Internal)
+    }
+}
+
+/// Makes the nonce, and adds the headers that keep a page to what we wrote.
+pub async fn headers(mut request: Request, next: Next) -> Response {
+    let mut bytes = [0; 16];
+    if getrandom::fill(&mut bytes).is_err() {
+        return Error::Internal.into_response();
+    }
+    let nonce = hex::encode(bytes);
+    request.extensions_mut().insert(Nonce(nonce.clone()));
+    let mut response = next.run(request).await;
+    let headers = response.headers_mut();
+    if let Ok(policy) = HeaderValue::from_str(&content_security_policy(&nonce)) {
+        headers.insert(CONTENT_SECURITY_POLICY, policy);
+    }
+    headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
+    headers.insert(HeaderName::from_static("cross-origin-opener-policy"), HeaderValue::from_static("same-origin"));
+    headers.entry(CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    response
+}
+
+fn content_security_policy(nonce: &str) -> String {
+    format!(
+        "default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'nonce-{nonce}'; \
+         img-src 'self' blob: data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; form-action 'self'; \
+         base-uri 'none'; frame-ancestors 'none'"
+    )
+}
+
+/// Turns away what another site asks for, and, on a loopback server, names that are not this machine's own: a site whose
+/// name is made to point here (DNS rebinding) would otherwise be the operator.
+pub async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
+    let headers = request.headers();
+    let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+    if app.loopback_only && !is_loopback_name(host) {
+        return Error::WrongHost.into_response();
+    }
+    let changes = !matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
+    if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host) {
+        return Error::CrossSite.into_response();
+    }
+    next.run(request).await
+}
+
+/// By `Sec-Fetch-Site` and `Origin`, whichever the browser sends; what sends neither is no browser, and has no cookie to
+/// be tricked out of.
+fn is_same_origin(headers: &HeaderMap, host: &str) -> bool {
+    let site_fits = headers.get("sec-fetch-site").is_none_or(|site| site == "same-origin");
+    let origin_fits = headers.get(ORIGIN).is_none_or(|origin| {
+        let origin = origin.to_str().unwrap_or_default();
+        let authority = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+        authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host))
+    });
+    site_fits && origin_fits
+}
+
+/// Whether `host`, with or without a port, is one of this machine's own names.
+#[must_use]
+pub fn is_loopback_name(host: &str) -> bool {
+    let name = match host.strip_prefix('[') {
+        Some(rest) => rest.split(']').next().unwrap_or_default(),
+        None => host.split(':').next().unwrap_or_default(),
+    };
+    name.eq_ignore_ascii_case("localhost") || name.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loopback_names_are_told_from_others() {
+        for ours in ["localhost", "LocalHost:8080", "127.0.0.1:8080", "127.1.2.3", "[::1]:8080", "[::1]"] {
+            assert!(is_loopback_name(ours), "{ours}");
+        }
+        for other in
+            ["", "evil.example", "localhost.evil.example", "127.0.0.1.evil.example:80", "10.0.0.1", "[fe80::1]"]
+        {
+            assert!(!is_loopback_name(other), "{other}");
+        }
+    }
+
+    #[test]
+    fn origin_and_fetch_metadata_must_both_fit() {
+        let verdict = |pairs: &[(&'static str, &'static str)]| {
+            let mut headers = HeaderMap::new();
+            for (name, value) in pairs {
+                headers.insert(*name, HeaderValue::from_static(value));
+            }
+            is_same_origin(&headers, "localhost:8080")
+        };
+        assert!(verdict(&[]));
+        assert!(verdict(&[("origin", "http://localhost:8080"), ("sec-fetch-site", "same-origin")]));
+        assert!(!verdict(&[("origin", "http://localhost:8081")]));
+        assert!(!verdict(&[("origin", "null")]));
+        assert!(!verdict(&[("sec-fetch-site", "cross-site")]));
+        assert!(!verdict(&[("sec-fetch-site", "same-site")]));
+        assert!(!verdict(&[("origin", "http://localhost:8080"), ("sec-fetch-site", "cross-site")]));
+    }
+}

@@ -1,0 +1,51 @@
+//! What every handler holds of the rest of the server.
+
+use std::sync::Arc;
+
+use tokio::sync::watch;
+
+use super::keys::Keys;
+use super::metrics::Metrics;
+use crate::autofocus::Registry;
+use crate::clock::Clock;
+use crate::conductor::Conductor;
+use crate::control::ControlHandle;
+use crate::live::LiveHandle;
+use crate::trial::view::{OperatorView, SurgeonView};
+
+/// The server's parts, made once at start.
+pub struct App {
+    /// Both clocks.
+    pub clock: Arc<dyn Clock>,
+    /// The control loop.
+    pub control: ControlHandle,
+    /// Pictures.
+    pub live: LiveHandle,
+    /// Trial sessions.
+    pub conductor: Conductor,
+    /// The session under way as surgeons may see it.
+    pub surgeon_view: watch::Receiver<Option<Arc<SurgeonView>>>,
+    /// The session under way as the operator sees it.
+    pub operator_view: watch::Receiver<Option<Arc<OperatorView>>>,
+    /// All policies.
+    pub registry: Registry,
+    /// Keys of the three roles.
+    pub keys: Keys,
+    /// Whether the server listens on the machine itself alone: then its operator needs no key.
+    pub loopback_only: bool,
+    /// Counters for Prometheus.
+    pub metrics: Metrics,
+    /// Turns true when the server is to end; streams then close by themselves.
+    pub shutdown: watch::Receiver<bool>,
+}
+
+/// The state of every route.
+pub type AppState = Arc<App>;
+
+impl App {
+    /// Whether a session is under way or its end is still shown: then nobody is told which policy runs.
+    #[must_use]
+    pub fn blinded(&self) -> bool {
+        self.operator_view.borrow().is_some()
+    }
+}

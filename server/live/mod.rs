@@ -1,0 +1,92 @@
+//! Live: the imaging thread. Each frame is made once into what every viewer gets; a viewer who is slow misses frames and
+//! holds up nobody.
+
+mod picture;
+mod thread;
+
+pub use picture::{EncodedFrame, Insight, Picture};
+pub use thread::start;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use tokio::sync::watch;
+
+/// What the imaging thread has done so far.
+#[derive(Debug, Default)]
+pub struct Counts {
+    viewers: AtomicU64,
+    encoded: AtomicU64,
+    jpeg_bytes: AtomicU64,
+}
+
+impl Counts {
+    /// Viewers that want pictures now.
+    #[must_use]
+    pub fn viewers(&self) -> u64 {
+        self.viewers.load(Ordering::Relaxed)
+    }
+
+    /// Frames made into JPEG since the start.
+    #[must_use]
+    pub fn encoded(&self) -> u64 {
+        self.encoded.load(Ordering::Relaxed)
+    }
+
+    /// Bytes of JPEG made since the start.
+    #[must_use]
+    pub fn jpeg_bytes(&self) -> u64 {
+        self.jpeg_bytes.load(Ordering::Relaxed)
+    }
+}
+
+/// Where viewers get frames from. Clone freely.
+#[derive(Debug, Clone)]
+pub struct LiveHandle {
+    frames: watch::Receiver<Option<Arc<EncodedFrame>>>,
+    counts: Arc<Counts>,
+}
+
+impl LiveHandle {
+    /// Joins the viewers. While nobody has, no picture is made.
+    #[must_use]
+    pub fn watch(&self) -> Watcher {
+        self.counts.viewers.fetch_add(1, Ordering::Relaxed);
+        let mut frames = self.frames.clone();
+        // What was made before is stale by the time somebody comes.
+        frames.mark_unchanged();
+        Watcher { frames, counts: Arc::clone(&self.counts) }
+    }
+
+    /// What the imaging thread has done so far.
+    #[must_use]
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+}
+
+/// One viewer's place; leaves when dropped.
+#[derive(Debug)]
+pub struct Watcher {
+    frames: watch::Receiver<Option<Arc<EncodedFrame>>>,
+    counts: Arc<Counts>,
+}
+
+impl Watcher {
+    /// The latest frame not seen yet, waiting for one if need be; `None` once the imaging thread has ended. Dropping the
+    /// future loses nothing.
+    pub async fn next(&mut self) -> Option<Arc<EncodedFrame>> {
+        loop {
+            self.frames.changed().await.ok()?;
+            if let Some(frame) = self.frames.borrow_and_update().clone() {
+                return Some(frame);
+            }
+        }
+    }
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        self.counts.viewers.fetch_sub(1, Ordering::Relaxed);
+    }
+}

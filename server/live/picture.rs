@@ -1,0 +1,53 @@
+//! A frame as it leaves the imaging thread: the picture, which anyone may see, apart from what only the operator may.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+
+use crate::clock::Moment;
+use crate::control::Hold;
+use crate::imaging::{ContentArea, PatchArea};
+use crate::lens::FocalPower;
+
+/// A picture and what belongs to it. Lengths in pixels of this picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Frame's number.
+    pub number: u64,
+    /// End of the exposure.
+    pub exposed_at: Moment,
+    /// Width.
+    pub width: usize,
+    /// Height.
+    pub height: usize,
+    /// The colour picture as JPEG.
+    pub jpeg: Bytes,
+    /// Where the patch was taken.
+    pub patch: PatchArea,
+    /// The content area in use when it was.
+    pub content_area: Option<ContentArea>,
+}
+
+/// What the loop did with the frame. Never for surgeons.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Insight {
+    /// Focal power asked for after this frame.
+    pub asked: FocalPower,
+    /// Focal power that the frame was exposed at, as far as the lens knows.
+    pub measured: Option<FocalPower>,
+    /// The policy's focus metric.
+    pub metric: Option<f64>,
+    /// Why the lens was held, if it was.
+    pub held: Option<Hold>,
+    /// The policy's belief, if it has one.
+    pub belief: Option<Arc<[f32]>>,
+}
+
+/// One frame, made once for all viewers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncodedFrame {
+    /// What anyone may see.
+    pub picture: Picture,
+    /// What only the operator and the researcher may see.
+    pub insight: Insight,
+}
