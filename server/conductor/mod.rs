@@ -18,6 +18,9 @@ pub enum ConductError {
     /// There is no such session, segment or question, or it is not the one under way.
     #[error("{0}")]
     NotFound(String),
+    /// Another role does this.
+    #[error("{0}")]
+    Forbidden(String),
     /// It cannot be done in the session's present state; nothing was changed.
     #[error("{0}")]
     Conflict(String),

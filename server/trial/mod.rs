@@ -1,3 +1,10 @@
 //! Trials: protocol, allocation, the session's state machine, questionnaires. Pure: clock and random source are handed in.
 
+pub mod allocation;
+pub mod answers;
+pub mod commitment;
+pub mod event;
+pub mod participant;
+pub mod protocol;
+pub mod session;
 pub mod view;

@@ -1,0 +1,122 @@
+//! Questionnaires: whether an answer fits its question, and the System Usability Scale's score.
+
+use super::view::{AnswerValue, Question, QuestionKind};
+
+/// Longest text of an answer or comment, bytes of UTF-8: some 2500 words.
+pub const LONGEST_TEXT: usize = 16 * 1024;
+
+/// Items of the System Usability Scale.
+pub const SUS_ITEMS: usize = 10;
+
+/// Why an answer does not fit.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Misfit {
+    /// Another sort of answer was expected.
+    #[error("question '{question}' takes {expected}")]
+    Kind {
+        /// The question's id.
+        question: String,
+        /// What it takes.
+        expected: String,
+    },
+    /// The text is too long.
+    #[error("the text is {length} bytes long; at most {LONGEST_TEXT} can be kept in one piece, so please split it")]
+    TooLong {
+        /// Length in bytes.
+        length: usize,
+    },
+}
+
+/// Checks that `value` answers `question` in a session of `settings` settings.
+///
+/// # Errors
+/// When it does not; says what the question takes.
+pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Result<(), Misfit> {
+    let expected = match (&question.kind, value) {
+        (QuestionKind::Text, AnswerValue::Text(text)) => return check_length(text),
+        (QuestionKind::Likert { points, .. }, AnswerValue::Point(point)) if (1..=*points).contains(point) => {
+            return Ok(());
+        }
+        (QuestionKind::Ranking, AnswerValue::Points(order)) if is_ranking(order, settings) => return Ok(()),
+        (QuestionKind::Sus, AnswerValue::Points(items)) if sus_score(items).is_some() => return Ok(()),
+        (QuestionKind::Text, _) => "text".to_owned(),
+        (QuestionKind::Likert { points, .. }, _) => format!("a point from 1 to {points}"),
+        (QuestionKind::Ranking, _) => format!("each of the settings 1 to {settings} once, best first"),
+        (QuestionKind::Sus, _) => format!("{SUS_ITEMS} points from 1 to 5"),
+    };
+    Err(Misfit::Kind { question: question.id.clone(), expected })
+}
+
+/// Checks the length of what was written.
+///
+/// # Errors
+/// When it is longer than [`LONGEST_TEXT`].
+pub const fn check_length(text: &str) -> Result<(), Misfit> {
+    if text.len() > LONGEST_TEXT { Err(Misfit::TooLong { length: text.len() }) } else { Ok(()) }
+}
+
+fn is_ranking(order: &[u8], settings: usize) -> bool {
+    let mut sorted = order.to_vec();
+    sorted.sort_unstable();
+    sorted.len() == settings
+        && sorted.iter().zip(1_usize..).all(|(&setting, expected)| usize::from(setting) == expected)
+}
+
+/// The System Usability Scale's score, 0..=100 in steps of 2.5, of ten items from 1 (strongly disagree) to 5 (strongly
+/// agree): odd items count `item - 1`, even ones `5 - item`, the sum times 2.5 (Brooke 1996). `None` when these are not
+/// ten such items.
+#[must_use]
+pub fn sus_score(items: &[u8]) -> Option<f64> {
+    if items.len() != SUS_ITEMS || !items.iter().all(|item| (1..=5).contains(item)) {
+        return None;
+    }
+    let sum: u8 = items.iter().enumerate().map(|(i, item)| if i % 2 == 0 { item - 1 } else { 5 - item }).sum();
+    Some(f64::from(sum) * 2.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(kind: QuestionKind) -> Question {
+        Question { id: "q".to_owned(), text: "?".to_owned(), kind, optional: false }
+    }
+
+    #[test]
+    fn the_sus_score_goes_from_0_to_100() {
+        assert_eq!(sus_score(&[5, 1, 5, 1, 5, 1, 5, 1, 5, 1]), Some(100.0));
+        assert_eq!(sus_score(&[1, 5, 1, 5, 1, 5, 1, 5, 1, 5]), Some(0.0));
+        assert_eq!(sus_score(&[3; 10]), Some(50.0));
+        // Worked by hand: odd items 4+3+4+2+4 = 17 less 5 = 12, even 25 less (2+1+3+2+2) = 15; 27 * 2.5.
+        assert_eq!(sus_score(&[4, 2, 3, 1, 4, 3, 2, 2, 4, 2]), Some(67.5));
+        assert_eq!(sus_score(&[3; 9]), None);
+        assert_eq!(sus_score(&[0; 10]), None);
+    }
+
+    #[test]
+    fn a_ranking_names_every_setting_once() {
+        let ranking = question(QuestionKind::Ranking);
+        assert_eq!(check(&ranking, &AnswerValue::Points(vec![3, 1, 2]), 3), Ok(()));
+        for wrong in [vec![1, 2], vec![1, 2, 2], vec![0, 1, 2], vec![1, 2, 4], vec![1, 2, 3, 4]] {
+            let misfit = check(&ranking, &AnswerValue::Points(wrong), 3).unwrap_err();
+            assert!(misfit.to_string().contains("1 to 3"), "{misfit}");
+        }
+    }
+
+    #[test]
+    fn a_likert_point_stays_on_its_scale() {
+        let likert = question(QuestionKind::Likert { points: 7, low: "l".to_owned(), high: "h".to_owned() });
+        assert_eq!(check(&likert, &AnswerValue::Point(7), 6), Ok(()));
+        assert!(check(&likert, &AnswerValue::Point(0), 6).is_err());
+        assert!(check(&likert, &AnswerValue::Point(8), 6).is_err());
+        assert!(check(&likert, &AnswerValue::Text("7".to_owned()), 6).is_err());
+    }
+
+    #[test]
+    fn a_text_up_to_the_limit_is_taken_and_the_limit_is_named() {
+        let text = question(QuestionKind::Text);
+        assert_eq!(check(&text, &AnswerValue::Text("é".repeat(LONGEST_TEXT / 2)), 6), Ok(()));
+        let misfit = check(&text, &AnswerValue::Text("x".repeat(1_000_000)), 6).unwrap_err();
+        assert!(misfit.to_string().contains("16384"), "{misfit}");
+    }
+}

@@ -1,0 +1,67 @@
+//! The commitment: a hash, made public when a session is created, by which anyone can check after unblinding that the
+//! order was not changed since. The seed's 256 random bits keep the order from being guessed from it.
+
+use sha2::{Digest, Sha256};
+
+use super::allocation::{Algorithm, Seed};
+use crate::autofocus::PolicyName;
+use crate::ids::SessionId;
+
+/// What a session's order was drawn from, and the order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Allocation {
+    /// The session.
+    pub session: SessionId,
+    /// The algorithm.
+    pub algorithm: Algorithm,
+    /// The seed.
+    pub seed: Seed,
+    /// Index of the session in the set that shares the seed, from 0.
+    pub index: usize,
+    /// SHA-256 of the protocol's text.
+    pub protocol_sha256: [u8; 32],
+    /// The policy of each segment.
+    pub schedule: Vec<PolicyName>,
+}
+
+impl Allocation {
+    /// The text that is hashed: seven lines, each ended by a line feed.
+    #[must_use]
+    pub fn statement(&self) -> String {
+        let schedule: Vec<&str> = self.schedule.iter().map(PolicyName::as_str).collect();
+        format!(
+            "parfocal-commitment-1\nsession {}\nalgorithm {}\nseed {}\nindex {}\nprotocol {}\nschedule {}\n",
+            self.session,
+            self.algorithm,
+            self.seed.to_hex(),
+            self.index,
+            hex::encode(self.protocol_sha256),
+            schedule.join(","),
+        )
+    }
+
+    /// SHA-256 of the [statement](Self::statement), in hexadecimal.
+    #[must_use]
+    pub fn commitment(&self) -> String {
+        hex::encode(Sha256::digest(self.statement()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_commitment_is_what_sha256sum_says_of_the_statement() {
+        let allocation = Allocation {
+            session: "00000000-0000-4000-8000-000000000001".parse().unwrap(),
+            algorithm: Algorithm::Shuffle1,
+            seed: Seed([0; 32]),
+            index: 0,
+            protocol_sha256: [0xab; 32],
+            schedule: ["fixed", "mgm-hill-climber"].map(PolicyName::new).to_vec(),
+        };
+        // printf 'parfocal-commitment-1\nsession …\n…' | sha256sum
+        assert_eq!(allocation.commitment(), "c9ef7743934603d3dca9fc252a945a2e078f679169d9d81fb4b2ba4294f7be45");
+    }
+}

@@ -1,0 +1,228 @@
+//! Protocols: what a trial compares, for how long, and what it asks. Written in TOML (docs/trial.md); valid once parsed.
+
+mod fault;
+mod file;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+pub use fault::ProtocolError;
+
+use super::allocation::Order;
+use super::view::{Question, QuestionKind};
+use crate::autofocus::PolicyName;
+use crate::lens::FocalPower;
+
+/// A valid protocol, with the text that it was read from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Protocol {
+    /// Name: lower case letters, digits and dashes.
+    pub name: String,
+    /// Title as surgeons read it.
+    pub title: String,
+    /// Title as researchers and operators read it before a session; never sent to a surgeon.
+    pub researcher_title: String,
+    /// Whether its sessions are practice: kept apart from real data everywhere.
+    pub practice: bool,
+    /// Policies compared, in the order that the allocation algorithm takes them.
+    pub policies: Vec<PolicyName>,
+    /// Segments of each policy.
+    pub repeats: usize,
+    /// How the segments are ordered.
+    pub order: Order,
+    /// Longest inspection in a segment.
+    pub segment_limit: Duration,
+    /// Focal power at which every segment begins, so that the start tells nothing.
+    pub start: FocalPower,
+    /// What the surgeon is prompted to comment on, by time.
+    pub prompts: Vec<Prompt>,
+    /// How long a prompt stays.
+    pub prompt_stay: Duration,
+    /// One-tap comments.
+    pub quick_comments: Vec<String>,
+    /// Questions after each segment.
+    pub after_segment: Vec<Question>,
+    /// Questions at the end.
+    pub closing: Vec<Question>,
+    /// The TOML text, byte for byte.
+    pub source: Arc<str>,
+}
+
+/// A prompt to comment.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Prompt {
+    /// Time of inspection in the segment at which it appears.
+    pub at: Duration,
+    /// What it says.
+    pub text: String,
+}
+
+impl Protocol {
+    /// Reads a protocol. `file` is named in errors; `known` are the policies that there are.
+    ///
+    /// # Errors
+    /// At the first thing wrong, with its line and key.
+    pub fn parse(source: &str, file: &str, known: &[PolicyName]) -> Result<Self, ProtocolError> {
+        file::parse(source, known).map_err(|fault| fault.in_file(file, source))
+    }
+
+    /// Segments in a session.
+    #[must_use]
+    pub fn settings(&self) -> usize {
+        self.policies.len() * self.repeats
+    }
+
+    /// SHA-256 of the TOML text.
+    #[must_use]
+    pub fn sha256(&self) -> [u8; 32] {
+        Sha256::digest(self.source.as_bytes()).into()
+    }
+
+    /// The question `id`, among those after a segment (`true`) or at the end (`false`).
+    #[must_use]
+    pub fn question(&self, id: &str, after_segment: bool) -> Option<&Question> {
+        let questions = if after_segment { &self.after_segment } else { &self.closing };
+        questions.iter().find(|question| question.id == id)
+    }
+
+    /// The prompt to show after `inspected` in a segment.
+    #[must_use]
+    pub fn prompt_at(&self, inspected: Duration) -> Option<&Prompt> {
+        self.prompts.iter().rev().find(|prompt| prompt.at <= inspected && inspected < prompt.at + self.prompt_stay)
+    }
+
+    /// Time of inspection after `inspected` at which the prompt shown next changes.
+    #[must_use]
+    pub fn next_prompt_change(&self, inspected: Duration) -> Option<Duration> {
+        self.prompts
+            .iter()
+            .flat_map(|prompt| [prompt.at, prompt.at + self.prompt_stay])
+            .filter(|&at| at > inspected)
+            .min()
+    }
+}
+
+impl QuestionKind {
+    /// Name of the kind, as in protocols and exports.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Text => "text",
+            Self::Likert { .. } => "likert",
+            Self::Ranking => "ranking",
+            Self::Sus => "sus",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known() -> Vec<PolicyName> {
+        ["fixed", "mgm-hill-climber", "mlr-hill-climber"].map(PolicyName::new).to_vec()
+    }
+
+    fn error(source: &str) -> String {
+        Protocol::parse(source, "trial.toml", &known()).unwrap_err().to_string()
+    }
+
+    const PAPER: &str = include_str!("../../../trial-protocols/paper.toml");
+
+    #[test]
+    fn the_papers_trial_compares_three_policies_twice_for_two_minutes() {
+        let paper = Protocol::parse(PAPER, "paper.toml", &known()).unwrap();
+        assert_eq!((paper.policies.len(), paper.repeats, paper.settings()), (3, 2, 6));
+        assert_eq!(paper.segment_limit, Duration::from_secs(120));
+        assert_eq!(paper.order, Order::Shuffled);
+        assert!(!paper.practice);
+        assert_eq!(paper.start, FocalPower::MIDDLE);
+    }
+
+    #[test]
+    fn practice_is_one_minute_and_marked() {
+        let source = include_str!("../../../trial-protocols/practice.toml");
+        let practice = Protocol::parse(source, "practice.toml", &known()).unwrap();
+        assert!(practice.practice);
+        assert_eq!(practice.segment_limit * u32::try_from(practice.settings()).unwrap(), Duration::from_secs(60));
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line() {
+        let text = PAPER.replace("repeats = 2", "repeats = 2\nrepeat = 3");
+        let line = text.lines().position(|line| line == "repeat = 3").unwrap() + 1;
+        let said = error(&text);
+        assert!(said.starts_with(&format!("trial.toml, line {line}: key 'repeat'")), "{said}");
+    }
+
+    #[test]
+    fn a_wrong_type_is_named_with_its_line_and_key() {
+        let said = error(&PAPER.replace("repeats = 2", "repeats = \"two\""));
+        assert!(said.contains("key 'repeats'") && said.contains("line "), "{said}");
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        let said = error(&PAPER.replace("repeats = 2", ""));
+        assert!(said.starts_with("trial.toml, line ") && said.contains("repeats"), "{said}");
+    }
+
+    #[test]
+    fn an_unknown_policy_is_named_and_the_known_are_listed() {
+        let text = PAPER.replace("\"mgm-hill-climber\"", "\"mgm-hill\"");
+        let line = text.lines().position(|line| line.contains("\"mgm-hill\"")).unwrap() + 1;
+        let said = error(&text);
+        assert!(said.starts_with(&format!("trial.toml, line {line}: key 'policies'")), "{said}");
+        assert!(said.contains("'mgm-hill'") && said.contains("mlr-hill-climber"), "{said}");
+    }
+
+    #[test]
+    fn broken_toml_is_named_with_its_line() {
+        let said = error("name = \"x\"\ntitle = \n");
+        assert!(said.starts_with("trial.toml, line 2"), "{said}");
+    }
+
+    #[test]
+    fn what_surgeons_read_may_not_name_a_policy() {
+        let said =
+            error(&PAPER.replace("text = \"How does the focus feel now?\"", "text = \"Is MGM-hill-climber good?\""));
+        assert!(said.contains("mgm-hill-climber") && said.contains("blind"), "{said}");
+    }
+
+    #[test]
+    fn a_likert_has_five_or_seven_points() {
+        let text = "\n[[after_segment]]\nid = \"x\"\ntext = \"x?\"\nkind = \"likert\"\npoints = 6\nlow = \"l\"\nhigh = \"h\"\n";
+        let said = error(&format!("{PAPER}{text}"));
+        assert!(said.contains("key 'points'") && said.contains("5 or 7"), "{said}");
+    }
+
+    #[test]
+    fn two_questions_may_not_share_an_id() {
+        let text = "\n[[after_segment]]\nid = \"x\"\ntext = \"x?\"\nkind = \"text\"\n".repeat(2);
+        let said = error(&format!("{PAPER}{text}"));
+        assert!(said.contains("key 'id'") && said.contains("'x'"), "{said}");
+    }
+
+    #[test]
+    fn a_prompt_shows_for_its_time_and_no_longer() {
+        let paper = Protocol::parse(PAPER, "paper.toml", &known()).unwrap();
+        let first = &paper.prompts[0];
+        let just_before = first.at - Duration::from_millis(1);
+        assert_eq!(paper.prompt_at(just_before), None);
+        assert_eq!(paper.next_prompt_change(just_before), Some(first.at));
+        assert_eq!(paper.prompt_at(first.at), Some(first));
+        assert_eq!(paper.prompt_at(first.at + paper.prompt_stay), None);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_text_makes_the_parser_panic(text in "(?s).{0,200}", cut in 0_usize..2000) {
+            let _ = Protocol::parse(&text, "x", &known());
+            let cut = (0..=cut.min(PAPER.len())).rev().find(|&at| PAPER.is_char_boundary(at)).unwrap();
+            let _ = Protocol::parse(&format!("{}{text}", &PAPER[..cut]), "x", &known());
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! What an action brings about: the events to record, none where it was done already, or why not. Who may do what is
+//! decided here too.
+
+use std::time::Duration;
+
+use super::{PauseCause, SessionState};
+use crate::clock::Moment;
+use crate::ids::SegmentId;
+use crate::trial::event::EventKind;
+use crate::trial::view::{Action, Phase, Question, Role};
+
+/// Longest reason, characters.
+const LONGEST_REASON: usize = 1000;
+
+/// Why an action was not done; nothing was changed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// Another role does this.
+    #[error("{0}")]
+    NotAllowed(String),
+    /// The session has no such segment.
+    #[error("this session has no such setting; reload the page")]
+    UnknownSegment,
+    /// It does not fit where the session stands.
+    #[error("{0}")]
+    Conflict(String),
+    /// What was sent makes no sense.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+/// The events that `action` by `by` brings about at `now`; none when it was done before (a double click, a stale tab).
+///
+/// # Errors
+/// When `by` may not, or it does not fit where the session stands.
+pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    allowed(state, by, action)?;
+    match action {
+        Action::Start => Ok(if state.phase == Phase::Ready { vec![EventKind::Started] } else { Vec::new() }),
+        Action::Acknowledge { segment } => acknowledge(state, *segment),
+        Action::FinishSegment { segment } => finish_segment(state, *segment, now),
+        Action::FinishQuestions { segment: Some(segment) } => finish_questions(state, *segment),
+        Action::FinishQuestions { segment: None } => finish_closing(state),
+        Action::Pause { reason } => pause(state, reason, now),
+        Action::Resume => Ok(if state.paused.is_some() { vec![EventKind::Resumed] } else { Vec::new() }),
+        Action::Abort { reason } => abort(state, reason, now),
+        Action::Unblind { reason } => unblind(state, reason),
+    }
+}
+
+/// The events that the passing of time brings about: the end of a segment at its limit.
+#[must_use]
+pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
+    if !state.running() || state.inspected(now) < state.plan.limit {
+        return Vec::new();
+    }
+    state.segment().map_or_else(Vec::new, |segment| finish(state, segment, state.plan.limit))
+}
+
+/// The events that a restart of the server brings about; `inspected` is the time inspected as far as is known.
+#[must_use]
+pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKind> {
+    if state.ended() || state.phase == Phase::Ready {
+        return Vec::new();
+    }
+    let inspected = inspected.clamp(state.inspected.min(state.plan.limit), state.plan.limit);
+    vec![EventKind::ServerRestarted { inspected_ms: milliseconds(inspected) }]
+}
+
+fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusal> {
+    let (who, fits): (&str, bool) = match action {
+        Action::Start | Action::Pause { .. } | Action::Abort { .. } => ("the operator", by == Role::Operator),
+        Action::Acknowledge { .. } | Action::FinishQuestions { .. } => ("the surgeon", by == Role::Surgeon),
+        Action::FinishSegment { .. } => ("the surgeon or the operator", matches!(by, Role::Surgeon | Role::Operator)),
+        Action::Resume => {
+            let surgeon_may = state.paused != Some(PauseCause::Operator);
+            ("the operator", by == Role::Operator || (by == Role::Surgeon && surgeon_may))
+        }
+        Action::Unblind { .. } => ("the researcher", by == Role::Researcher),
+    };
+    if fits { Ok(()) } else { Err(Refusal::NotAllowed(format!("only {who} can do this"))) }
+}
+
+/// Where `segment` stands to the one under way: already left (`None`), or under way and not paused.
+fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Refusal> {
+    let position = state.plan.position(segment).ok_or(Refusal::UnknownSegment)?;
+    if position < state.done {
+        return Ok(None);
+    }
+    if state.phase == Phase::Aborted {
+        return Err(conflict("the session was aborted"));
+    }
+    if position > state.done || state.segment().is_none() {
+        return Err(conflict("this setting has not been reached"));
+    }
+    Ok(Some(state.phase))
+}
+
+fn acknowledge(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
+    match current(state, segment)? {
+        Some(Phase::Notice) => {
+            going_on(state)?;
+            Ok(vec![EventKind::SegmentStarted { segment }])
+        }
+        _ => Ok(Vec::new()),
+    }
+}
+
+fn finish_segment(state: &SessionState, segment: SegmentId, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    match current(state, segment)? {
+        Some(Phase::Notice) => Err(conflict("this setting has not begun")),
+        Some(Phase::Inspecting) => {
+            going_on(state)?;
+            Ok(finish(state, segment, state.inspected(now)))
+        }
+        _ => Ok(Vec::new()),
+    }
+}
+
+fn finish_questions(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
+    match current(state, segment)? {
+        Some(Phase::Questions) => {
+            going_on(state)?;
+            answered(state, Some(segment), &state.plan.after_segment)?;
+            Ok(with_completion(state, EventKind::QuestionsFinished { segment: Some(segment) }))
+        }
+        Some(_) => Err(conflict("the questions on this setting have not been asked")),
+        None => Ok(Vec::new()),
+    }
+}
+
+fn finish_closing(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
+    match state.phase {
+        Phase::Completed => Ok(Vec::new()),
+        Phase::Closing => {
+            going_on(state)?;
+            answered(state, None, &state.plan.closing)?;
+            Ok(vec![EventKind::QuestionsFinished { segment: None }, EventKind::Completed])
+        }
+        _ => Err(conflict("the closing questions have not been asked")),
+    }
+}
+
+fn finish(state: &SessionState, segment: SegmentId, inspected: Duration) -> Vec<EventKind> {
+    let finished = EventKind::SegmentFinished { segment, inspected_ms: milliseconds(inspected) };
+    if state.plan.after_segment.is_empty() { with_completion(state, finished) } else { vec![finished] }
+}
+
+/// `last`, which leaves the segment under way, and the completion if nothing follows.
+fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
+    let completes = state.done + 1 == state.plan.segments.len() && state.plan.closing.is_empty();
+    let mut events = vec![last];
+    events.extend(completes.then_some(EventKind::Completed));
+    events
+}
+
+fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    match state.phase {
+        Phase::Ready => return Err(conflict("the session has not started")),
+        Phase::Completed | Phase::Aborted => return Err(conflict("the session has ended")),
+        _ => {}
+    }
+    if state.paused == Some(PauseCause::Operator) {
+        return Ok(Vec::new());
+    }
+    let reason = reason_text(reason)?;
+    Ok(vec![EventKind::Paused { reason, inspected_ms: milliseconds(state.inspected(now)) }])
+}
+
+fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    match state.phase {
+        Phase::Completed => return Err(conflict("the session is complete; nothing is left to abort")),
+        Phase::Aborted => return Ok(Vec::new()),
+        _ => {}
+    }
+    let reason = needed(reason_text(reason)?)?;
+    Ok(vec![EventKind::Aborted { reason, inspected_ms: milliseconds(state.inspected(now)) }])
+}
+
+fn unblind(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal> {
+    if state.unblinded {
+        return Ok(Vec::new());
+    }
+    let reason = needed(reason_text(reason)?)?;
+    Ok(vec![EventKind::Unblinded { reason, emergency: !state.ended() }])
+}
+
+fn answered(state: &SessionState, segment: Option<SegmentId>, questions: &[Question]) -> Result<(), Refusal> {
+    let open = questions.iter().find(|question| !question.optional && state.answer(segment, &question.id).is_none());
+    open.map_or(Ok(()), |question| Err(Refusal::Conflict(format!("still to be answered: {}", question.text))))
+}
+
+fn going_on(state: &SessionState) -> Result<(), Refusal> {
+    if state.paused.is_some() { Err(conflict("the session is paused")) } else { Ok(()) }
+}
+
+fn reason_text(reason: &str) -> Result<String, Refusal> {
+    let reason = reason.trim();
+    if reason.chars().count() > LONGEST_REASON {
+        return Err(Refusal::Invalid(format!("the reason is longer than {LONGEST_REASON} characters")));
+    }
+    Ok(reason.to_owned())
+}
+
+fn needed(reason: String) -> Result<String, Refusal> {
+    if reason.is_empty() {
+        Err(Refusal::Invalid("give a reason: it is kept in the log".to_owned()))
+    } else {
+        Ok(reason)
+    }
+}
+
+fn conflict(text: &str) -> Refusal {
+    Refusal::Conflict(text.to_owned())
+}
+
+fn milliseconds(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+}

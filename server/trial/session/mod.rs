@@ -1,0 +1,235 @@
+//! The session's state machine. Events are the truth: [`SessionState::apply`] folds them into a state, [`decide`] says
+//! which events an action brings about, and neither reads a clock or keeps anything elsewhere.
+//!
+//! ```text
+//! Ready -Start-> Notice -Acknowledge-> Inspecting -FinishSegment, or time is up-> Questions -FinishQuestions-+
+//!                  ^                                                                                          |
+//!                  +------------------------------- while settings are left ---------------------------------+
+//!                                                                                                             |
+//!                                    Completed <-FinishQuestions- Closing <-----------------------------------+
+//! ```
+//! Without questions the step is left out. Every phase from Notice to Closing can be paused and aborted.
+
+mod decide;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+pub use decide::{Refusal, decide, decide_restart, decide_time};
+
+use super::event::{Event, EventKind};
+use super::protocol::Protocol;
+use super::view::{AnswerValue, Phase, Question};
+use crate::clock::Moment;
+use crate::ids::SegmentId;
+
+/// What of a session never changes and decides its course.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The segments, in order.
+    pub segments: Vec<SegmentId>,
+    /// Longest inspection in a segment.
+    pub limit: Duration,
+    /// Questions after each segment.
+    pub after_segment: Vec<Question>,
+    /// Questions at the end.
+    pub closing: Vec<Question>,
+}
+
+impl Plan {
+    /// The plan of a session by `protocol` with these `segments`.
+    #[must_use]
+    pub fn new(protocol: &Protocol, segments: Vec<SegmentId>) -> Self {
+        Self {
+            segments,
+            limit: protocol.segment_limit,
+            after_segment: protocol.after_segment.clone(),
+            closing: protocol.closing.clone(),
+        }
+    }
+
+    /// Place of `segment` in the session, from 0.
+    #[must_use]
+    pub fn position(&self, segment: SegmentId) -> Option<usize> {
+        self.segments.iter().position(|&known| known == segment)
+    }
+}
+
+/// Who or what paused a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PauseCause {
+    /// The operator: only the operator lets it go on.
+    Operator,
+    /// A restart of the server: the surgeon may let it go on too.
+    Restart,
+}
+
+/// Where a session stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionState {
+    plan: Plan,
+    phase: Phase,
+    done: usize,
+    paused: Option<PauseCause>,
+    inspected: Duration,
+    running_since: Option<Moment>,
+    unblinded: bool,
+    answers: BTreeMap<(Option<SegmentId>, String), AnswerValue>,
+}
+
+impl SessionState {
+    /// A session just made.
+    #[must_use]
+    pub const fn new(plan: Plan) -> Self {
+        Self {
+            plan,
+            phase: Phase::Ready,
+            done: 0,
+            paused: None,
+            inspected: Duration::ZERO,
+            running_since: None,
+            unblinded: false,
+            answers: BTreeMap::new(),
+        }
+    }
+
+    /// Its plan.
+    #[must_use]
+    pub const fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Its phase.
+    #[must_use]
+    pub const fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Who paused it, if it is paused.
+    #[must_use]
+    pub const fn paused(&self) -> Option<PauseCause> {
+        self.paused
+    }
+
+    /// Whether nothing more will happen in it but late comments and unblinding.
+    #[must_use]
+    pub const fn ended(&self) -> bool {
+        matches!(self.phase, Phase::Completed | Phase::Aborted)
+    }
+
+    /// Whether it was told which policies ran.
+    #[must_use]
+    pub const fn unblinded(&self) -> bool {
+        self.unblinded
+    }
+
+    /// Segments done with, their questions included.
+    #[must_use]
+    pub const fn done(&self) -> usize {
+        self.done
+    }
+
+    /// The segment under way: from its notice to the end of its questions.
+    #[must_use]
+    pub fn segment(&self) -> Option<SegmentId> {
+        let under_way = matches!(self.phase, Phase::Notice | Phase::Inspecting | Phase::Questions);
+        self.plan.segments.get(self.done).copied().filter(|_| under_way)
+    }
+
+    /// Time inspected in the segment under way, pauses excluded, never more than the limit.
+    #[must_use]
+    pub fn inspected(&self, now: Moment) -> Duration {
+        let running = self.running_since.map_or(Duration::ZERO, |since| now.since(since));
+        (self.inspected + running).min(self.plan.limit)
+    }
+
+    /// Whether the segment's clock runs.
+    #[must_use]
+    pub const fn running(&self) -> bool {
+        self.running_since.is_some()
+    }
+
+    /// The questions asked now.
+    #[must_use]
+    pub fn questions(&self) -> &[Question] {
+        match self.phase {
+            Phase::Questions => &self.plan.after_segment,
+            Phase::Closing => &self.plan.closing,
+            _ => &[],
+        }
+    }
+
+    /// The answer kept to `question`, asked after `segment` or (none) at the end.
+    #[must_use]
+    pub fn answer(&self, segment: Option<SegmentId>, question: &str) -> Option<&AnswerValue> {
+        self.answers.get(&(segment, question.to_owned()))
+    }
+
+    /// Takes an answer in; a later one to the same question replaces it.
+    pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, value: AnswerValue) {
+        self.answers.insert((segment, question.to_owned()), value);
+    }
+
+    /// Whether questions about `segment` (none: about the whole) may be answered: once they have been shown, and for
+    /// good after that.
+    #[must_use]
+    pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
+        match segment {
+            None => matches!(self.phase, Phase::Closing | Phase::Completed) || self.done == self.plan.segments.len(),
+            Some(segment) => self.plan.position(segment).is_some_and(|position| {
+                position < self.done || (position == self.done && self.phase == Phase::Questions)
+            }),
+        }
+    }
+
+    /// Takes in what happened.
+    pub fn apply(&mut self, event: &Event) {
+        match &event.kind {
+            EventKind::Created => {}
+            EventKind::Started => self.phase = Phase::Notice,
+            EventKind::SegmentStarted { .. } => {
+                self.phase = Phase::Inspecting;
+                self.inspected = Duration::ZERO;
+                self.running_since = Some(event.at);
+            }
+            EventKind::SegmentFinished { inspected_ms, .. } => {
+                self.stop_clock(*inspected_ms);
+                if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
+            }
+            EventKind::QuestionsFinished { segment: Some(_) } => self.leave_segment(),
+            EventKind::QuestionsFinished { segment: None } => {}
+            EventKind::Paused { inspected_ms, .. } => {
+                self.stop_clock(*inspected_ms);
+                self.paused = Some(PauseCause::Operator);
+            }
+            EventKind::Resumed => {
+                self.paused = None;
+                self.running_since = (self.phase == Phase::Inspecting).then_some(event.at);
+            }
+            EventKind::ServerRestarted { inspected_ms } => {
+                self.stop_clock(*inspected_ms);
+                self.paused = self.paused.or(Some(PauseCause::Restart));
+            }
+            EventKind::Completed => self.phase = Phase::Completed,
+            EventKind::Aborted { inspected_ms, .. } => {
+                self.stop_clock(*inspected_ms);
+                self.paused = None;
+                self.phase = Phase::Aborted;
+            }
+            EventKind::Unblinded { .. } => self.unblinded = true,
+        }
+    }
+
+    fn stop_clock(&mut self, inspected_ms: u64) {
+        self.inspected = Duration::from_millis(inspected_ms);
+        self.running_since = None;
+    }
+
+    const fn leave_segment(&mut self) {
+        self.done += 1;
+        self.inspected = Duration::ZERO;
+        self.phase = if self.done < self.plan.segments.len() { Phase::Notice } else { Phase::Closing };
+    }
+}
