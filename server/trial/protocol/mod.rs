@@ -136,7 +136,7 @@ mod tests {
     fn the_papers_trial_compares_three_policies_twice_for_two_minutes() {
         let paper = Protocol::parse(PAPER, "paper.toml", &known()).unwrap();
         assert_eq!((paper.policies.len(), paper.repeats, paper.settings()), (3, 2, 6));
-        assert_eq!(paper.segment_limit, Duration::from_secs(120));
+        assert_eq!(paper.segment_limit, Duration::from_mins(2));
         assert_eq!(paper.order, Order::Shuffled);
         assert!(!paper.practice);
         assert_eq!(paper.start, FocalPower::MIDDLE);
@@ -147,7 +147,7 @@ mod tests {
         let source = include_str!("../../../trial-protocols/practice.toml");
         let practice = Protocol::parse(source, "practice.toml", &known()).unwrap();
         assert!(practice.practice);
-        assert_eq!(practice.segment_limit * u32::try_from(practice.settings()).unwrap(), Duration::from_secs(60));
+        assert_eq!(practice.segment_limit * u32::try_from(practice.settings()).unwrap(), Duration::from_mins(1));
     }
 
     #[test]
@@ -210,7 +210,8 @@ mod tests {
     fn a_prompt_shows_for_its_time_and_no_longer() {
         let paper = Protocol::parse(PAPER, "paper.toml", &known()).unwrap();
         let first = &paper.prompts[0];
-        let just_before = first.at - Duration::from_millis(1);
+        assert_eq!(first.at, Duration::from_secs(20));
+        let just_before = Duration::from_millis(19_999);
         assert_eq!(paper.prompt_at(just_before), None);
         assert_eq!(paper.next_prompt_change(just_before), Some(first.at));
         assert_eq!(paper.prompt_at(first.at), Some(first));

@@ -187,7 +187,7 @@ impl SessionState {
     /// Takes in what happened.
     pub fn apply(&mut self, event: &Event) {
         match &event.kind {
-            EventKind::Created => {}
+            EventKind::Created | EventKind::QuestionsFinished { segment: None } => {}
             EventKind::Started => self.phase = Phase::Notice,
             EventKind::SegmentStarted { .. } => {
                 self.phase = Phase::Inspecting;
@@ -199,7 +199,6 @@ impl SessionState {
                 if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
             }
             EventKind::QuestionsFinished { segment: Some(_) } => self.leave_segment(),
-            EventKind::QuestionsFinished { segment: None } => {}
             EventKind::Paused { inspected_ms, .. } => {
                 self.stop_clock(*inspected_ms);
                 self.paused = Some(PauseCause::Operator);

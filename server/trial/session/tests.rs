@@ -20,7 +20,7 @@ fn question(id: &str, optional: bool) -> Question {
 fn plan(segments: usize, asks_after: bool, asks_closing: bool) -> Plan {
     Plan {
         segments: (0..segments).map(segment).collect(),
-        limit: Duration::from_secs(120),
+        limit: Duration::from_mins(2),
         after_segment: if asks_after { vec![question("a", false), question("b", true)] } else { Vec::new() },
         closing: if asks_closing { vec![question("z", false)] } else { Vec::new() },
     }
