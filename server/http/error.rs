@@ -33,6 +33,9 @@ pub enum Error {
     /// The key in the link is not one of this server's.
     #[error("This link is not, or no longer, valid. Ask for the link that the server printed when it last started.")]
     WrongKey,
+    /// Another role does this.
+    #[error("{0}")]
+    Forbidden(String),
     /// A request that another site made.
     #[error("This request came from another site and was not done. Go back to the page and try again from there.")]
     CrossSite,
@@ -64,7 +67,7 @@ impl Error {
             Self::NotFound(_) => StatusCode::NOT_FOUND,
             Self::Conflict(_) => StatusCode::CONFLICT,
             Self::Invalid(_) => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::NeedsRole(_) | Self::WrongKey | Self::CrossSite => StatusCode::FORBIDDEN,
+            Self::NeedsRole(_) | Self::Forbidden(_) | Self::WrongKey | Self::CrossSite => StatusCode::FORBIDDEN,
             Self::WrongHost => StatusCode::MISDIRECTED_REQUEST,
             Self::Storage(_) => StatusCode::INSUFFICIENT_STORAGE,
             Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
@@ -76,6 +79,7 @@ impl From<ConductError> for Error {
     fn from(error: ConductError) -> Self {
         match error {
             ConductError::NotFound(text) => Self::NotFound(text),
+            ConductError::Forbidden(text) => Self::Forbidden(text),
             ConductError::Conflict(text) => Self::Conflict(text),
             ConductError::Invalid(text) => Self::Invalid(text),
             ConductError::Storage(text) => Self::Storage(text),
