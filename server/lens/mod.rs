@@ -1,6 +1,8 @@
 //! Lenses: focal power, and what drives it. Knows no image.
 
+pub mod emulator;
 mod focal_power;
+pub mod optotune;
 mod response;
 mod simulated;
 mod spec;

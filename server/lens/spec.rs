@@ -5,18 +5,21 @@ use std::fmt::Display;
 use std::str::FromStr;
 use std::sync::Arc;
 
+use super::optotune::OptotuneLens;
 use super::simulated::SimulatedLens;
 use super::{Lens, LensError};
 use crate::clock::Clock;
 
-/// Opens the lens that `spec` names: `simulated`, or `simulated?fault=NAME` for one that begins with a fault.
+/// Opens the lens that `spec` names: `simulated` (option `fault`, see [`super::SimulatedFault`]), `optotune:auto` or
+/// `optotune:/dev/...` (options `min` and `max`, the dioptres to use, `low` and `high`, the temperature limits in °C).
 ///
 /// # Errors
 /// When the specification makes no sense, or its device cannot be used; says what to do.
 pub fn open(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
     let (device, options) = Options::split(spec)?;
-    match device {
-        "simulated" => Ok(Box::new(SimulatedLens::open(options, clock)?)),
+    match device.split_once(':') {
+        None if device == "simulated" => Ok(Box::new(SimulatedLens::open(options, clock)?)),
+        Some(("optotune", port)) => Ok(Box::new(OptotuneLens::open(port, options, clock)?)),
         _ => Err(LensError::BadSpec(format!(
             "there is no lens '{spec}': use 'simulated', 'optotune:auto' or 'optotune:/dev/...'"
         ))),

@@ -1,0 +1,397 @@
+//! The emulated driver's firmware: bytes in, bytes out.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::clock::Moment;
+use crate::lens::{FocalPower, LensDynamics, Response};
+
+/// Focal power that the emulated lens can reach at all, in dioptres.
+const LENS_DIOPTRES: (f64, f64) = (5.0, 10.0);
+/// Temperature limits up to which the whole range is held, in °C; a wider span costs a little at both ends.
+const FULL_RANGE_SPAN: f64 = 20.0;
+/// Dioptres that a degree more costs, at each end.
+const NARROWING: f64 = 0.02;
+const IMAX_HUNDREDTHS: u16 = 29_284;
+/// A request whose rest does not come within this time is forgotten.
+const PATIENCE: Duration = Duration::from_millis(50);
+const GLASS: LensDynamics = LensDynamics { delay: Duration::from_millis(1), settling: Duration::from_millis(15) };
+const PLAY: f64 = 0.004;
+/// Focal power commands remembered for whoever wants to look.
+const REMEMBERED: usize = 8192;
+
+/// Every request but the greeting: its name, and the bytes between name and checksum.
+const REQUESTS: [(&[u8], usize); 17] = [
+    (b"H", 0),
+    (b"V", 1),
+    (b"X", 0),
+    (b"CrMA", 2),
+    (b"Aw", 2),
+    (b"Ar", 2),
+    (b"MwDA", 0),
+    (b"MwCA", 0),
+    (b"MMA", 0),
+    (b"PwTA", 4),
+    (b"PwDA", 4),
+    (b"PwUA", 4),
+    (b"PwLA", 4),
+    (b"PwFA", 4),
+    (b"PrDA", 4),
+    (b"TCA", 0),
+    (b"Sr", 0),
+];
+
+/// What is wrong with the emulated driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fault {
+    /// Nothing.
+    #[default]
+    None,
+    /// Every reply is noise.
+    Garbage,
+    /// Every reply has a wrong checksum.
+    WrongChecksum,
+    /// Nothing is answered and nothing done.
+    Silent,
+    /// Every request is answered with an error, and not carried out.
+    Errors,
+    /// Focal power commands are ignored.
+    DropsCommands,
+    /// Some other device that says what it likes.
+    Stranger,
+}
+
+impl std::str::FromStr for Fault {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        match name {
+            "none" => Ok(Self::None),
+            "garbage" => Ok(Self::Garbage),
+            "wrong-checksum" => Ok(Self::WrongChecksum),
+            "silent" => Ok(Self::Silent),
+            "errors" => Ok(Self::Errors),
+            "drops-commands" => Ok(Self::DropsCommands),
+            "stranger" => Ok(Self::Stranger),
+            _ => Err(format!(
+                "there is no fault '{name}': choose from none, garbage, wrong-checksum, silent, errors, \
+                 drops-commands, stranger"
+            )),
+        }
+    }
+}
+
+/// What makes one unit differ from another.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Serial number, eight characters.
+    pub serial: [u8; 8],
+    /// Type of firmware, `A` to `F`.
+    pub firmware: u8,
+    /// Time to answer a request.
+    pub latency: Duration,
+    /// Whether error numbers are sent as digits rather than bytes.
+    pub ascii_errors: bool,
+    /// Whether a wrong checksum is answered with `N` as old firmware does.
+    pub old: bool,
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Self { serial: *b"EMUL0001", firmware: b'A', latency: Duration::from_millis(1), ascii_errors: true, old: false }
+    }
+}
+
+/// A driver with its lens.
+pub struct Firmware {
+    /// The unit.
+    pub model: Model,
+    /// What is wrong.
+    pub fault: Fault,
+    /// Of the lens, in °C.
+    pub temperature: f64,
+    /// Whether a lens is plugged into the driver.
+    pub lens_present: bool,
+    /// Focal power commands carried out, in the driver's units, and when they were read.
+    pub commands: VecDeque<(Moment, i16)>,
+    glass: Arc<Response>,
+    mode: u8,
+    /// In 1/16 °C: upper, lower.
+    limits: Option<(i16, i16)>,
+    focal_power: i16,
+    unreachable: bool,
+    current: i16,
+    buffer: Vec<u8>,
+    last_byte: Moment,
+}
+
+impl Firmware {
+    /// A unit that has just got power.
+    pub fn new(model: Model) -> Self {
+        Self {
+            model,
+            fault: Fault::None,
+            temperature: 25.5,
+            lens_present: true,
+            commands: VecDeque::new(),
+            glass: Arc::new(Response::new(GLASS, PLAY, FocalPower::MIN)),
+            mode: 1,
+            limits: None,
+            focal_power: 0,
+            unreachable: false,
+            current: 0,
+            buffer: Vec::new(),
+            last_byte: Moment::default(),
+        }
+    }
+
+    /// Loses everything that it does not hold in its memory: mode, limits, focal power.
+    pub fn power_cycle(&mut self, now: Moment) {
+        (self.mode, self.limits, self.focal_power, self.current) = (1, None, 0, 0);
+        self.unreachable = false;
+        self.buffer.clear();
+        self.glass.command(now, FocalPower::MIN);
+    }
+
+    /// The glass, 0..=1 standing for the whole of what the lens can do.
+    pub fn glass(&self) -> Arc<Response> {
+        self.glass.clone()
+    }
+
+    /// Mode of control, and the current in counts.
+    pub const fn mode_and_current(&self) -> (u8, i16) {
+        (self.mode, self.current)
+    }
+
+    /// The driver's answers to `bytes`, one a request.
+    pub fn receive(&mut self, bytes: &[u8], now: Moment) -> Vec<Vec<u8>> {
+        if now.since(self.last_byte) > PATIENCE {
+            self.buffer.clear();
+        }
+        self.last_byte = now;
+        self.buffer.extend(bytes);
+        let mut answers = Vec::new();
+        match self.fault {
+            Fault::Silent => self.buffer.clear(),
+            Fault::Stranger => {
+                self.buffer.clear();
+                answers.push(b"ok T:21.4 B:60.0\r\n".to_vec());
+            }
+            _ => {
+                while let Some(answer) = self.next(now) {
+                    answers.extend((!answer.is_empty()).then(|| self.damaged(answer)));
+                }
+            }
+        }
+        answers
+    }
+
+    /// The answer to the first request in the buffer, empty where it gets none; nothing while it is incomplete.
+    fn next(&mut self, now: Moment) -> Option<Vec<u8>> {
+        if self.buffer.is_empty() {
+            return None;
+        }
+        if self.buffer.starts_with(b"Start") {
+            self.buffer.drain(..5);
+            return Some(b"Ready\r\n".to_vec());
+        }
+        let Some(&(name, values)) = REQUESTS.iter().find(|(name, _)| self.buffer.starts_with(name)) else {
+            let mut names = REQUESTS.iter().map(|(name, _)| *name).chain([&b"Start"[..]]);
+            if names.any(|name| name.starts_with(&self.buffer)) {
+                return None;
+            }
+            self.buffer.clear();
+            return Some(self.error(3));
+        };
+        let length = name.len() + values;
+        if self.buffer.len() < length + 2 {
+            return None;
+        }
+        let request: Vec<u8> = self.buffer.drain(..length + 2).collect();
+        let (payload, checksum) = request.split_at(length);
+        if checksum != checksum_of(payload) {
+            return Some(if self.model.old { b"N\r\n".to_vec() } else { self.error(1) });
+        }
+        if self.fault == Fault::Errors {
+            return Some(self.error(3));
+        }
+        Some(self.answer(name, payload.get(name.len()..).unwrap_or_default(), now))
+    }
+
+    fn answer(&mut self, name: &[u8], values: &[u8], now: Moment) -> Vec<u8> {
+        let value = |index: usize| match values.get(2 * index..2 * index + 2) {
+            Some(&[high, low]) => i16::from_be_bytes([high, low]),
+            _ => 0,
+        };
+        match name {
+            b"H" => framed(&[b'H', self.model.firmware]),
+            b"V" => framed(&[b'V', 1, 8, 0, 3, 0, 1]),
+            b"X" => framed(&[&b"X"[..], &self.model.serial].concat()),
+            b"CrMA" => framed(&[&b"CMA"[..], &IMAX_HUNDREDTHS.to_be_bytes()].concat()),
+            b"Aw" => self.set_current(value(0), now),
+            b"Ar" => framed(&[&b"A"[..], &self.current.to_be_bytes()].concat()),
+            b"MwDA" => {
+                self.mode = 1;
+                framed(b"MDA")
+            }
+            b"MwCA" => self.enter_focal_power_mode(),
+            b"MMA" => framed(&[b'M', b'M', b'A', self.mode]),
+            b"PwTA" => self.set_limits(value(0), value(1)),
+            b"PwDA" => self.set_focal_power(value(0), now),
+            b"PrDA" => framed(&[&b"PD"[..], &self.focal_power.to_be_bytes()].concat()),
+            b"TCA" => framed(&[&b"TCA"[..], &sixteenths(self.temperature).to_be_bytes()].concat()),
+            b"Sr" => framed(&[b'S', 0, 0, 0, self.status()]),
+            _ => Vec::new(),
+        }
+    }
+
+    fn set_limits(&mut self, high: i16, low: i16) -> Vec<u8> {
+        if !self.lens_present {
+            return self.error(4);
+        }
+        self.limits = (high > low).then_some((high, low));
+        self.limits_reply(b"PT")
+    }
+
+    fn enter_focal_power_mode(&mut self) -> Vec<u8> {
+        if !self.lens_present {
+            return self.error(4);
+        }
+        if self.limits.is_some() {
+            self.mode = 5;
+        }
+        self.limits_reply(b"MCA")
+    }
+
+    fn limits_reply(&self, name: &[u8]) -> Vec<u8> {
+        let (min, max) = self.range();
+        framed(&[name, &[self.status()], &max.to_be_bytes(), &min.to_be_bytes()].concat())
+    }
+
+    /// Least and greatest focal power within the temperature limits, in the driver's units; nothing without limits.
+    fn range(&self) -> (i16, i16) {
+        let Some((high, low)) = self.limits else { return (0, 0) };
+        let lost = (f64::from(high - low) / 16.0 - FULL_RANGE_SPAN).max(0.0) * NARROWING;
+        (self.units(LENS_DIOPTRES.0 + lost), self.units(LENS_DIOPTRES.1 - lost))
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a few thousand units")]
+    fn units(&self, dioptre: f64) -> i16 {
+        let offset = if self.model.firmware == b'A' { 5.0 } else { 0.0 };
+        ((dioptre + offset) * 200.0).round() as i16
+    }
+
+    fn set_focal_power(&mut self, wanted: i16, now: Moment) -> Vec<u8> {
+        if self.mode == 5 && self.fault != Fault::DropsCommands {
+            let (min, max) = self.range();
+            self.focal_power = wanted.clamp(min.min(max), max);
+            self.unreachable = self.focal_power != wanted;
+            let (least, most) = (self.units(LENS_DIOPTRES.0), self.units(LENS_DIOPTRES.1));
+            let share = f64::from(self.focal_power - least) / f64::from(most - least);
+            self.glass.command(now, FocalPower::nearest(share));
+            if self.commands.len() == REMEMBERED {
+                self.commands.pop_front();
+            }
+            self.commands.push_back((now, wanted));
+        }
+        Vec::new()
+    }
+
+    fn set_current(&mut self, counts: i16, now: Moment) -> Vec<u8> {
+        if self.mode == 1 {
+            self.current = counts.clamp(-4095, 4095);
+            self.glass.command(now, FocalPower::nearest(f64::from(self.current) / 4095.0));
+        }
+        Vec::new()
+    }
+
+    fn status(&self) -> u8 {
+        let celsius = self.temperature;
+        let outside = |(high, low)| celsius > f64::from(high) / 16.0 || celsius < f64::from(low) / 16.0;
+        u8::from(!self.lens_present)
+            | u8::from(self.limits.is_none()) << 2
+            | u8::from(self.unreachable) << 3
+            | u8::from(!(-20.0..=65.0).contains(&celsius)) << 5
+            | u8::from(self.limits.is_some_and(outside)) << 7
+    }
+
+    fn error(&self, number: u8) -> Vec<u8> {
+        framed(&[b'E', if self.model.ascii_errors { b'0' + number } else { number }])
+    }
+
+    fn damaged(&self, mut answer: Vec<u8>) -> Vec<u8> {
+        let length = answer.len();
+        match self.fault {
+            Fault::Garbage => answer.iter_mut().for_each(|byte| *byte = byte.wrapping_mul(31) ^ 0x5A),
+            Fault::WrongChecksum => {
+                if let Some(byte) = length.checked_sub(3).and_then(|at| answer.get_mut(at)) {
+                    *byte ^= 0x40;
+                }
+            }
+            _ => {}
+        }
+        answer
+    }
+}
+
+fn framed(payload: &[u8]) -> Vec<u8> {
+    [payload, &checksum_of(payload), b"\r\n"].concat()
+}
+
+/// CRC-16/ARC bit by bit, low byte first.
+fn checksum_of(payload: &[u8]) -> [u8; 2] {
+    let mut crc = 0_u16;
+    for &byte in payload {
+        crc ^= u16::from(byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { (crc >> 1) ^ 0xA001 } else { crc >> 1 };
+        }
+    }
+    crc.to_le_bytes()
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "a lens's temperature")]
+fn sixteenths(celsius: f64) -> i16 {
+    (celsius * 16.0).round() as i16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn talk(firmware: &mut Firmware, request: &str) -> String {
+        let answers = firmware.receive(&hex::decode(request).unwrap(), Moment::default());
+        hex::encode_upper(answers.concat())
+    }
+
+    #[test]
+    fn answers_the_published_requests_with_the_published_replies() {
+        let mut firmware = Firmware::new(Model::default());
+        assert_eq!(firmware.receive(b"Start", Moment::default()).concat(), b"Ready\r\n");
+        assert_eq!(talk(&mut firmware, "544341B0D0"), "544341019874660D0A", "25.5 °C");
+        assert_eq!(talk(&mut firmware, "43724D4100007180"), "434D41726427FC0D0A", "292.84 mA");
+        assert!(!talk(&mut firmware, "507754410280014033D0").is_empty(), "temperature limits");
+        assert!(!talk(&mut firmware, "4D7743415676").is_empty(), "focal power mode");
+        assert_eq!(talk(&mut firmware, "4D4D416577"), "4D4D410577280D0A", "mode 5");
+        assert_eq!(talk(&mut firmware, "544341B0D1"), "4531F3440D0A", "wrong checksum");
+        firmware.model.ascii_errors = false;
+        assert_eq!(talk(&mut firmware, "544341B0D1"), "4501F3500D0A", "wrong checksum");
+        firmware.model.old = true;
+        assert_eq!(talk(&mut firmware, "544341B0D1"), "4E0D0A", "wrong checksum");
+    }
+
+    #[test]
+    fn focal_power_needs_its_mode_and_the_mode_needs_limits() {
+        let mut firmware = Firmware::new(Model::default());
+        let ten_dioptres = "507744410BB80000B371";
+        talk(&mut firmware, "4D7743415676");
+        talk(&mut firmware, ten_dioptres);
+        assert!(firmware.commands.is_empty());
+        talk(&mut firmware, "507754410280014033D0");
+        talk(&mut firmware, "4D7743415676");
+        talk(&mut firmware, ten_dioptres);
+        assert_eq!(firmware.commands, [(Moment::default(), 3000)]);
+        assert!(talk(&mut firmware, "50724441000000006470").contains("0BB8"));
+    }
+}

@@ -1,0 +1,351 @@
+//! The wire format of the Optotune Lens Driver 4/4i: requests, replies, checksums. Does no input or output.
+//!
+//! A request is a payload and its CRC-16/ARC, low byte first; a reply is the same followed by `\r\n`. A reply may hold
+//! `\r\n` inside, so it is told complete by the length that its request leads to, not by its end. Integers are
+//! big-endian. Formats: Optotune, *Lens Driver 4 manual*.
+
+use crc::{CRC_16_ARC, Crc, Table};
+
+const CHECKSUM: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_ARC);
+
+/// Greeting; carries no checksum.
+pub const START: &[u8] = b"Start";
+/// Answer to [`START`].
+pub const READY: &[u8] = b"Ready\r\n";
+
+/// What firmware before error codes answers to a damaged request.
+const OLD_CRC_ERROR: &[u8] = b"N\r\n";
+/// Bytes of checksum and line end behind a reply's payload.
+const TRAILER: usize = 4;
+/// Bytes of an error reply: `E`, its number, trailer.
+const ERROR_LENGTH: usize = 2 + TRAILER;
+
+/// Something asked of the driver. Temperatures in 1/16 °C, focal power in the driver's own units (see
+/// [`super::range::Scale`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// Letter of the firmware's type.
+    FirmwareType,
+    /// Version of the firmware.
+    FirmwareVersion,
+    /// Serial number of the lens.
+    Serial,
+    /// Largest current.
+    MaxCurrent,
+    /// Go to a current, in counts of `mA * 4095 / largest current`. Gets no reply.
+    SetCurrent(i16),
+    /// The current, in counts.
+    Current,
+    /// Control by current.
+    CurrentMode,
+    /// Control by focal power. Needs temperature limits.
+    FocalPowerMode,
+    /// The mode of control.
+    Mode,
+    /// Temperatures between which focal power is to be held, which sets the range of focal power.
+    TemperatureLimits {
+        /// Upper limit.
+        high: i16,
+        /// Lower limit.
+        low: i16,
+    },
+    /// Go to a focal power. Gets no reply.
+    SetFocalPower(i16),
+    /// The focal power set.
+    FocalPower,
+    /// Temperature of the lens.
+    Temperature,
+    /// Status bits.
+    Status,
+}
+
+/// What the driver answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reply {
+    /// `A` to `F`.
+    FirmwareType(u8),
+    /// Major, minor, build, revision.
+    FirmwareVersion(u8, u8, u16, u16),
+    /// Serial number, usually ASCII.
+    Serial([u8; 8]),
+    /// In 1/100 mA.
+    MaxCurrent(u16),
+    /// In counts.
+    Current(i16),
+    /// Current is controlled from now on.
+    CurrentMode,
+    /// Focal power is controlled from now on.
+    FocalPowerMode(Limits),
+    /// 1 current, 2 sine, 3 triangle, 4 square, 5 focal power, 6 analog, 7 position.
+    Mode(u8),
+    /// The limits are set.
+    TemperatureLimits(Limits),
+    /// In the driver's own units.
+    FocalPower(i16),
+    /// In 1/16 °C.
+    Temperature(i16),
+    /// See [`super::status::Status`].
+    Status(u32),
+}
+
+/// Focal power that the lens can hold between the temperature limits, in the driver's own units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// The eight status bits.
+    pub status: u8,
+    /// Greatest focal power.
+    pub max: i16,
+    /// Least focal power.
+    pub min: i16,
+}
+
+/// Why bytes are no reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum WireError {
+    /// The checksum does not fit.
+    #[error("a reply's checksum is wrong")]
+    Checksum,
+    /// It has not the form of a reply to this request.
+    #[error("a reply is unreadable")]
+    Garbage,
+    /// The driver answered with an error.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+}
+
+/// An error that the driver itself reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum DeviceError {
+    /// Error 1, or `N` from old firmware.
+    #[error("the driver says that a command reached it damaged")]
+    Checksum,
+    /// Error 2.
+    #[error("the driver says that its firmware does not have this command: update it")]
+    NotInFirmware,
+    /// Error 3.
+    #[error("the driver says that it does not know this command")]
+    Unknown,
+    /// Error 4.
+    #[error("the driver says that the lens does not fit: plug a compatible lens in")]
+    LensIncompatible,
+    /// Any other.
+    #[error("the driver reports error {0}")]
+    Other(u8),
+}
+
+impl Request {
+    /// The bytes that go over the wire.
+    #[must_use]
+    pub fn encode(self) -> Vec<u8> {
+        let mut bytes = self.payload();
+        let checksum = CHECKSUM.checksum(&bytes);
+        bytes.extend(checksum.to_le_bytes());
+        bytes
+    }
+
+    fn payload(self) -> Vec<u8> {
+        let of = |name: &[u8], values: [i16; 2], used: usize| {
+            let values = values.into_iter().flat_map(i16::to_be_bytes).take(used);
+            name.iter().copied().chain(values).collect()
+        };
+        match self {
+            Self::FirmwareType => of(b"H", [0, 0], 0),
+            Self::FirmwareVersion => of(b"V", [0, 0], 1),
+            Self::Serial => of(b"X", [0, 0], 0),
+            Self::MaxCurrent => of(b"CrMA", [0, 0], 2),
+            Self::SetCurrent(counts) => of(b"Aw", [counts, 0], 2),
+            Self::Current => of(b"Ar", [0, 0], 2),
+            Self::CurrentMode => of(b"MwDA", [0, 0], 0),
+            Self::FocalPowerMode => of(b"MwCA", [0, 0], 0),
+            Self::Mode => of(b"MMA", [0, 0], 0),
+            Self::TemperatureLimits { high, low } => of(b"PwTA", [high, low], 4),
+            Self::SetFocalPower(raw) => of(b"PwDA", [raw, 0], 4),
+            Self::FocalPower => of(b"PrDA", [0, 0], 4),
+            Self::Temperature => of(b"TCA", [0, 0], 0),
+            Self::Status => of(b"Sr", [0, 0], 0),
+        }
+    }
+
+    /// How the reply's payload begins, and its length in bytes; nothing for a request that gets no reply.
+    const fn reply_form(self) -> Option<(&'static [u8], usize)> {
+        match self {
+            Self::SetCurrent(_) | Self::SetFocalPower(_) => None,
+            Self::FirmwareType => Some((b"H", 2)),
+            Self::FirmwareVersion => Some((b"V", 7)),
+            Self::Serial => Some((b"X", 9)),
+            Self::MaxCurrent => Some((b"CMA", 5)),
+            Self::Current => Some((b"A", 3)),
+            Self::CurrentMode => Some((b"MDA", 3)),
+            Self::FocalPowerMode => Some((b"M", 8)),
+            Self::Mode => Some((b"MMA", 4)),
+            Self::TemperatureLimits { .. } => Some((b"", 7)),
+            Self::FocalPower => Some((b"", 4)),
+            Self::Temperature => Some((b"TCA", 5)),
+            Self::Status => Some((b"S", 5)),
+        }
+    }
+
+    /// The reply to this request at the start of `bytes`, or nothing while bytes are missing.
+    ///
+    /// # Errors
+    /// When the driver reports an error, or the bytes are no such reply.
+    pub fn reply(self, bytes: &[u8]) -> Result<Option<Reply>, WireError> {
+        let Some((name, length)) = self.reply_form() else { return Err(WireError::Garbage) };
+        let whole = bytes.get(..length + TRAILER);
+        if let Some(payload) = whole.and_then(checked) {
+            let reply = payload.strip_prefix(name).and_then(|values| self.decode(values));
+            return reply.map(Some).ok_or(WireError::Garbage);
+        }
+        if let Some(error) = error_reply(bytes) {
+            return Err(error.into());
+        }
+        match whole {
+            None => Ok(None),
+            Some(whole) if whole.starts_with(name) && whole.ends_with(b"\r\n") => Err(WireError::Checksum),
+            Some(_) => Err(WireError::Garbage),
+        }
+    }
+
+    /// The values behind the name in a reply of the right length.
+    fn decode(self, values: &[u8]) -> Option<Reply> {
+        let word = |at: usize| values.get(at..at + 2)?.try_into().ok().map(u16::from_be_bytes);
+        let signed = |at: usize| word(at).map(u16::cast_signed);
+        let limits = |at: usize| Some(Limits { status: *values.get(at)?, max: signed(at + 1)?, min: signed(at + 3)? });
+        match self {
+            Self::SetCurrent(_) | Self::SetFocalPower(_) => None,
+            Self::FirmwareType => values.first().copied().map(Reply::FirmwareType),
+            Self::FirmwareVersion => {
+                Some(Reply::FirmwareVersion(*values.first()?, *values.get(1)?, word(2)?, word(4)?))
+            }
+            Self::Serial => values.try_into().ok().map(Reply::Serial),
+            Self::MaxCurrent => word(0).map(Reply::MaxCurrent),
+            Self::Current => signed(0).map(Reply::Current),
+            Self::CurrentMode => Some(Reply::CurrentMode),
+            Self::FocalPowerMode => limits(2).map(Reply::FocalPowerMode),
+            Self::Mode => values.first().copied().map(Reply::Mode),
+            Self::TemperatureLimits { .. } => limits(2).map(Reply::TemperatureLimits),
+            Self::FocalPower => signed(2).map(Reply::FocalPower),
+            Self::Temperature => signed(0).map(Reply::Temperature),
+            Self::Status => values.try_into().ok().map(u32::from_be_bytes).map(Reply::Status),
+        }
+    }
+}
+
+/// The error reply at the start of `bytes`, if there is one. The error's number comes as a digit or as a byte.
+#[must_use]
+pub fn error_reply(bytes: &[u8]) -> Option<DeviceError> {
+    if bytes.starts_with(OLD_CRC_ERROR) {
+        return Some(DeviceError::Checksum);
+    }
+    let &[b'E', number] = checked(bytes.get(..ERROR_LENGTH)?)? else { return None };
+    Some(match number.checked_sub(b'0').unwrap_or(number) {
+        1 => DeviceError::Checksum,
+        2 => DeviceError::NotInFirmware,
+        3 => DeviceError::Unknown,
+        4 => DeviceError::LensIncompatible,
+        other => DeviceError::Other(other),
+    })
+}
+
+/// The payload of a whole reply, if line end and checksum are right.
+fn checked(reply: &[u8]) -> Option<&[u8]> {
+    let (payload, checksum) = reply.strip_suffix(b"\r\n")?.split_last_chunk::<2>()?;
+    (CHECKSUM.checksum(payload) == u16::from_le_bytes(*checksum)).then_some(payload)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The checksum bit by bit from its definition: reflected polynomial 0xA001, start 0.
+    fn bitwise(bytes: &[u8]) -> u16 {
+        bytes.iter().fold(0, |crc, &byte| {
+            (0..8).fold(crc ^ u16::from(byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xA001 } else { crc >> 1 })
+        })
+    }
+
+    fn framed(payload: &[u8]) -> Vec<u8> {
+        [payload, &bitwise(payload).to_le_bytes(), b"\r\n"].concat()
+    }
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        assert_eq!(CHECKSUM.checksum(b"123456789"), 0xBB3D);
+    }
+
+    #[test]
+    fn requests_are_the_published_bytes() {
+        let vectors: [(Request, &str); 14] = [
+            (Request::Temperature, "544341B0D0"),
+            (Request::CurrentMode, "4D7744415446"),
+            (Request::FocalPowerMode, "4D7743415676"),
+            (Request::Mode, "4D4D416577"),
+            (Request::Current, "41720000B427"),
+            (Request::Status, "5372BCD5"),
+            (Request::FirmwareType, "480036"),
+            (Request::Serial, "5801FA"),
+            (Request::FirmwareVersion, "56003FA0"),
+            (Request::MaxCurrent, "43724D4100007180"),
+            (Request::SetCurrent(0), "41770000A426"),
+            (Request::TemperatureLimits { high: 40 * 16, low: 20 * 16 }, "5077544102800140 33D0"),
+            (Request::SetFocalPower(3000), "507744410BB80000B371"),
+            (Request::FocalPower, "50724441000000006470"),
+        ];
+        for (request, expected) in vectors {
+            assert_eq!(hex::encode_upper(request.encode()), expected.replace(' ', ""), "{request:?}");
+        }
+    }
+
+    #[test]
+    fn published_replies_are_understood() {
+        let bytes = |text| hex::decode(text).unwrap();
+        let reply = |request: Request, text| request.reply(&bytes(text));
+        assert_eq!(reply(Request::Temperature, "544341019874660D0A"), Ok(Some(Reply::Temperature(408))));
+        assert_eq!(reply(Request::MaxCurrent, "434D41726427FC0D0A"), Ok(Some(Reply::MaxCurrent(29_284))));
+        assert_eq!(reply(Request::Mode, "4D4D410577280D0A"), Ok(Some(Reply::Mode(5))));
+        for error in ["4531F3440D0A", "4501F3500D0A", "4E0D0A"] {
+            assert_eq!(reply(Request::Status, error), Err(WireError::Device(DeviceError::Checksum)), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_reply_is_taken_apart() {
+        let reply = |request: Request, payload: &[u8]| request.reply(&framed(payload)).unwrap().unwrap();
+        let limits = Limits { status: 1, max: 3000, min: -2 };
+        assert_eq!(reply(Request::FirmwareType, b"HA"), Reply::FirmwareType(b'A'));
+        assert_eq!(reply(Request::FirmwareVersion, b"V\x01\x02\x01\x00\x00\x07"), Reply::FirmwareVersion(1, 2, 256, 7));
+        assert_eq!(reply(Request::Serial, b"XAREA0042"), Reply::Serial(*b"AREA0042"));
+        assert_eq!(reply(Request::Current, b"A\xFF\xFE"), Reply::Current(-2));
+        assert_eq!(reply(Request::CurrentMode, b"MDA"), Reply::CurrentMode);
+        assert_eq!(reply(Request::FocalPowerMode, b"MCA\x01\x0B\xB8\xFF\xFE"), Reply::FocalPowerMode(limits));
+        let temperatures = Request::TemperatureLimits { high: 1, low: 0 };
+        assert_eq!(reply(temperatures, b"??\x01\x0B\xB8\xFF\xFE"), Reply::TemperatureLimits(limits));
+        assert_eq!(reply(Request::FocalPower, b"??\r\n"), Reply::FocalPower(0x0D0A));
+        assert_eq!(reply(Request::Status, b"S\0\0\x01\x80"), Reply::Status(0x180));
+    }
+
+    proptest! {
+        #[test]
+        fn a_reply_is_complete_only_with_its_last_byte(celsius: i16, cut in 0_usize..9) {
+            let bytes = framed(&[&b"TCA"[..], &celsius.to_be_bytes()].concat());
+            prop_assert_eq!(Request::Temperature.reply(&bytes), Ok(Some(Reply::Temperature(celsius))));
+            prop_assert_eq!(Request::Temperature.reply(&bytes[..cut]), Ok(None));
+        }
+
+        #[test]
+        fn one_flipped_bit_is_always_noticed(status: u32, bit in 0_usize..72) {
+            let mut bytes = framed(&[&b"S"[..], &status.to_be_bytes()].concat());
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            prop_assert!(Request::Status.reply(&bytes).is_err());
+        }
+
+        #[test]
+        fn no_bytes_panic(bytes in prop::collection::vec(any::<u8>(), 0..40)) {
+            for request in [Request::Serial, Request::FocalPower, Request::FocalPowerMode, Request::FirmwareVersion] {
+                let _ = request.reply(&bytes);
+            }
+        }
+    }
+}

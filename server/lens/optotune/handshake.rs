@@ -1,0 +1,117 @@
+//! What is said before the first command: who are you, temperature limits, focal power mode.
+
+use std::path::Path;
+
+use super::codec::{DeviceError, Limits, Reply, Request, WireError};
+use super::link::{Link, LinkError};
+use super::range::{Range, Scale};
+use super::shared::Device;
+use super::status::{FOCAL_POWER_MODE, Status, mode_name};
+use super::worker::Trouble;
+use crate::lens::LensError;
+
+/// How the lens is to be used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Least dioptres to use, if not the device's.
+    pub min_dioptre: Option<f64>,
+    /// Most dioptres to use.
+    pub max_dioptre: Option<f64>,
+    /// Lens temperatures, in °C, between which focal power is to be held. A wider span narrows the dioptre range.
+    pub temperatures: (f64, f64),
+}
+
+/// Makes the device behind `link` ready for commands.
+pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Device, Trouble> {
+    greet(link, path)?;
+    let Reply::FirmwareType(letter) = link.ask(Request::FirmwareType)? else { return Err(confused()) };
+    let version = match link.ask(Request::FirmwareVersion)? {
+        Reply::FirmwareVersion(major, minor, build, revision) => format!("{major}.{minor}.{build}.{revision}"),
+        _ => return Err(confused()),
+    };
+    let Reply::Serial(serial) = link.ask(Request::Serial)? else { return Err(confused()) };
+    let Reply::Status(status) = link.ask(Request::Status)? else { return Err(confused()) };
+    check_lens(Status(status))?;
+    let limits = control_focal_power(link, settings)?;
+    let scale = Scale::of_firmware(letter);
+    let range = Range::new(scale, limits, settings.min_dioptre, settings.max_dioptre)?;
+    let Reply::Mode(mode) = link.ask(Request::Mode)? else { return Err(confused()) };
+    if mode != FOCAL_POWER_MODE {
+        let mode = mode_name(mode);
+        return Err(LensError::Refused(format!("it stays in {mode} mode instead of focal power mode")).into());
+    }
+    let Reply::Status(status) = link.ask(Request::Status)? else { return Err(confused()) };
+    let Reply::Temperature(sixteenths) = link.ask(Request::Temperature)? else { return Err(confused()) };
+    let Reply::FocalPower(read_back) = link.ask(Request::FocalPower)? else { return Err(confused()) };
+    Ok(Device {
+        firmware: format!("type {}, version {version}", char::from(letter)),
+        serial: String::from_utf8_lossy(&serial).trim_matches(['\0', ' ']).to_owned(),
+        range,
+        mode,
+        status: Status(status),
+        temperature: f64::from(sixteenths) / 16.0,
+        read_back,
+    })
+}
+
+/// Tries twice, because the first greeting may end a request that someone else left half sent.
+fn greet(link: &mut Link, path: &Path) -> Result<(), Trouble> {
+    let stranger = || {
+        LensError::Refused(format!(
+            "{} answers, but not as an Optotune Lens Driver 4: is this the right port?",
+            path.display()
+        ))
+    };
+    match link.greet() {
+        Ok(true) => return Ok(()),
+        Ok(false) | Err(LinkError::Silent) => {}
+        Err(error) => return Err(error.into()),
+    }
+    match link.greet() {
+        Ok(true) => Ok(()),
+        Ok(false) => Err(stranger().into()),
+        Err(LinkError::Silent) => Err(LensError::Gone(format!(
+            "nothing answers at {}: is it an Optotune Lens Driver 4, and is it powered?",
+            path.display()
+        ))
+        .into()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Temperature limits first: without them the driver refuses focal power mode. The range is that of the last reply.
+fn control_focal_power(link: &mut Link, settings: &Settings) -> Result<Limits, Trouble> {
+    let (low, high) = settings.temperatures;
+    let request = Request::TemperatureLimits { high: sixteenths(high), low: sixteenths(low) };
+    let Reply::TemperatureLimits(_) = link.ask(request).map_err(explain_incompatible)? else { return Err(confused()) };
+    match link.ask(Request::FocalPowerMode).map_err(explain_incompatible)? {
+        Reply::FocalPowerMode(limits) => Ok(limits),
+        _ => Err(confused()),
+    }
+}
+
+fn explain_incompatible(error: LinkError) -> Trouble {
+    match error {
+        LinkError::Wire(WireError::Device(DeviceError::LensIncompatible)) => {
+            LensError::Refused("the lens has no focal power calibration: plug in one with a memory".into()).into()
+        }
+        other => other.into(),
+    }
+}
+
+fn check_lens(status: Status) -> Result<(), LensError> {
+    if status.without_lens() {
+        let words = status.words().join("; ");
+        return Err(LensError::Gone(format!("the driver is there, but {words}: check the lens's cable")));
+    }
+    Ok(())
+}
+
+fn confused() -> Trouble {
+    LensError::Refused("it answered another question than was asked".into()).into()
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "held within the bounds of i16")]
+fn sixteenths(celsius: f64) -> i16 {
+    (celsius * 16.0).round().clamp(f64::from(i16::MIN), f64::from(i16::MAX)) as i16
+}
