@@ -1,7 +1,21 @@
 //! Imaging: from a sensor's mosaic to what people and policies see. No thread, clock, file or socket.
 
+mod blur;
+mod calibration;
+mod calibration_toml;
+mod colour;
+pub mod content_area;
 mod frame;
 mod geometry;
+mod jpeg;
+mod luma;
+mod reconstruct;
 
-pub use frame::{FrameError, GrayImage, MosaicFrame, RgbImage};
-pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea};
+pub use blur::gaussian_blur;
+pub use calibration::{BANDS, Band, Calibration, Reference};
+pub use calibration_toml::CalibrationError;
+pub use frame::{CELL, FrameError, GrayImage, MosaicFrame, RgbImage};
+pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
+pub use jpeg::{JpegEncoder, JpegError};
+pub use luma::{rgb_patch, rgb_to_gray};
+pub use reconstruct::Reconstructor;

@@ -1,0 +1,68 @@
+//! White balance by references per pixel.
+
+use crate::imaging::calibration::{BANDS, Calibration, Reference};
+use crate::imaging::frame::{CELL, MosaicFrame};
+
+/// Gain and offset of every pixel of the sensor, so that dark becomes 0 and white 1.
+#[derive(Debug, Clone)]
+pub(super) struct PixelBalance {
+    width: usize,
+    height: usize,
+    gains: Vec<f32>,
+    offsets: Vec<f32>,
+}
+
+impl PixelBalance {
+    /// The balance by the references of `calibration`, if one of them is per pixel and they are of one size.
+    pub(super) fn new(calibration: &Calibration) -> Option<Self> {
+        let (width, height) =
+            [&calibration.dark, &calibration.white].into_iter().find_map(|reference| match reference {
+                Reference::PerPixel(frame) => Some((frame.width(), frame.height())),
+                Reference::PerBand(_) => None,
+            })?;
+        if !calibration.fits(width, height) {
+            return None;
+        }
+        let (mean_dark, mean_white) = (calibration.dark.band_means(), calibration.white.band_means());
+        let counts = |reference: &Reference, means: &[f32; BANDS], index: usize| match reference {
+            Reference::PerPixel(frame) => f32::from(frame.samples()[index]),
+            Reference::PerBand(_) => means[band(index, width)],
+        };
+        let (gains, offsets) = (0..width * height)
+            .map(|index| {
+                let dark = counts(&calibration.dark, &mean_dark, index);
+                let white = counts(&calibration.white, &mean_white, index);
+                // A dead pixel, which sees no white, is balanced as its band is.
+                let band = band(index, width);
+                let span = if white > dark { white - dark } else { mean_white[band] - mean_dark[band] };
+                (1.0 / span, -dark / span)
+            })
+            .unzip();
+        Some(Self { width, height, gains, offsets })
+    }
+
+    /// Whether `mosaic` is of the references' size.
+    pub(super) fn fits(&self, mosaic: &MosaicFrame) -> bool {
+        (mosaic.width(), mosaic.height()) == (self.width, self.height)
+    }
+
+    /// White-balances the samples from column `x` on of the row of cells `y` into `balanced`, which is four rows one
+    /// after another.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
+    pub(super) fn apply(&self, rows: [&[u16]; CELL], x: usize, y: usize, balanced: &mut [f32]) {
+        let length = rows[0].len();
+        for (row, (samples, balanced)) in rows.into_iter().zip(balanced.chunks_exact_mut(length)).enumerate() {
+            let start = (CELL * y + row) * self.width + x;
+            let places = start..start + length;
+            let correction = self.gains[places.clone()].iter().zip(&self.offsets[places]);
+            for ((balanced, &sample), (gain, offset)) in balanced.iter_mut().zip(samples).zip(correction) {
+                *balanced = f32::from(sample) * gain + offset;
+            }
+        }
+    }
+}
+
+fn band(index: usize, width: usize) -> usize {
+    CELL * (index / width % CELL) + index % width % CELL
+}

@@ -1,0 +1,198 @@
+//! From a mosaic to pictures: RGB for people, gray for the content area, and the gray patch for policies.
+
+mod balance;
+mod mix;
+
+use multiversion::multiversion;
+
+use super::calibration::{BANDS, Calibration};
+use super::colour::{Encoder, linear_srgb_from_bands};
+use super::frame::{CELL, GrayImage, MosaicFrame, RgbImage};
+use super::geometry::{PATCH_SIDE, Patch, PatchArea};
+use balance::PixelBalance;
+use mix::Mix;
+
+/// Makes pictures of one value a mosaic cell from mosaics, by one calibration. Keep one and reuse it.
+///
+/// Colour is made from the spectrally corrected bands. Gray is the mean of the white-balanced bands before that
+/// correction, which subtracts bands from one another and so would add noise to the focus metrics.
+#[derive(Debug, Clone)]
+pub struct Reconstructor {
+    of_counts: Mixes,
+    /// Where references are per pixel: the balance, and what is then mixed of balanced samples.
+    of_balanced: Option<(PixelBalance, Mixes)>,
+    encoder: Encoder,
+    lines: Lines,
+}
+
+/// What is made of the 16 samples of a cell.
+#[derive(Debug, Clone)]
+struct Mixes {
+    /// Red, green and blue, each as an index of an [`Encoder`], and gray.
+    picture: Mix<4>,
+    /// Gray alone.
+    gray: Mix<1>,
+}
+
+/// Memory for one row of cells on its way.
+#[derive(Debug, Clone, Default)]
+struct Lines {
+    /// Four rows of white-balanced samples.
+    balanced: Vec<f32>,
+    /// One row of each colour.
+    colours: [Vec<f32>; 3],
+}
+
+impl Reconstructor {
+    /// A reconstructor for mosaics of the sensor that `calibration` belongs to. Fits the colour matrix, which takes some
+    /// milliseconds.
+    #[must_use]
+    pub fn new(calibration: &Calibration) -> Self {
+        let weights = weights(calibration);
+        let (dark, white) = (calibration.dark.band_means(), calibration.white.band_means());
+        let balanced = Mixes { picture: Mix::new(weights), gray: Mix::new([weights[3]]) };
+        Self {
+            of_counts: Mixes {
+                picture: balanced.picture.of_counts(&dark, &white),
+                gray: balanced.gray.of_counts(&dark, &white),
+            },
+            of_balanced: PixelBalance::new(calibration).map(|balance| (balance, balanced)),
+            encoder: Encoder::new(),
+            lines: Lines::default(),
+        }
+    }
+
+    /// Makes `rgb` (sRGB) and `gray` (0..=255) from `mosaic`, one pixel a cell; both are resized as needed.
+    ///
+    /// References per pixel hold for mosaics of their own size (see [`Calibration::fits`]); one of another size is made
+    /// with the means of their bands.
+    pub fn reconstruct(&mut self, mosaic: &MosaicFrame, rgb: &mut RgbImage, gray: &mut GrayImage) {
+        let (width, height) = (mosaic.band_width(), mosaic.band_height());
+        (rgb.width, rgb.height, gray.width, gray.height) = (width, height, width, height);
+        rgb.data.resize(3 * width * height, 0);
+        gray.data.resize(width * height, 0.0);
+        self.lines.colours.iter_mut().for_each(|line| line.resize(width, 0.0));
+        match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
+            None => picture_of_counts(&self.of_counts, mosaic, &self.encoder, &mut self.lines, rgb, gray),
+            Some((balance, mixes)) => {
+                self.lines.balanced.resize(CELL * mosaic.width(), 0.0);
+                picture_of_balanced(balance, mixes, mosaic, &self.encoder, &mut self.lines, rgb, gray);
+            }
+        }
+    }
+
+    /// The patch of the gray picture at `area` (in cells), computing just those cells; black where `area` leaves the
+    /// picture.
+    #[must_use]
+    pub fn gray_patch(&self, mosaic: &MosaicFrame, area: PatchArea) -> Patch {
+        let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
+        match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
+            None => patch_of_counts(&self.of_counts, mosaic, area, &mut patch),
+            Some((balance, mixes)) => patch_of_balanced(balance, mixes, mosaic, area, &mut patch),
+        }
+        patch
+    }
+}
+
+/// The weights of [`Mixes::picture`] for white-balanced samples.
+fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
+    let corrected = |colour: [f32; BANDS]| {
+        std::array::from_fn(|band| {
+            let through = calibration.correction.iter().zip(colour).map(|(from, weight)| weight * from[band]);
+            Encoder::SCALE * through.sum::<f32>()
+        })
+    };
+    let [red, green, blue] = linear_srgb_from_bands(&calibration.bands).map(corrected);
+    [red, green, blue, [255.0 / 16.0; BANDS]]
+}
+
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn picture_of_counts(
+    mixes: &Mixes,
+    mosaic: &MosaicFrame,
+    encoder: &Encoder,
+    lines: &mut Lines,
+    rgb: &mut RgbImage,
+    gray: &mut GrayImage,
+) {
+    let width = mosaic.band_width();
+    let rows = rgb.data.chunks_exact_mut(3 * width).zip(gray.data.chunks_exact_mut(width));
+    for (y, (rgb, gray)) in rows.enumerate() {
+        let [red, green, blue] = &mut lines.colours;
+        mixes.picture.apply(cell_row(mosaic, 0, y, width), [red, green, blue, gray]);
+        finish(&lines.colours, encoder, rgb, gray);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn picture_of_balanced(
+    balance: &PixelBalance,
+    mixes: &Mixes,
+    mosaic: &MosaicFrame,
+    encoder: &Encoder,
+    lines: &mut Lines,
+    rgb: &mut RgbImage,
+    gray: &mut GrayImage,
+) {
+    let width = mosaic.band_width();
+    let rows = rgb.data.chunks_exact_mut(3 * width).zip(gray.data.chunks_exact_mut(width));
+    for (y, (rgb, gray)) in rows.enumerate() {
+        balance.apply(cell_row(mosaic, 0, y, width), 0, y, &mut lines.balanced);
+        let [red, green, blue] = &mut lines.colours;
+        mixes.picture.apply(quarters(&lines.balanced), [red, green, blue, gray]);
+        finish(&lines.colours, encoder, rgb, gray);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn patch_of_counts(mixes: &Mixes, mosaic: &MosaicFrame, area: PatchArea, patch: &mut Patch) {
+    let cells = PATCH_SIDE.min(mosaic.band_width().saturating_sub(area.x));
+    for (y, gray) in (area.y..mosaic.band_height()).zip(patch.0.chunks_exact_mut(PATCH_SIDE)) {
+        let gray = &mut gray[..cells];
+        mixes.gray.apply(cell_row(mosaic, area.x, y, cells), [gray]);
+        clamp_gray(gray);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn patch_of_balanced(balance: &PixelBalance, mixes: &Mixes, mosaic: &MosaicFrame, area: PatchArea, patch: &mut Patch) {
+    let cells = PATCH_SIDE.min(mosaic.band_width().saturating_sub(area.x));
+    let mut balanced = [0.0; CELL * CELL * PATCH_SIDE];
+    let balanced = &mut balanced[..CELL * CELL * cells];
+    for (y, gray) in (area.y..mosaic.band_height()).zip(patch.0.chunks_exact_mut(PATCH_SIDE)) {
+        let gray = &mut gray[..cells];
+        balance.apply(cell_row(mosaic, area.x, y, cells), CELL * area.x, y, balanced);
+        mixes.gray.apply(quarters(balanced), [gray]);
+        clamp_gray(gray);
+    }
+}
+
+/// The four rows of samples of `cells` cells from cell (`x`, `y`) on.
+fn cell_row(mosaic: &MosaicFrame, x: usize, y: usize, cells: usize) -> [&[u16]; CELL] {
+    std::array::from_fn(|row| &mosaic.samples()[(CELL * y + row) * mosaic.width()..][CELL * x..][..CELL * cells])
+}
+
+fn quarters(values: &[f32]) -> [&[f32]; CELL] {
+    let length = values.len() / CELL;
+    std::array::from_fn(|row| &values[row * length..][..length])
+}
+
+/// Encodes a row of colours and brings a row of gray into range.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
+fn finish(colours: &[Vec<f32>; 3], encoder: &Encoder, rgb: &mut [u8], gray: &mut [f32]) {
+    let [red, green, blue] = colours;
+    let pixels = rgb.as_chunks_mut::<3>().0;
+    for (((pixel, &red), &green), &blue) in pixels.iter_mut().zip(red).zip(green).zip(blue) {
+        *pixel = [red, green, blue].map(|colour| encoder.at(colour));
+    }
+    clamp_gray(gray);
+}
+
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
+fn clamp_gray(gray: &mut [f32]) {
+    for value in gray {
+        *value = value.clamp(0.0, 255.0);
+    }
+}
