@@ -25,7 +25,28 @@ macro_rules! assets {
 }
 
 /// Every file of `web/static/`, by name.
-static ASSETS: &[Asset] = &assets!["live.js", "overlay.js", "style.css", "viewer.js"];
+static ASSETS: &[Asset] = &assets![
+    "api.js",
+    "change.js",
+    "compose.js",
+    "devices.js",
+    "dialogs.js",
+    "dom.js",
+    "icon.svg",
+    "live.js",
+    "operator.css",
+    "operator.js",
+    "outbox.js",
+    "overlay.js",
+    "questions.js",
+    "researcher.css",
+    "researcher.js",
+    "style.css",
+    "surgeon.css",
+    "surgeon.js",
+    "timeline.js",
+    "viewer.js"
+];
 
 /// Hash of all files, in hexadecimal.
 static VERSION: LazyLock<String> = LazyLock::new(|| {

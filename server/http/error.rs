@@ -11,7 +11,6 @@ use axum::response::{Html, IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::assets;
 use crate::conductor::ConductError;
 use crate::trial::view::Role;
 
@@ -99,7 +98,6 @@ impl IntoResponse for Error {
 #[derive(Template)]
 #[template(path = "error.html")]
 struct ErrorPage<'a> {
-    stylesheet: String,
     title: &'a str,
     message: &'a str,
     /// Whether to load the page once more: a browser that followed another site's link keeps strict cookies back the
@@ -128,7 +126,6 @@ pub async fn render(request: Request, next: Next) -> Response {
         return (parts, Json(ErrorBody { error: message })).into_response();
     }
     let html = ErrorPage {
-        stylesheet: assets::url("style.css"),
         title: title_of(status),
         message: &message,
         reload: from_elsewhere && matches!(error, Some(Error::NeedsRole(_))),

@@ -1,30 +1,92 @@
-//! The surgeon's page.
+//! The surgeon's page and what it sends: actions, comments, answers. Sees no view but the surgeon's.
+
+use std::sync::Arc;
 
 use askama::Template;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
 use axum::response::Html;
+use serde::Deserialize;
+use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::Error;
+use super::AppState;
+use super::error::{Error, ErrorBody};
 use super::roles::Surgeon;
 use super::security::Nonce;
-use super::{AppState, assets};
+use crate::ids::SessionId;
+use crate::trial::view::{Action, NewAnswer, NewComment, Role, SurgeonView};
 
 #[derive(Template)]
 #[template(path = "surgeon.html")]
 struct Page {
     nonce: String,
-    stylesheet: String,
-    viewer: String,
 }
 
 /// The surgeon's page.
 #[utoipa::path(get, path = "/surgeon", tag = "surgeon", responses((status = 200, description = "The page", content_type = "text/html")))]
 async fn page(_: Surgeon, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
-    let page = Page { nonce, stylesheet: assets::url("style.css"), viewer: assets::url("viewer.js") };
-    page.render().map(Html).map_err(|_| Error::Internal)
+    Page { nonce }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+type View = Json<Option<Arc<SurgeonView>>>;
+
+/// The session under way; null when there is none.
+#[utoipa::path(get, path = "/api/surgeon/session", tag = "surgeon", responses((status = 200, body = Option<SurgeonView>)))]
+async fn session(_: Surgeon, State(app): State<AppState>) -> View {
+    Json(app.surgeon_view.borrow().clone())
+}
+
+/// An action on a session.
+#[derive(Debug, Deserialize, ToSchema)]
+pub(super) struct Act {
+    /// The session that the page was showing.
+    pub(super) session: SessionId,
+    /// What to do.
+    #[serde(flatten)]
+    pub(super) action: Action,
+}
+
+/// Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then.
+#[utoipa::path(post, path = "/api/surgeon/actions", tag = "surgeon", request_body = Act, responses(
+    (status = 200, body = Option<SurgeonView>),
+    (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
+async fn act(_: Surgeon, State(app): State<AppState>, Json(act): Json<Act>) -> Result<View, Error> {
+    app.conductor.act(Role::Surgeon, act.session, act.action).await?;
+    Ok(Json(app.surgeon_view.borrow().clone()))
+}
+
+/// Keeps a comment: once this has answered, it is on disk. The same key again is the same comment.
+#[utoipa::path(post, path = "/api/surgeon/comments", tag = "surgeon", request_body = NewComment, responses(
+    (status = 204, description = "Kept"),
+    (status = 422, description = "Empty or too long", body = ErrorBody),
+    (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
+async fn comment(
+    _: Surgeon,
+    State(app): State<AppState>,
+    Json(comment): Json<NewComment>,
+) -> Result<StatusCode, Error> {
+    app.conductor.comment(comment).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Keeps an answer: once this has answered, it is on disk. A later answer to the same question replaces it.
+#[utoipa::path(post, path = "/api/surgeon/answers", tag = "surgeon", request_body = NewAnswer, responses(
+    (status = 204, description = "Kept"),
+    (status = 422, description = "The value does not fit the question", body = ErrorBody),
+    (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
+async fn answer(_: Surgeon, State(app): State<AppState>, Json(answer): Json<NewAnswer>) -> Result<StatusCode, Error> {
+    app.conductor.answer(answer).await?;
+    Ok(StatusCode::NO_CONTENT)
 }
 
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(page))
+    OpenApiRouter::new()
+        .routes(routes!(page))
+        .routes(routes!(session))
+        .routes(routes!(act))
+        .routes(routes!(comment))
+        .routes(routes!(answer))
 }

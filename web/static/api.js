@@ -1,0 +1,49 @@
+// Talks JSON with the server, and tells three things apart: it worked, the server refused, nobody answered.
+
+/** The server's refusal: `message` is written for people. */
+export class Refused extends Error {
+  constructor(status, message) {
+    super(message);
+    this.status = status;
+  }
+
+  /** Whether the same request may succeed later: the fault is not in what was sent. */
+  get passing() {
+    return this.status >= 500 || this.status === 408 || this.status === 429;
+  }
+}
+
+const PATIENCE_MS = 10000;
+
+async function request(method, path, body) {
+  const response = await fetch(path, {
+    method,
+    headers: body === undefined ? {} : { "content-type": "application/json" },
+    body: body === undefined ? undefined : JSON.stringify(body),
+    signal: AbortSignal.timeout(PATIENCE_MS),
+    cache: "no-store",
+  });
+  const text = await response.text();
+  if (!response.ok) throw new Refused(response.status, explanation(text, response.status));
+  return text ? JSON.parse(text) : null;
+}
+
+function explanation(text, status) {
+  try {
+    const said = JSON.parse(text);
+    if (typeof said.error === "string") return said.error;
+  } catch {
+    // not JSON: a proxy's page or a bare status
+  }
+  if (status === 401 || status === 403) return "This link is no longer valid here. Open it again, or ask for a new one.";
+  if (status === 413) return "That is too long to be saved in one piece.";
+  return `The server answered with an error (${status}).`;
+}
+
+export const get = (path) => request("GET", path);
+export const post = (path, body) => request("POST", path, body);
+
+/** An error in words, whoever made it. */
+export function inWords(error) {
+  return error instanceof Refused ? error.message : "No connection to the server. Trying again by itself.";
+}

@@ -1,0 +1,46 @@
+// The full-screen notice at each change of setting. It needs a tap meant for it: one that began before it was there, or
+// the second half of a double tap, does not count.
+
+import { byId, setText } from "./dom.js";
+
+const NOT_MEANT_MS = 600;
+
+/** `accept(segment)` is called when the surgeon taps the notice of `segment`. */
+export function changeNotice(accept) {
+  const dialog = byId("change");
+  const button = byId("change-tap");
+  let segment = null;
+  let shownAt = 0;
+  let focusBefore = null;
+
+  dialog.addEventListener("cancel", (event) => event.preventDefault());
+  button.onclick = () => {
+    if (performance.now() - shownAt < NOT_MEANT_MS) return;
+    setText(byId("change-go"), "One moment…");
+    accept(segment);
+  };
+
+  function show(state) {
+    if (dialog.open && segment === state.segment) return;
+    segment = state.segment;
+    shownAt = performance.now();
+    setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
+    ask();
+    byId("change-practice").hidden = !state.practice;
+    if (dialog.open) return;
+    focusBefore = document.activeElement;
+    dialog.showModal();
+    button.focus();
+  }
+
+  function hide() {
+    if (!dialog.open) return;
+    dialog.close();
+    segment = null;
+    if (focusBefore?.isConnected) focusBefore.focus();
+  }
+
+  /** Asks (again) for the tap. */
+  const ask = () => setText(byId("change-go"), "Tap to continue");
+  return { show, hide, ask };
+}

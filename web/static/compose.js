@@ -1,0 +1,125 @@
+// The comment box, the quick comments and "Mark this moment". A comment belongs to the setting it was begun under, even
+// when the setting changes while it is being written.
+
+import { Draft } from "./outbox.js";
+import { byId, make, setText } from "./dom.js";
+
+const PATH = "/api/surgeon/comments";
+/** A second tap on the same button within this time is the same tap. */
+const SAME_TAP_MS = 700;
+
+/** `now()` gives `{ session, segment, setting, frame }` as on screen at this moment, or null outside a session. */
+export function composer(outbox, now) {
+  const box = byId("comment");
+  const about = byId("about");
+  const status = byId("comment-state");
+  const trouble = byId("comment-trouble");
+  const quick = byId("quick");
+  const mark = byId("mark");
+  const send = byId("send");
+  let draft = null;
+  let begun = null;
+  let kept = 0;
+  let shown = null;
+
+  function follow(state) {
+    const session = state?.session ?? null;
+    if (session !== shown) {
+      shown = session;
+      draft = session && new Draft(`comment.${session}`);
+      const left = draft?.read();
+      begun = left?.begun ?? null;
+      box.value = left?.text ?? "";
+      setText(trouble, "");
+    }
+    const over = !state || state.phase === "completed" || state.phase === "aborted";
+    box.disabled = over && box.value === "";
+    box.placeholder = state ? "Say what you see" : "Comments are kept once a trial begins";
+    const looking = state?.phase === "inspecting";
+    mark.hidden = !looking;
+    kept = state?.comments ?? 0;
+    drawQuick(looking ? state.quick_comments : []);
+    drawState();
+  }
+
+  function drawQuick(texts) {
+    if (quick.dataset.texts === JSON.stringify(texts)) return;
+    quick.dataset.texts = JSON.stringify(texts);
+    quick.hidden = texts.length === 0;
+    quick.replaceChildren(...texts.map((text) => make("button", { type: "button", onclick: (event) => tap(event.currentTarget, { kind: "quick", text }) }, text)));
+  }
+
+  function drawState() {
+    send.disabled = box.value.trim() === "";
+    send.classList.toggle("primary", !send.disabled);
+    const waiting = outbox.waiting.filter((entry) => entry.path === PATH).length;
+    if (waiting === 0) setText(status, kept === 0 ? "" : kept === 1 ? "1 comment saved" : `${kept} comments saved`);
+    else if (outbox.trouble) setText(status, `${waiting === 1 ? "1 comment" : `${waiting} comments`} kept on this ${outbox.durable ? "device" : "page: do not close it"}. ${outbox.trouble}`);
+    else setText(status, "Saving…");
+    status.classList.toggle("saved", waiting === 0);
+    const here = now();
+    const elsewhere = begun && begun.setting > 0 && begun.segment !== here?.segment && box.value !== "";
+    about.hidden = !elsewhere;
+    if (elsewhere) setText(about, `This comment is about setting ${begun.setting}.`);
+  }
+
+  function say(said, place) {
+    const { session, segment, frame } = place;
+    outbox.add(PATH, { session, segment, frame, client_millis: Date.now(), ...said });
+  }
+
+  function tap(button, said) {
+    const place = now();
+    if (!place || button.dataset.busy) return;
+    button.dataset.busy = "yes";
+    button.classList.add("taken");
+    setTimeout(() => {
+      delete button.dataset.busy;
+      button.classList.remove("taken");
+    }, SAME_TAP_MS);
+    say(said, place);
+  }
+
+  function submit() {
+    const place = now();
+    const text = box.value.trim();
+    if (!place || text === "") return;
+    say({ kind: "text", text }, { ...place, ...begun });
+    write("");
+    setText(trouble, "");
+    box.focus();
+  }
+
+  function write(text) {
+    if (box.value !== text) box.value = text;
+    if (text === "") begun = null;
+    else if (!begun && now()) begun = { segment: now().segment, setting: now().setting, frame: now().frame };
+    draft?.write(text === "" ? null : { text, begun });
+    box.classList.toggle("tall", text.length > 90 || text.includes("\n"));
+    drawState();
+  }
+
+  outbox.addEventListener("change", ({ detail: { entry, state, reason } }) => {
+    if (entry.path !== PATH) return;
+    if (state === "saved") kept += 1;
+    if (state === "refused") refused(entry, reason);
+    drawState();
+  });
+
+  function refused({ body }, reason) {
+    if (body.kind === "text") write(box.value === "" ? body.text : `${body.text}\n${box.value}`);
+    const what = body.kind === "text" ? "The comment was not saved, it is back in the box" : body.kind === "mark" ? "The mark was not saved" : `“${body.text}” was not saved`;
+    setText(trouble, `${what}: ${reason}`);
+  }
+
+  box.addEventListener("input", () => write(box.value));
+  box.addEventListener("keydown", (event) => {
+    if (event.key === "Enter" && !event.shiftKey && !event.isComposing) {
+      event.preventDefault();
+      submit();
+    }
+  });
+  send.onclick = submit;
+  mark.onclick = () => tap(mark, { kind: "mark" });
+  return { follow, draw: drawState };
+}

@@ -1,0 +1,40 @@
+// The devices' health as the operator sees it: a lamp each, and every warning as a sentence that says what to do.
+
+import { make } from "./dom.js";
+
+/** Draws a lamp for camera, lens and loop into `list`. */
+export function drawDevices(list, status) {
+  const loop = `${status.steps_per_second.toFixed(0)} steps/s · ${milliseconds(status.latency_p50_micros)} ms median, ${milliseconds(status.latency_p99_micros)} ms p99`;
+  redraw(list, [
+    lamp(status.camera.name, `${status.camera.fps.toFixed(1)} fps`, status.camera.working ? (status.camera.simulated ? "warn" : "") : "bad", status.camera.message),
+    lamp(status.lens.name, status.lens.working ? "" : "not answering", status.lens.working ? (status.lens.simulated ? "warn" : "") : "bad", status.lens.message),
+    lamp("focus loop", loop, status.held && status.held !== "paused" ? "bad" : "", status.message ?? ""),
+  ]);
+}
+
+const milliseconds = (micros) => (micros / 1000).toFixed(2);
+
+function lamp(name, figure, state, title) {
+  return make("li", { className: `badge ${state}`, title }, make("span", { className: "lamp", "aria-hidden": "true" }), make("span", { className: "name" }, name), figure && make("span", { className: "number" }, figure));
+}
+
+/** Draws one line a warning into `box`. */
+export function drawWarnings(box, status) {
+  const lines = [];
+  const warn = (text, level = "warn") => lines.push(make("p", { className: `notice-line ${level}` }, text));
+  if (!status.camera.working) warn(`Camera: ${status.camera.message}`, "bad");
+  if (!status.lens.working) warn(`Lens: ${status.lens.message}`, "bad");
+  if (status.held && status.held !== "paused") warn(status.message ?? "The lens is being held where it is.", "bad");
+  const simulated = [status.camera.simulated && "camera", status.lens.simulated && "lens"].filter(Boolean);
+  if (simulated.length > 0) warn(`Simulated ${simulated.join(" and ")}: this is not a real instrument.`);
+  if (status.telemetry_dropped > 0) warn(`${status.telemetry_dropped} telemetry records were dropped: the disk cannot keep up. Comments and answers are not affected.`);
+  redraw(box, lines);
+}
+
+/** Replaces the children only where they differ: a screen reader should not hear the same warning every second. */
+function redraw(parent, nodes) {
+  const markup = nodes.map((node) => node.outerHTML).join("");
+  if (parent.dataset.markup === markup) return;
+  parent.dataset.markup = markup;
+  parent.replaceChildren(...nodes);
+}

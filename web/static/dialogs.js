@@ -1,0 +1,41 @@
+// Native dialogs that ask for something and stay open, with the reason, until it has been done.
+
+import { inWords } from "./api.js";
+import { setText } from "./dom.js";
+
+/**
+ * Opens `dialog`; on submit awaits `done()`, and closes if it worked. `trouble` is where a refusal is told.
+ */
+export function askIn(dialog, trouble, done) {
+  const form = dialog.querySelector("form");
+  const submit = form.querySelector("[type=submit]");
+  setText(trouble, "");
+  for (const button of dialog.querySelectorAll("[data-close]")) button.onclick = () => dialog.close();
+  form.onsubmit = async (event) => {
+    event.preventDefault();
+    submit.disabled = true;
+    try {
+      await done();
+      dialog.close();
+      form.reset();
+    } catch (error) {
+      setText(trouble, inWords(error));
+    } finally {
+      submit.disabled = false;
+    }
+  };
+  dialog.showModal();
+}
+
+/** Asks for a reason in the page's reason dialog. `ask` is `{ heading, consequence, go, danger, done(reason) }`. */
+export function askReason(ask) {
+  const dialog = document.getElementById("reason-dialog");
+  const go = document.getElementById("reason-go");
+  setText(document.getElementById("reason-heading"), ask.heading);
+  setText(document.getElementById("reason-consequence"), ask.consequence);
+  setText(go, ask.go);
+  go.className = ask.danger ? "danger filled" : "primary";
+  const reason = document.getElementById("reason");
+  reason.value = "";
+  askIn(dialog, document.getElementById("reason-trouble"), () => ask.done(reason.value.trim()));
+}

@@ -1,0 +1,234 @@
+// The operator's page: the devices, who focuses, and the session from preparing it to its end.
+
+import { get, inWords, post } from "./api.js";
+import { askIn, askReason } from "./dialogs.js";
+import { byId, clockText, make, setText } from "./dom.js";
+import { drawDevices, drawWarnings } from "./devices.js";
+import { mountViewer } from "./viewer.js";
+
+const BY_HAND = "by-hand";
+const viewer = mountViewer(byId("view"), { role: "operator", traces: byId("traces") });
+let session = null;
+let setup = null;
+let endsAt = null;
+
+/* Devices and focus */
+
+let status = null;
+let dragging = false;
+
+function followStatus(next) {
+  status = next;
+  drawDevices(byId("devices"), status);
+  drawWarnings(byId("warnings"), status);
+  drawFocus();
+}
+
+function drawFocus() {
+  const busy = session !== null && !over(session);
+  byId("focus-controls").disabled = busy;
+  const power = status.focal_power.toFixed(3);
+  setText(byId("focus-now"), busy ? "The session decides until it ends." : `focal power ${power}`);
+  if (dragging || busy) return;
+  byId("policy").value = status.policy ?? BY_HAND;
+  if (status.policy === null) return;
+  byId("focal-power").value = status.focal_power;
+  setText(byId("focal-power-value"), power);
+}
+
+async function drive(order) {
+  try {
+    await post("/api/operator/drive", order);
+    setText(byId("focus-trouble"), "");
+  } catch (error) {
+    setText(byId("focus-trouble"), inWords(error));
+  }
+}
+
+const slider = byId("focal-power");
+slider.addEventListener("input", () => {
+  dragging = true;
+  setText(byId("focal-power-value"), Number(slider.value).toFixed(3));
+  byId("policy").value = BY_HAND;
+  drive({ focal_power: Number(slider.value) });
+});
+slider.addEventListener("change", () => (dragging = false));
+byId("policy").addEventListener("change", () => {
+  const policy = byId("policy").value;
+  drive(policy === BY_HAND ? { focal_power: status?.focal_power ?? 0.5 } : { policy });
+});
+
+/* The session */
+
+const over = (view) => view.phase === "completed" || view.phase === "aborted";
+
+const PHASES = {
+  ready: () => "Ready to start",
+  notice: (view) => `Setting ${view.setting} of ${view.settings}: waiting for the surgeon’s tap`,
+  inspecting: (view) => `Setting ${view.setting} of ${view.settings}: inspecting`,
+  questions: (view) => `Setting ${view.setting} of ${view.settings}: questions`,
+  closing: () => "Closing questions",
+  completed: () => "Completed",
+  aborted: () => "Aborted",
+};
+
+function followSession(next) {
+  session = next;
+  endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
+  byId("new-session").hidden = session !== null && !over(session);
+  byId("running").hidden = session === null;
+  byId("follow").hidden = session === null;
+  if (status) drawFocus();
+  drawBadges();
+  if (!session) return;
+  setText(byId("phase"), PHASES[session.phase](session));
+  byId("steps").replaceChildren(...Array.from({ length: session.settings }, (_, index) => make("li", { className: stepClass(index + 1) })));
+  drawActions();
+  drawFeed();
+  drawTime();
+}
+
+function stepClass(number) {
+  if (number < session.setting || session.phase === "completed" || session.phase === "closing") return "done";
+  return number === session.setting ? "now" : "";
+}
+
+function drawBadges() {
+  const badges = session
+    ? [make("span", { className: "badge" }, session.participant), session.practice && make("span", { className: "badge warn" }, "Practice"), session.paused && make("span", { className: "badge warn" }, "Paused")]
+    : [];
+  byId("session-badges").replaceChildren(...badges.filter(Boolean));
+}
+
+function drawTime() {
+  const inspecting = session?.phase === "inspecting" && endsAt !== null;
+  setText(byId("remaining"), !inspecting ? "" : session.paused ? "clock stopped" : `${clockText((endsAt - performance.now()) / 1000)} left`);
+}
+
+function drawActions() {
+  const { phase, paused, segment, setting } = session;
+  const buttons = [];
+  const add = (label, onclick, className = "") => buttons.push(make("button", { type: "button", className, onclick }, label));
+  if (phase === "ready") add("Start", () => act({ action: "start" }), "primary");
+  if (paused) add("Resume", () => act({ action: "resume" }), "primary");
+  else if (phase === "inspecting") add(`End setting ${setting} now`, () => act({ action: "finish-segment", segment }));
+  if (!paused && phase !== "ready" && !over(session)) add("Pause…", pause);
+  if (!over(session)) add("Abort…", abort, "danger");
+  const labels = JSON.stringify(buttons.map((button) => button.textContent));
+  if (byId("session-actions").dataset.labels === labels && segment === byId("session-actions").dataset.segment) return;
+  Object.assign(byId("session-actions").dataset, { labels, segment });
+  byId("session-actions").replaceChildren(...buttons);
+}
+
+function pause() {
+  askReason({
+    heading: "Pause the session",
+    consequence: "The clock stops and the lens holds still. The surgeon sees that the session is paused and can still comment.",
+    go: "Pause",
+    done: (reason) => send({ action: "pause", reason }),
+  });
+}
+
+function abort() {
+  askReason({
+    heading: "Abort the session",
+    consequence: "The session ends for good and cannot be taken up again. Everything said and answered so far is kept.",
+    go: "Abort session",
+    danger: true,
+    done: (reason) => send({ action: "abort", reason }),
+  });
+}
+
+const send = async (action) => followSession(await post("/api/operator/actions", { session: session.session, ...action }));
+
+async function act(action) {
+  try {
+    await send(action);
+    setText(byId("session-trouble"), "");
+  } catch (error) {
+    setText(byId("session-trouble"), inWords(error));
+    refresh();
+  }
+}
+
+/* Comments and events, newest first */
+
+const time = (at) => make("time", { dateTime: at, title: at }, new Date(at).toLocaleTimeString([], { hour12: false }));
+const SAID = { text: (said) => said.text, quick: (said) => `${said.text} (quick)`, mark: () => "Marked this moment" };
+
+function drawFeed() {
+  setText(byId("comment-count"), String(session.comments));
+  const comments = session.latest_comments.map((comment) => make("li", {}, time(comment.at), make("span", {}, comment.setting ? make("span", { className: "who" }, `setting ${comment.setting} · `) : null, SAID[comment.kind](comment))));
+  const events = session.log.map((line) => make("li", {}, time(line.at), make("span", {}, line.text, make("span", { className: "who" }, ` · ${line.by}`))));
+  byId("comments").replaceChildren(...(comments.length ? comments : [make("li", { className: "empty" }, "None yet.")]));
+  byId("log").replaceChildren(...events);
+}
+
+/* Preparing a session */
+
+function fill(select, options, chosen) {
+  select.replaceChildren(...options.map(({ value, label, disabled }) => make("option", { value, disabled: disabled ?? false, selected: value === chosen }, label)));
+}
+
+function drawSetup(participant = byId("participant").value) {
+  fill(byId("participant"), setup.participants.map((code) => ({ value: code, label: code })), participant);
+  fill(byId("protocol"), setup.protocols.map(({ name, title, practice }) => ({ value: name, label: practice ? `${title} (practice)` : title })), byId("protocol").value);
+  const policies = setup.policies.map(({ name, available }) => ({ value: name, label: available ? name : `${name} (no weights)`, disabled: !available }));
+  fill(byId("policy"), [{ value: BY_HAND, label: "By hand" }, ...policies], status?.policy ?? BY_HAND);
+  drawSummary();
+}
+
+function drawSummary() {
+  const protocol = setup.protocols.find(({ name }) => name === byId("protocol").value);
+  setText(byId("protocol-summary"), protocol?.summary ?? "");
+}
+
+byId("protocol").addEventListener("change", drawSummary);
+byId("new-session").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  try {
+    followSession(await post("/api/operator/sessions", { participant: byId("participant").value, protocol: byId("protocol").value }));
+    setText(byId("session-trouble"), "");
+  } catch (error) {
+    setText(byId("session-trouble"), inWords(error));
+  }
+});
+byId("add-participant").onclick = () =>
+  askIn(byId("participant-dialog"), byId("participant-trouble"), async () => {
+    const code = byId("code").value.trim();
+    setup.participants = await post("/api/operator/participants", { code });
+    drawSetup(code);
+  });
+
+/* Wiring */
+
+byId("copy-link").onclick = async () => {
+  const link = byId("surgeon-link");
+  link.select();
+  try {
+    await navigator.clipboard.writeText(link.value);
+  } catch {
+    document.execCommand("copy"); // the clipboard interface is missing on plain http
+  }
+  setText(byId("copy-link"), "Copied");
+  setTimeout(() => setText(byId("copy-link"), "Copy link"), 2000);
+};
+for (const box of document.querySelectorAll("[data-overlay]")) {
+  const apply = () => viewer.overlay(box.dataset.overlay, box.checked);
+  box.addEventListener("change", apply);
+  apply();
+}
+
+async function refresh() {
+  try {
+    setup = await get("/api/operator/setup");
+    drawSetup();
+  } catch (error) {
+    setText(byId("session-trouble"), inWords(error));
+  }
+}
+
+viewer.live.addEventListener("session", (event) => followSession(event.detail));
+viewer.live.addEventListener("status", (event) => followStatus(event.detail));
+setInterval(drawTime, 250);
+refresh();

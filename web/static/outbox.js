@@ -1,0 +1,185 @@
+// Keeps what was said until the server says that it is saved. Every entry is written to this device first, under a key of
+// its own, so that a reload, a Wi-Fi gap or a second tab loses nothing; the entry's idempotency key makes sending it
+// twice harmless.
+
+import { post, Refused, inWords } from "./api.js";
+import { uuid } from "./dom.js";
+
+const PREFIX = "parfocal.outbox.";
+const FIRST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 8000;
+
+/** Fires `change` whenever an entry is added, saved or refused; the event's detail is `{ entry, state, reason }`. */
+export class Outbox extends EventTarget {
+  #entries = new Map();
+  #flushing = false;
+  #wait = FIRST_WAIT_MS;
+  #timer = null;
+  #count = 0;
+  /** Why the last attempt failed, if it did. */
+  trouble = null;
+  /** Whether this device keeps entries over a reload. */
+  durable = true;
+
+  constructor() {
+    super();
+    for (const entry of stored()) this.#entries.set(entry.id, entry);
+    addEventListener("online", () => this.nudge());
+    document.addEventListener("visibilitychange", () => document.hidden || this.nudge());
+    addEventListener("beforeunload", (event) => {
+      if (!this.durable && this.#entries.size > 0) event.preventDefault();
+    });
+    this.nudge();
+  }
+
+  /** Entries not yet saved, oldest first. */
+  get waiting() {
+    return [...this.#entries.values()].sort((a, b) => (a.id < b.id ? -1 : 1));
+  }
+
+  /**
+   * Takes something to be sent to `path`. An entry with the same `slot` (a question) that has not left yet is replaced.
+   * `body.key` is made here.
+   */
+  add(path, body, slot = null) {
+    const order = `${String(Date.now()).padStart(15, "0")}-${String(this.#count++).padStart(5, "0")}`;
+    const entry = { id: `${order}-${uuid()}`, path, slot, body: { key: uuid(), ...body } };
+    if (slot) {
+      for (const other of this.waiting) if (other.slot === slot && !other.sending) this.#forget(other);
+    }
+    this.#entries.set(entry.id, entry);
+    this.durable = store(entry);
+    this.#tell(entry, "saving");
+    this.nudge();
+    return entry;
+  }
+
+  /** The newest entry for `slot`, if it is still unsaved. */
+  pending(slot) {
+    return this.waiting.findLast((entry) => entry.slot === slot) ?? null;
+  }
+
+  /** Tries now rather than at the end of the present wait. */
+  nudge() {
+    clearTimeout(this.#timer);
+    this.#wait = FIRST_WAIT_MS;
+    this.#flush();
+  }
+
+  /** Resolves once nothing waits, or false as soon as an attempt failed. */
+  async settled() {
+    this.nudge();
+    while (this.#entries.size > 0) {
+      const state = await new Promise((resolve) => this.addEventListener("change", (e) => resolve(e.detail.state), { once: true }));
+      if (state === "waiting") return false;
+    }
+    return true;
+  }
+
+  async #flush() {
+    if (this.#flushing) return;
+    this.#flushing = true;
+    const tried = new Set();
+    const next = () => this.waiting.find((entry) => !tried.has(entry.id));
+    for (let entry = next(); entry; entry = next()) {
+      tried.add(entry.id);
+      if (!(await this.#send(entry))) break;
+    }
+    this.#flushing = false;
+    if (this.#entries.size > 0) {
+      this.#timer = setTimeout(() => this.#flush(), this.#wait);
+      this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
+    }
+  }
+
+  /** Whether the server answered at all, so that the next entry is worth trying. */
+  async #send(entry) {
+    entry.sending = true;
+    try {
+      await post(entry.path, entry.body);
+      this.trouble = null;
+      this.#forget(entry);
+      this.#tell(entry, "saved");
+      return true;
+    } catch (error) {
+      entry.sending = false;
+      if (error instanceof Refused && !error.passing && error.status !== 401 && error.status !== 403) {
+        this.#forget(entry);
+        this.#tell(entry, "refused", error.message);
+        return true;
+      }
+      this.trouble = inWords(error);
+      this.#tell(entry, "waiting", this.trouble);
+      return error instanceof Refused;
+    }
+  }
+
+  #forget(entry) {
+    this.#entries.delete(entry.id);
+    try {
+      localStorage.removeItem(PREFIX + entry.id);
+    } catch {
+      // storage switched off: there was nothing to remove
+    }
+  }
+
+  #tell(entry, state, reason = null) {
+    this.dispatchEvent(new CustomEvent("change", { detail: { entry, state, reason } }));
+  }
+}
+
+function store(entry) {
+  try {
+    localStorage.setItem(PREFIX + entry.id, JSON.stringify(entry));
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+function stored() {
+  try {
+    return Object.keys(localStorage)
+      .filter((key) => key.startsWith(PREFIX))
+      .flatMap((key) => parsed(localStorage.getItem(key)));
+  } catch {
+    return [];
+  }
+}
+
+function parsed(text) {
+  try {
+    return [{ ...JSON.parse(text), sending: false }];
+  } catch {
+    return [];
+  }
+}
+
+/** A text being written, kept on this device: per tab over a reload, and for the next tab when this one is closed. */
+export class Draft {
+  #name;
+  constructor(name) {
+    this.#name = `parfocal.draft.${name}`;
+  }
+
+  /** What was being written, or null. */
+  read() {
+    try {
+      return JSON.parse(sessionStorage.getItem(this.#name) ?? localStorage.getItem(this.#name));
+    } catch {
+      return null;
+    }
+  }
+
+  /** Keeps `value`; null forgets it. */
+  write(value) {
+    for (const storage of ["sessionStorage", "localStorage"]) {
+      try {
+        if (value === null) window[storage].removeItem(this.#name);
+        else window[storage].setItem(this.#name, JSON.stringify(value));
+      } catch {
+        // full or switched off: the text is still in its box
+      }
+    }
+  }
+}

@@ -1,0 +1,59 @@
+// One session as the researcher sees it: the timeline and the list of comments move together; unblinding asks for a reason.
+
+import { get, inWords, post } from "./api.js";
+import { askReason } from "./dialogs.js";
+import { byId, clockText, make, pageData, setText } from "./dom.js";
+import { drawTimeline } from "./timeline.js";
+
+const data = pageData();
+let path = null;
+let point = () => {};
+
+const lines = data.comments.map((comment, index) => {
+  const said = comment.kind === "mark" ? make("em", {}, "Marked this moment") : comment.text;
+  const where = comment.setting ? `Setting ${comment.setting}` : "";
+  return make("button", { type: "button", onclick: () => choose(index), onfocus: () => choose(index) },
+    make("span", { className: "when" }, clockText(comment.at)), make("span", { className: "muted" }, where), make("span", { className: "said" }, said));
+});
+byId("comment-list").append(...lines.map((line) => make("li", {}, line)));
+
+function choose(index) {
+  point(index);
+  lines.forEach((line, other) => (other === index ? line.setAttribute("aria-current", "true") : line.removeAttribute("aria-current")));
+  lines[index].scrollIntoView({ block: "nearest" });
+}
+
+function draw() {
+  point = drawTimeline(byId("timeline"), data, path, choose);
+}
+
+async function showPath() {
+  try {
+    path = (await get(`/api/researcher/sessions/${data.session}/path`)).path;
+    byId("show-path").hidden = true;
+    draw();
+  } catch (error) {
+    setText(byId("timeline-trouble"), inWords(error));
+  }
+}
+
+function unblind() {
+  askReason({
+    heading: data.ended ? "Unblind this session" : "Emergency unblinding",
+    consequence: data.ended
+      ? "You and everyone with this page will see which policy ran in which setting. This cannot be undone, and stands in the audit trail and in every export."
+      : "The session is still under way. Unblinding now is an emergency measure: it is marked as such for good, in the audit trail and in every export. The surgeon’s and operator’s pages still do not show the policies.",
+    go: data.ended ? "Unblind" : "Unblind now",
+    danger: true,
+    done: async (reason) => {
+      await post(`/api/researcher/sessions/${data.session}/unblind`, { reason });
+      location.reload();
+    },
+  });
+}
+
+byId("show-path").onclick = showPath;
+if (byId("unblind")) byId("unblind").onclick = unblind;
+new ResizeObserver(draw).observe(byId("timeline"));
+draw();
+if (data.unblinded) showPath();

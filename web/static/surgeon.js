@@ -1,0 +1,211 @@
+// The surgeon's page: follows the session's state as the server sends it, and shows the same whatever is being tried.
+
+import { post, get, inWords, Refused } from "./api.js";
+import { changeNotice } from "./change.js";
+import { composer } from "./compose.js";
+import { byId, clockText, make, setText } from "./dom.js";
+import { Draft, Outbox } from "./outbox.js";
+import { questionForm, showState } from "./questions.js";
+import { mountViewer } from "./viewer.js";
+
+const ANSWERS = "/api/surgeon/answers";
+const outbox = new Outbox();
+const viewer = mountViewer(byId("view"), { role: "surgeon" });
+let state = null;
+let known = false;
+let endsAt = null;
+
+const here = () => state && { session: state.session, segment: state.segment, setting: state.setting, frame: viewer.frame ?? null };
+const comments = composer(outbox, here);
+const change = changeNotice((segment) => act({ action: "acknowledge", segment }));
+
+/* State in */
+
+function follow(next) {
+  known = true;
+  state = next;
+  endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
+  drawBar();
+  drawPanel();
+  comments.follow(state);
+  if (state?.phase === "notice" && !state.paused) change.show(state);
+  else change.hide();
+}
+
+async function refresh() {
+  try {
+    follow(await get("/api/surgeon/session"));
+  } catch (error) {
+    setText(byId("trouble"), inWords(error));
+  }
+}
+
+/** Does `action`; the page then shows what the server's state says, whether this tab or another moved it. */
+async function act(action) {
+  try {
+    follow(await post("/api/surgeon/actions", { session: state.session, ...action }));
+    setText(byId("trouble"), "");
+  } catch (error) {
+    change.ask();
+    const stale = error instanceof Refused && (error.status === 409 || error.status === 404);
+    if (stale) await refresh();
+    if (!stale || stands(action)) setText(byId("trouble"), inWords(error));
+  }
+}
+
+/** Whether the page still stands where `action` was meant, so that its refusal is news. */
+function stands(action) {
+  return state !== null && (action.segment === undefined || action.segment === state.segment);
+}
+
+/* Bar */
+
+function drawBar() {
+  const inside = state?.segment != null;
+  setText(byId("setting"), inside ? `Setting ${state.setting} of ${state.settings}` : (state?.title ?? "Live view"));
+  const steps = Array.from({ length: state?.settings ?? 0 }, (_, index) => {
+    const number = index + 1;
+    const over = number < state.setting || (number === state.setting && state.segment === null);
+    return make("li", { className: over ? "done" : number === state.setting ? "now" : "" });
+  });
+  byId("steps").replaceChildren(...steps);
+  byId("practice").hidden = !state?.practice;
+  const inspecting = state?.phase === "inspecting";
+  byId("finish").hidden = !inspecting;
+  byId("finish").disabled = !inspecting || state.paused;
+  setText(byId("prompt"), inspecting && !state.paused ? (state.prompt ?? "") : "");
+  drawTime();
+}
+
+function drawTime() {
+  const left = byId("remaining");
+  if (state?.phase !== "inspecting" || endsAt === null) return setText(left, "");
+  if (state.paused) return setText(left, "Paused");
+  setText(left, `${clockText((endsAt - performance.now()) / 1000)} left`);
+}
+
+function followStatus({ camera_simulated: camera, lens_simulated: lens, notice }) {
+  const simulated = [camera && "camera", lens && "lens"].filter(Boolean).join(" and ");
+  byId("simulated").hidden = simulated === "";
+  setText(byId("simulated"), `Simulated ${simulated}`);
+  setText(byId("device-notice"), notice ?? "");
+}
+
+/* What stands over the picture */
+
+let drawn = "";
+
+function drawPanel() {
+  const panel = byId("panel");
+  const key = JSON.stringify(state && [state.session, state.phase, state.paused, state.segment, state.questions]);
+  if (key === drawn) return;
+  drawn = key;
+  const content = panelContent();
+  panel.hidden = content === null;
+  panel.className = `panel ${content?.className ?? ""}`;
+  panel.replaceChildren(...(content?.nodes ?? []));
+  panel.scrollTop = 0;
+  const heading = panel.querySelector("h2");
+  if (heading && document.activeElement === document.body) heading.focus();
+}
+
+function card(className, heading, text, ...more) {
+  const title = make("h2", { tabIndex: -1 }, heading);
+  return { className, nodes: [make("div", { className: "panel-card", role: "status" }, title, make("p", {}, text), ...more)] };
+}
+
+function panelContent() {
+  if (!known) return null;
+  if (!state) return card("aside", "No trial is under way", "The view is live. A trial begins here by itself when the operator starts one.");
+  if (state.paused && state.phase !== "completed" && state.phase !== "aborted") return paused();
+  switch (state.phase) {
+    case "ready":
+      return card("aside", state.title, `${state.settings === 1 ? "One setting" : `${state.settings} settings`} to look at, one after another. Waiting for the operator to start.`);
+    case "questions":
+      return questions(`Setting ${state.setting}: before the next one`);
+    case "closing":
+      return questions("To finish");
+    case "completed":
+      return card("centred", "Thank you", "The trial is complete, and everything you said is saved.");
+    case "aborted":
+      return card("centred", "The session was ended", "There is nothing more to do. Everything you said until then is saved.");
+    default:
+      return null;
+  }
+}
+
+function paused() {
+  const resume = make("button", { type: "button", className: "primary", onclick: () => act({ action: "resume" }) }, "Go on");
+  const text = state.may_resume ? "The server was restarted. Everything is saved; go on where you were." : "The operator has paused the session. You can still comment.";
+  return card("centred clear", "Paused", text, state.may_resume && resume);
+}
+
+/* Questions */
+
+const slot = (question) => `${state.session}/${state.segment ?? "closing"}/${question.id}`;
+
+function questions(heading) {
+  const { session, phase } = state;
+  const segment = phase === "questions" ? state.segment : null;
+  const answers = { ...state.answers };
+  for (const question of state.questions) {
+    const unsent = outbox.pending(slot(question));
+    if (unsent) answers[question.id] = unsent.body.value;
+  }
+  const boxes = questionForm(state.questions, {
+    answers,
+    settings: state.settings,
+    draft: (question) => new Draft(`answer.${slot(question)}`),
+    give: (question, value) => outbox.add(ANSWERS, { session, segment, question: question.id, value }, slot(question)),
+  });
+  const done = make("button", { type: "button", className: "primary", onclick: () => finishQuestions(segment) }, phase === "closing" ? "Finish" : "Continue");
+  const missing = make("p", { id: "missing", className: "message", role: "alert" });
+  const title = make("h2", { tabIndex: -1 }, heading);
+  return { className: "", nodes: [make("div", { className: "questions" }, title, ...boxes, make("div", { className: "done" }, missing, done))] };
+}
+
+async function finishQuestions(segment) {
+  const boxes = [...byId("panel").querySelectorAll(".question")];
+  for (const area of byId("panel").querySelectorAll("textarea")) area.give();
+  const wanting = boxes.filter((box) => unanswered(box));
+  for (const box of boxes) box.classList.toggle("wanting", wanting.includes(box));
+  if (wanting.length > 0) {
+    setText(byId("missing"), wanting.length === 1 ? "One question is still open." : `${wanting.length} questions are still open.`);
+    wanting[0].scrollIntoView({ block: "start" });
+    return wanting[0].querySelector("input, textarea, button.confirm, button")?.focus();
+  }
+  setText(byId("missing"), "Saving…");
+  if (!(await outbox.settled())) return setText(byId("missing"), `${outbox.trouble} Your answers are kept on this device.`);
+  if (byId("panel").querySelector(".state.refused")) return setText(byId("missing"), "An answer was not taken: see above.");
+  await act({ action: "finish-questions", segment });
+  if (byId("missing")) setText(byId("missing"), byId("trouble").textContent);
+}
+
+function unanswered(box) {
+  const question = state.questions.find(({ id }) => id === box.dataset.question);
+  return question && !question.optional && !/saving|saved|waiting/.test(box.querySelector(".state").className);
+}
+
+outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }) => {
+  if (entry.path !== ANSWERS) return;
+  if (state && reached === "saved" && entry.body.session === state.session) state.answers[entry.body.question] = entry.body.value;
+  const box = byId("panel").querySelector(`[data-question="${CSS.escape(entry.body.question)}"] > .state`);
+  const current = state && entry.slot === slot({ id: entry.body.question });
+  if (box && current && !(reached === "saved" && outbox.pending(entry.slot))) showState(box, reached, reason);
+});
+
+/* Wiring */
+
+viewer.live.addEventListener("session", (event) => follow(event.detail));
+viewer.live.addEventListener("status", (event) => followStatus(event.detail));
+viewer.live.addEventListener("connection", (event) => event.detail.open && outbox.nudge());
+byId("finish").onclick = () => act({ action: "finish-segment", segment: state.segment });
+for (const box of document.querySelectorAll("[data-overlay]")) {
+  box.addEventListener("change", () => viewer.overlay(box.dataset.overlay, box.checked));
+}
+document.addEventListener("pointerdown", (event) => {
+  const menu = byId("overlays");
+  if (!menu.contains(event.target)) menu.open = false;
+});
+setInterval(drawTime, 250);
+refresh();
