@@ -1,9 +1,22 @@
 //! Control: the loop camera -> patch -> policy -> lens, its watchdog and its telemetry. Waits for no viewer, disk or
 //! database.
 
+mod attribution;
+mod eye;
+mod pilot;
+pub mod priority;
+mod runner;
 mod slot;
+mod source;
+mod spawn;
+mod stepper;
+mod window;
 
+pub use eye::Eye;
+pub use pilot::HoldReason;
 pub use slot::LatestSlot;
+pub use spawn::{ControlLoop, Rig, Settings};
+pub use stepper::Stepper;
 
 use std::sync::Arc;
 
@@ -84,6 +97,8 @@ pub enum Hold {
     PolicyNonsense,
     /// The policy took longer than a frame.
     PolicySlow,
+    /// The policy cannot run here, or there is none of that name.
+    PolicyUnavailable,
     /// The lens did not take the command.
     LensFailed,
     /// No frame came.

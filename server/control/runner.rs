@@ -1,0 +1,135 @@
+//! A thread that runs one instance of a policy, so that an instance that hangs or panics takes nothing with it.
+
+use std::any::Any;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use crate::autofocus::{Decision, Observation, Policy, PolicyError, PolicyName, Registry};
+use crate::clock::{Clock, Moment};
+use crate::imaging::Patch;
+use crate::lens::FocalPower;
+
+/// An observation of the thread's own.
+#[derive(Debug)]
+struct Question {
+    patch: Patch,
+    focal_power: FocalPower,
+}
+
+/// What came of a question.
+#[derive(Debug)]
+pub enum Answer {
+    /// The policy answered.
+    Decided {
+        /// Its answer, unchecked.
+        decision: Decision,
+        /// Time its step took.
+        took: Duration,
+    },
+    /// The policy panicked, with this message; its thread has ended.
+    Panicked(String),
+    /// The policy could not be made; its thread has ended.
+    Unavailable(PolicyError),
+}
+
+/// One instance of a policy on a thread of its own. At most one question is open at a time. Dropping the runner ends the
+/// thread as soon as the policy's step returns, and waits for nothing.
+#[derive(Debug)]
+pub struct Runner {
+    questions: SyncSender<Question>,
+    answers: Receiver<Answer>,
+    thread: JoinHandle<()>,
+    asked_at: Option<Moment>,
+    /// Whether the instance has answered once. Until then it may be loading.
+    pub proven: bool,
+}
+
+impl Runner {
+    /// Starts a fresh instance of policy `name`; it is made on its own thread.
+    ///
+    /// # Errors
+    /// When the system has no thread left.
+    pub fn start(registry: Arc<Registry>, name: PolicyName, clock: Arc<dyn Clock>) -> io::Result<Self> {
+        let (questions, questions_in) = sync_channel(1);
+        let (answers_out, answers) = sync_channel(1);
+        let thread = std::thread::Builder::new().name("policy".into()).spawn(move || {
+            super::priority::raise();
+            serve(&registry, &name, &*clock, &questions_in, &answers_out);
+        })?;
+        Ok(Self { questions, answers, thread, asked_at: None, proven: false })
+    }
+
+    /// Asks; does not wait.
+    pub fn ask(&mut self, now: Moment, seen: &Observation<'_>) {
+        self.asked_at = Some(now);
+        // A thread that has ended leaves its reason among the answers.
+        let _ = self.questions.try_send(Question { patch: *seen.patch, focal_power: seen.focal_power });
+    }
+
+    /// When the open question was asked, if one is open.
+    pub const fn open_since(&self) -> Option<Moment> {
+        self.asked_at
+    }
+
+    /// Waits for the answer to the open question, for at most `timeout`; `None` when it did not come.
+    pub fn answer(&mut self, timeout: Duration) -> Option<Answer> {
+        let answer = match self.answers.recv_timeout(timeout) {
+            Ok(answer) => answer,
+            Err(RecvTimeoutError::Timeout) => return None,
+            Err(RecvTimeoutError::Disconnected) => Answer::Panicked("its thread ended".into()),
+        };
+        self.asked_at = None;
+        self.proven = true;
+        Some(answer)
+    }
+
+    /// Gives the thread up; it ends when the policy's step returns, if ever.
+    pub fn abandon(self) -> JoinHandle<()> {
+        self.thread
+    }
+}
+
+fn serve(
+    registry: &Registry,
+    name: &PolicyName,
+    clock: &dyn Clock,
+    questions: &Receiver<Question>,
+    answers: &SyncSender<Answer>,
+) {
+    let mut policy = match guarded(|| registry.build(name)) {
+        Ok(Ok(policy)) => policy,
+        Ok(Err(error)) => return drop(answers.send(Answer::Unavailable(error))),
+        Err(message) => return drop(answers.send(Answer::Panicked(message))),
+    };
+    for question in questions {
+        let answer = step(&mut *policy, &question, clock);
+        let over = matches!(answer, Answer::Panicked(_));
+        if answers.send(answer).is_err() || over {
+            return;
+        }
+    }
+}
+
+fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answer {
+    let began = clock.now();
+    let seen = Observation { patch: &question.patch, focal_power: question.focal_power };
+    match guarded(|| policy.step(&seen)) {
+        Ok(decision) => Answer::Decided { decision, took: clock.now().since(began) },
+        Err(message) => Answer::Panicked(message),
+    }
+}
+
+/// Runs `risky`; a panic becomes its message.
+pub fn guarded<T>(risky: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(risky)).map_err(|payload| message(&*payload))
+}
+
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("no message").to_owned()
+}

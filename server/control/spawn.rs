@@ -1,0 +1,236 @@
+//! The loop's thread: starts it, feeds the stepper, publishes what happened, and ends it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+use std::{io, thread};
+
+use tokio::sync::{mpsc, watch};
+
+use super::eye::Eye;
+use super::pilot::HoldReason;
+use super::runner::guarded;
+use super::source::Source;
+use super::stepper::Stepper;
+use super::window::LatencyWindow;
+use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Hold, LatestSlot, StepRecord};
+use crate::autofocus::Registry;
+use crate::camera::{Camera, Frame};
+use crate::clock::{Clock, Moment};
+use crate::imaging::Reconstructor;
+use crate::lens::Lens;
+
+/// Longest wait for a frame before commands are looked at.
+const TICK: Duration = Duration::from_millis(20);
+/// Time without a frame after which the camera counts as failed.
+const NO_FRAME: Duration = Duration::from_millis(300);
+/// Status is published this often, and at every change.
+const STATUS_INTERVAL: Duration = Duration::from_millis(200);
+/// How long a camera that does not answer is waited for at the end.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+/// What the loop is made of.
+pub struct Rig {
+    /// Where frames come from.
+    pub camera: Box<dyn Camera>,
+    /// What is turned.
+    pub lens: Box<dyn Lens>,
+    /// Makes the patch of a mosaic.
+    pub reconstructor: Reconstructor,
+    /// The policies that can be put in charge.
+    pub registry: Registry,
+    /// Time.
+    pub clock: Arc<dyn Clock>,
+}
+
+/// How the loop runs.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// Time between two frames: how long a policy's answer is waited for.
+    pub frame_period: Duration,
+    /// Telemetry records that may wait for their writer before further ones are dropped.
+    pub telemetry_capacity: usize,
+}
+
+/// The running loop. Dropping it ends the loop without waiting.
+pub struct ControlLoop {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl ControlLoop {
+    /// Starts the loop; the lens stays where it is until told otherwise. Also returned: what others hold of it, and its
+    /// telemetry, which is dropped and counted when it is not taken.
+    ///
+    /// # Errors
+    /// When the system has no thread left.
+    pub fn spawn(settings: Settings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
+        let Rig { camera, lens, reconstructor, registry, clock } = rig;
+        let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period);
+        let source = Source::start(camera)?;
+        let (telemetry, telemetry_out) = mpsc::channel(settings.telemetry_capacity.max(1));
+        let (commands_in, commands) = mpsc::unbounded_channel();
+        let frames = Arc::new(LatestSlot::default());
+        let stop = Arc::new(AtomicBool::new(false));
+        let worker = Worker::new(stepper, source, clock, telemetry, frames.clone());
+        let handle = ControlHandle { commands: commands_in, status: worker.status.subscribe(), frames };
+        let stopping = stop.clone();
+        let thread = thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &stopping))?;
+        Ok((Self { stop, thread: Some(thread) }, handle, telemetry_out))
+    }
+
+    /// Ends the loop and its camera, and waits for both; for a camera that hangs, a second at most.
+    pub fn stop(mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the control loop ended by a panic");
+        }
+    }
+}
+
+impl Drop for ControlLoop {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// What the loop's thread holds.
+struct Worker {
+    stepper: Stepper,
+    source: Source,
+    clock: Arc<dyn Clock>,
+    telemetry: mpsc::Sender<StepRecord>,
+    frames: Arc<LatestSlot<ControlledFrame>>,
+    status: watch::Sender<Arc<ControlStatus>>,
+    published_at: Moment,
+    last_frame_at: Moment,
+    /// Why frames lead to nothing: none come, or they hold no patch.
+    camera_fault: Option<HoldReason>,
+    window: LatencyWindow,
+    steps: u64,
+    telemetry_dropped: u64,
+}
+
+impl Worker {
+    fn new(
+        stepper: Stepper,
+        source: Source,
+        clock: Arc<dyn Clock>,
+        telemetry: mpsc::Sender<StepRecord>,
+        frames: Arc<LatestSlot<ControlledFrame>>,
+    ) -> Self {
+        let now = clock.now();
+        let first = ControlStatus {
+            camera: source.health(),
+            lens: stepper.lens_health(),
+            policy: None,
+            focal_power: stepper.focal_power(),
+            held: None,
+            message: None,
+            steps_per_second: 0.0,
+            steps: 0,
+            telemetry_dropped: 0,
+            latency_p50_micros: 0,
+            latency_p99_micros: 0,
+        };
+        Self {
+            stepper,
+            source,
+            clock,
+            telemetry,
+            frames,
+            status: watch::Sender::new(Arc::new(first)),
+            published_at: now,
+            last_frame_at: now,
+            camera_fault: None,
+            window: LatencyWindow::default(),
+            steps: 0,
+            telemetry_dropped: 0,
+        }
+    }
+
+    fn run(mut self, mut commands: mpsc::UnboundedReceiver<Command>, stop: &AtomicBool) {
+        super::priority::raise();
+        while !stop.load(Ordering::Relaxed) {
+            let frame = self.source.frames.take(TICK);
+            while let Ok(command) = commands.try_recv() {
+                self.stepper.obey(command);
+            }
+            // The last line of defence: whatever a frame brings to light, the next one gets its turn.
+            if let Err(panic) = guarded(|| self.turn(frame)) {
+                tracing::error!(panic, "a step of the control loop failed");
+            }
+        }
+        self.frames.close();
+        if !self.source.stop(FAREWELL) {
+            tracing::warn!("the camera hangs; its thread is left behind");
+        }
+    }
+
+    fn turn(&mut self, frame: Option<Frame>) {
+        match frame {
+            Some(frame) => self.step(frame),
+            None => self.wait_on(),
+        }
+        self.publish();
+    }
+
+    fn step(&mut self, frame: Frame) {
+        self.last_frame_at = self.clock.now();
+        match self.stepper.step(frame) {
+            Ok(controlled) => {
+                self.camera_fault = None;
+                self.steps += 1;
+                self.window.add(self.last_frame_at, controlled.record.latency_micros);
+                if self.telemetry.try_send(controlled.record.clone()).is_err() {
+                    self.telemetry_dropped += 1;
+                }
+                self.frames.put(controlled);
+            }
+            Err(reason) => self.camera_fault = Some(reason),
+        }
+    }
+
+    fn wait_on(&mut self) {
+        self.stepper.idle();
+        if self.clock.now().since(self.last_frame_at) >= NO_FRAME {
+            let message = format!("no frame comes from the camera; the lens is held: {}", self.source.health().message);
+            self.camera_fault = Some(HoldReason::new(Hold::CameraFailed, &message));
+        }
+    }
+
+    /// Publishes the status if it is time to, or if something changed that people must see at once.
+    fn publish(&mut self) {
+        let now = self.clock.now();
+        let reason = self.camera_fault.as_ref().or(self.stepper.hold_reason());
+        let (held, message) = (reason.map(|reason| reason.hold), reason.map(|reason| reason.message.clone()));
+        let changed = {
+            let last = self.status.borrow();
+            last.held != held || last.message != message || last.policy.as_ref() != self.stepper.policy()
+        };
+        if !changed && now.since(self.published_at) < STATUS_INTERVAL {
+            return;
+        }
+        self.published_at = now;
+        let figures = self.window.figures(now);
+        let mut camera = self.source.health();
+        camera.working &= held != Some(Hold::CameraFailed);
+        self.status.send_replace(Arc::new(ControlStatus {
+            camera,
+            lens: self.stepper.lens_health(),
+            policy: self.stepper.policy().cloned(),
+            focal_power: self.stepper.focal_power(),
+            held,
+            message,
+            #[allow(clippy::cast_precision_loss, reason = "a few hundred at most")]
+            steps_per_second: figures.steps as f64,
+            steps: self.steps,
+            telemetry_dropped: self.telemetry_dropped,
+            latency_p50_micros: figures.p50,
+            latency_p99_micros: figures.p99,
+        }));
+    }
+}

@@ -1,0 +1,80 @@
+//! Latencies of the last second.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use crate::clock::Moment;
+
+const LENGTH: Duration = Duration::from_secs(1);
+
+/// A window of one second that slides over the loop's steps.
+#[derive(Debug, Default)]
+pub struct LatencyWindow {
+    /// When each step ended, and its latency in microseconds.
+    steps: VecDeque<(Moment, u32)>,
+    sorted: Vec<u32>,
+}
+
+/// What a window holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LatencyFigures {
+    /// Steps in the window.
+    pub steps: usize,
+    /// Median, microseconds; 0 without steps.
+    pub p50: u32,
+    /// 99th percentile, microseconds; 0 without steps.
+    pub p99: u32,
+}
+
+impl LatencyWindow {
+    /// Adds a step that ended at `now`.
+    pub fn add(&mut self, now: Moment, latency_micros: u32) {
+        self.steps.push_back((now, latency_micros));
+        self.forget(now);
+    }
+
+    /// The figures of the second before `now`; percentiles by nearest rank.
+    pub fn figures(&mut self, now: Moment) -> LatencyFigures {
+        self.forget(now);
+        self.sorted.clear();
+        self.sorted.extend(self.steps.iter().map(|&(_, latency)| latency));
+        self.sorted.sort_unstable();
+        let rank = |percent: usize| (self.sorted.len() * percent).div_ceil(100).saturating_sub(1);
+        let percentile = |percent| self.sorted.get(rank(percent)).copied().unwrap_or(0);
+        LatencyFigures { steps: self.sorted.len(), p50: percentile(50), p99: percentile(99) }
+    }
+
+    fn forget(&mut self, now: Moment) {
+        while self.steps.front().is_some_and(|&(at, _)| now.since(at) >= LENGTH) {
+            self.steps.pop_front();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn millis(value: u64) -> Moment {
+        Moment::from_nanos(value * 1_000_000)
+    }
+
+    #[test]
+    fn percentiles_are_by_nearest_rank() {
+        let mut window = LatencyWindow::default();
+        for latency in (1..=200).rev() {
+            window.add(millis(0), latency);
+        }
+        assert_eq!(window.figures(millis(0)), LatencyFigures { steps: 200, p50: 100, p99: 198 });
+    }
+
+    #[test]
+    fn what_is_a_second_old_is_forgotten() {
+        let mut window = LatencyWindow::default();
+        for (at, latency) in [(0, 900), (500, 10), (1400, 20)] {
+            window.add(millis(at), latency);
+        }
+        assert_eq!(window.figures(millis(1400)), LatencyFigures { steps: 2, p50: 10, p99: 20 });
+        assert_eq!(window.figures(millis(3000)), LatencyFigures { steps: 0, p50: 0, p99: 0 });
+    }
+}

@@ -1,0 +1,5 @@
+//! The control loop from outside: with a camera, a lens and policies that fail on request.
+
+mod fakes;
+mod stepper;
+mod threads;

@@ -1,0 +1,307 @@
+//! Single steps, on a clock that the test moves: 20 ms a frame.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use parfocal::autofocus::PolicyName;
+use parfocal::clock::{Clock, ManualClock};
+use parfocal::control::{Command, Drive, Eye, Hold, StepRecord, Stepper};
+use parfocal::ids::SegmentId;
+use parfocal::imaging::ContentArea;
+use parfocal::lens::LensError;
+use proptest::prelude::*;
+use uuid::Uuid;
+
+use super::fakes::{Deed, FakeLens, Script, drive, frame, power, reconstructor, sized_frame};
+
+const FRAME: Duration = Duration::from_millis(20);
+/// Far longer than a sound policy's thread needs to be scheduled on a busy machine.
+const PATIENT: Duration = Duration::from_secs(20);
+/// Frames in a second: the longest a recovery may take.
+const SECOND: usize = 50;
+
+struct Bench {
+    clock: Arc<ManualClock>,
+    lens: FakeLens,
+    script: Script,
+    stepper: Stepper,
+    number: u64,
+}
+
+impl Bench {
+    fn new(patience: Duration) -> Self {
+        Self::with_lens(patience, FakeLens::at(power(0.5)))
+    }
+
+    fn with_lens(patience: Duration, lens: FakeLens) -> Self {
+        let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
+        clock.advance(Duration::from_secs(10));
+        let script = Script::new(Deed::GoTo(0.6));
+        let eye = Eye::new(reconstructor());
+        let stepper = Stepper::new(Box::new(lens.clone()), eye, script.registry(), clock.clone(), patience);
+        Self { clock, lens, script, stepper, number: 0 }
+    }
+
+    /// Takes a step a frame after the last.
+    fn step(&mut self) -> StepRecord {
+        self.step_after(FRAME)
+    }
+
+    fn step_after(&mut self, pace: Duration) -> StepRecord {
+        self.clock.advance(pace);
+        self.number += 1;
+        self.stepper.step(frame(self.number, self.clock.now())).unwrap().record
+    }
+
+    /// Steps until one is not held; how many it took.
+    fn recover(&mut self) -> usize {
+        (1..=SECOND).find(|_| self.step().held.is_none()).expect("recovers within a second of the fault's end")
+    }
+
+    /// Steps until one is not held, the clock moving on by `pace`: for hung threads, which come back in the machine's time
+    /// and not in the test's.
+    fn recover_in_time(&mut self, pace: Duration) {
+        while self.step_after(pace).held.is_some() {
+            std::thread::yield_now();
+        }
+    }
+
+    fn message(&self) -> &str {
+        self.stepper.hold_reason().map_or("", |reason| &reason.message)
+    }
+}
+
+#[test]
+fn a_policy_is_followed() {
+    let mut bench = Bench::new(PATIENT);
+    bench.stepper.obey(drive("scripted", None));
+    let record = bench.step();
+    assert_eq!((record.asked, record.held), (power(0.6), None));
+    assert_eq!(record.policy, Some(PolicyName::new("scripted")));
+    assert_eq!(record.metric, Some(0.6));
+    assert_eq!(bench.lens.position(), power(0.6));
+    bench.script.set(Deed::GoTo(0.65));
+    assert_eq!(bench.step().asked, power(0.65));
+    assert_eq!(bench.script.seen(), [0.5, 0.6], "each frame is attributed to where the lens was");
+}
+
+#[test]
+fn a_panic_holds_and_a_fresh_instance_takes_over() {
+    let mut bench = Bench::new(PATIENT);
+    bench.stepper.obey(drive("scripted", None));
+    bench.step();
+    bench.script.set(Deed::Panic);
+    for _ in 0..SECOND {
+        let record = bench.step();
+        assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyPanicked)));
+    }
+    assert!(bench.message().contains("started afresh"), "{}", bench.message());
+    assert!(bench.script.instances() < 8, "a policy that always panics is tried a few times a second");
+    bench.script.set(Deed::GoTo(0.7));
+    bench.recover();
+    assert_eq!(bench.lens.position(), power(0.7));
+    assert_eq!(bench.message(), "");
+}
+
+#[test]
+fn nonsense_holds_and_a_fresh_instance_takes_over() {
+    let mut bench = Bench::new(PATIENT);
+    bench.stepper.obey(drive("scripted", None));
+    bench.step();
+    for nonsense in [f64::NAN, f64::INFINITY, -0.001, 1.001] {
+        bench.script.set(Deed::GoTo(nonsense));
+        for _ in 0..SECOND {
+            let record = bench.step();
+            assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyNonsense)));
+        }
+        assert!(bench.message().contains("no focal power"), "{}", bench.message());
+        bench.script.set(Deed::GoTo(0.6));
+        bench.recover();
+    }
+}
+
+#[test]
+fn a_hanging_policy_is_given_up_and_replaced() {
+    let mut bench = Bench::new(Duration::from_millis(50));
+    bench.stepper.obey(drive("scripted", None));
+    bench.recover_in_time(Duration::ZERO);
+    bench.script.set(Deed::Hang);
+    for _ in 0..4 * SECOND {
+        let record = bench.step();
+        assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicySlow)));
+    }
+    assert!(bench.message().contains("hangs again and again"), "{}", bench.message());
+    assert!(bench.script.instances() <= 5, "no more threads are left hanging than a few");
+    bench.stepper.obey(drive("fixed", None));
+    bench.recover_in_time(Duration::ZERO);
+    bench.stepper.obey(drive("scripted", None));
+    assert_eq!(bench.step().held, Some(Hold::PolicySlow));
+    bench.script.set(Deed::GoTo(0.7));
+    bench.recover_in_time(FRAME);
+    assert_eq!(bench.lens.position(), power(0.7), "what the hung ones answered too late is not followed");
+}
+
+#[test]
+fn a_policy_that_is_late_once_keeps_its_memory() {
+    let mut bench = Bench::new(Duration::from_millis(50));
+    bench.stepper.obey(drive("scripted", None));
+    bench.recover_in_time(Duration::ZERO);
+    bench.script.set(Deed::Hang);
+    assert_eq!(bench.step().held, Some(Hold::PolicySlow));
+    bench.script.set(Deed::GoTo(0.7));
+    bench.recover_in_time(Duration::ZERO);
+    assert_eq!(bench.script.instances(), 1);
+}
+
+#[test]
+fn a_lens_that_fails_holds_and_comes_back() {
+    for (words, panics) in [("over temperature", false), ("its driver failed", true)] {
+        let fail = |lens: &FakeLens, on: bool| {
+            lens.panic(on && panics);
+            lens.fail((on && !panics).then(|| LensError::Refused("over temperature".into())));
+        };
+        let mut bench = Bench::new(PATIENT);
+        bench.stepper.obey(drive("scripted", None));
+        bench.step();
+        fail(&bench.lens, true);
+        bench.script.set(Deed::GoTo(0.7));
+        for _ in 0..SECOND {
+            let record = bench.step();
+            assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::LensFailed)));
+        }
+        assert!(bench.message().contains(words), "{}", bench.message());
+        assert_eq!(bench.script.seen().len(), 2, "the policy learns nothing from a lens that does not move");
+        fail(&bench.lens, false);
+        bench.recover();
+        assert_eq!(bench.lens.position(), power(0.7));
+    }
+}
+
+#[test]
+fn a_hand_on_the_slider_is_obeyed_without_frames_and_as_soon_as_the_lens_listens() {
+    let mut bench = Bench::new(PATIENT);
+    bench.lens.fail(Some(LensError::Gone("unplugged".into())));
+    bench.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.9)), segment: None });
+    assert_eq!(bench.stepper.hold_reason().unwrap().hold, Hold::LensFailed);
+    bench.lens.fail(None);
+    bench.stepper.idle();
+    assert_eq!((bench.lens.position(), bench.stepper.hold_reason()), (power(0.9), None));
+}
+
+#[test]
+fn a_pause_holds_and_asks_no_policy() {
+    let mut bench = Bench::new(PATIENT);
+    bench.stepper.obey(drive("scripted", None));
+    bench.step();
+    bench.stepper.obey(Command::Drive { drive: Drive::Hold, segment: None });
+    bench.script.set(Deed::GoTo(0.1));
+    let record = bench.step();
+    assert_eq!((record.asked, record.held, record.policy), (power(0.6), Some(Hold::Paused), None));
+}
+
+#[test]
+fn an_unknown_policy_holds_and_says_so() {
+    let mut bench = Bench::new(PATIENT);
+    bench.stepper.obey(drive("no-such", None));
+    assert_eq!(bench.step().held, Some(Hold::PolicyUnavailable));
+    assert!(bench.message().contains("parfocal policies"), "{}", bench.message());
+}
+
+#[test]
+fn no_message_tells_which_policy_runs() {
+    for deed in [Deed::Panic, Deed::Hang, Deed::GoTo(2.0)] {
+        let mut bench = Bench::new(Duration::from_millis(10));
+        bench.script.set(deed);
+        bench.stepper.obey(drive("scripted", None));
+        for _ in 0..SECOND {
+            bench.step();
+            assert!(!bench.message().is_empty() && !bench.message().contains("scripted"));
+        }
+        bench.script.set(Deed::GoTo(0.5));
+    }
+}
+
+#[test]
+fn drive_and_segment_change_together_between_two_frames() {
+    let mut bench = Bench::new(PATIENT);
+    let segments = [1, 2].map(|id| SegmentId(Uuid::from_u128(id)));
+    for (name, segment) in [("scripted", segments[0]), ("fixed", segments[1])] {
+        bench.stepper.obey(drive(name, Some(segment)));
+        for _ in 0..3 {
+            let record = bench.step();
+            assert_eq!((record.policy, record.segment), (Some(PolicyName::new(name)), Some(segment)));
+        }
+    }
+    bench.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.2)), segment: None });
+    let record = bench.step();
+    assert_eq!((record.policy, record.segment, record.asked), (None, None, power(0.2)));
+}
+
+/// The lens takes 17 ms: the first frame after the command was exposed on the way, so the policy is first asked with the
+/// second one, and is told that it was exposed at the start.
+#[test]
+fn a_policy_begins_once_the_lens_is_at_its_start() {
+    let lens = FakeLens::at(power(0.9)).slow(Duration::from_millis(2), Duration::from_millis(15));
+    let mut bench = Bench::with_lens(PATIENT, lens);
+    bench.step();
+    bench.clock.advance(Duration::from_millis(10));
+    let start = Drive::Policy { name: PolicyName::new("scripted"), start: Some(power(0.5)) };
+    bench.stepper.obey(Command::Drive { drive: start, segment: None });
+    assert_eq!(bench.lens.position(), power(0.5), "without waiting for a frame");
+    let (exposed_before, number) = (bench.clock.now(), bench.number + 1);
+    let early = bench.stepper.step(frame(number, exposed_before)).unwrap().record;
+    assert_eq!((early.policy, early.asked, early.held), (None, power(0.5), None));
+    assert_eq!(bench.step().asked, power(0.6));
+    assert_eq!(bench.script.seen(), [0.5]);
+}
+
+#[test]
+fn the_patch_follows_the_content_area() {
+    let mut bench = Bench::new(PATIENT);
+    let mut patch_of = |stepper: &mut Stepper| {
+        bench.number += 1;
+        let seen = stepper.step(sized_frame(bench.number, bench.clock.now(), 100)).unwrap();
+        (seen.patch.x, seen.patch.y)
+    };
+    assert_eq!(patch_of(&mut bench.stepper), (34, 34));
+    let area = ContentArea { x: 40.0, y: 60.0, radius: 30.0, confidence: 1.0 };
+    bench.stepper.obey(Command::ContentArea(Some(area)));
+    assert_eq!(patch_of(&mut bench.stepper), (24, 44));
+}
+
+#[test]
+fn a_picture_without_room_for_a_patch_is_a_fault_of_the_camera() {
+    let mut bench = Bench::new(PATIENT);
+    let Err(reason) = bench.stepper.step(sized_frame(1, bench.clock.now(), 16)) else { panic!("it has no patch") };
+    assert_eq!(reason.hold, Hold::CameraFailed);
+    assert!(reason.message.contains("16x16"), "{}", reason.message);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever the policy answers and whenever the lens fails: the lens is only ever sent to a focal power that the
+    /// policy asked for and that is one, and is otherwise held where it was.
+    #[test]
+    fn the_lens_only_ever_gets_a_focal_power(
+        answers in prop::collection::vec((prop_oneof![any::<f64>(), -0.5..1.5_f64], any::<bool>()), 1..20)
+    ) {
+        let mut bench = Bench::new(PATIENT);
+        bench.stepper.obey(drive("scripted", None));
+        let (mut expected, mut lens_failed) = (0.5, false);
+        for (answer, lens_fails) in answers {
+            bench.script.set(Deed::GoTo(answer));
+            bench.lens.fail(lens_fails.then(|| LensError::Stalled("as the test asked".into())));
+            // Longer than the pause before a fresh instance, so that each answer gets its chance.
+            bench.clock.advance(Duration::from_secs(1));
+            let record = bench.step();
+            if (0.0..=1.0).contains(&answer) && !lens_fails && !lens_failed {
+                expected = answer;
+            }
+            lens_failed = lens_fails;
+            prop_assert_eq!(record.asked.get().to_bits(), expected.to_bits());
+            prop_assert_eq!(bench.lens.position(), record.asked);
+        }
+    }
+}

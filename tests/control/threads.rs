@@ -1,0 +1,152 @@
+//! The whole loop on its threads, with the machine's clock. What is awaited are events; the long limits only end a test
+//! that would otherwise hang.
+
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::Duration;
+
+use parfocal::clock::SystemClock;
+use parfocal::control::{
+    Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, Hold, Rig, Settings, StepRecord,
+};
+use tokio::sync::mpsc;
+
+use super::fakes::{Deed, FakeCamera, FakeLens, Script, Shot, drive, power, reconstructor};
+
+const LIMIT: Duration = Duration::from_secs(20);
+const SIDE: usize = 32;
+
+struct Stage {
+    control: ControlLoop,
+    handle: ControlHandle,
+    telemetry: mpsc::Receiver<StepRecord>,
+    camera: Sender<Shot>,
+    lens: FakeLens,
+    script: Script,
+}
+
+impl Stage {
+    fn new(telemetry_capacity: usize) -> Self {
+        let clock = Arc::new(SystemClock);
+        let (fake_camera, camera) = FakeCamera::new(clock.clone());
+        let (lens, script) = (FakeLens::at(power(0.5)), Script::new(Deed::GoTo(0.6)));
+        let rig = Rig {
+            camera: Box::new(fake_camera),
+            lens: Box::new(lens.clone()),
+            reconstructor: reconstructor(),
+            registry: script.registry(),
+            clock,
+        };
+        let settings = Settings { frame_period: Duration::from_millis(20), telemetry_capacity };
+        let (control, handle, telemetry) = ControlLoop::spawn(settings, rig).unwrap();
+        Self { control, handle, telemetry, camera, lens, script }
+    }
+
+    /// Has the camera deliver a frame, and waits until the loop is done with it.
+    fn shoot(&self) -> ControlledFrame {
+        self.camera.send(Shot::Frame(SIDE)).unwrap();
+        self.handle.frames.take(LIMIT).expect("the frame comes through")
+    }
+
+    /// Shoots until a frame satisfies `wanted`.
+    fn shoot_until(&self, wanted: impl Fn(&StepRecord) -> bool) -> StepRecord {
+        std::iter::repeat_with(|| self.shoot().record).find(wanted).expect("endless")
+    }
+
+    /// Waits until the status satisfies `wanted`.
+    fn status_until(&mut self, wanted: impl FnMut(&Arc<ControlStatus>) -> bool) -> Arc<ControlStatus> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        runtime.block_on(async {
+            let status = self.handle.status.wait_for(wanted);
+            tokio::time::timeout(LIMIT, status).await.expect("the status comes").unwrap().clone()
+        })
+    }
+}
+
+#[test]
+fn frames_commands_and_telemetry_go_through() {
+    let mut stage = Stage::new(16);
+    let first = stage.shoot().record;
+    assert_eq!((first.frame, first.asked, &first.policy), (1, power(0.5), &None));
+    stage.handle.send(drive("scripted", None));
+    let followed = stage.shoot_until(|record| record.policy.is_some() && record.held.is_none());
+    assert_eq!((followed.asked, stage.lens.position()), (power(0.6), power(0.6)));
+    assert_eq!(stage.telemetry.blocking_recv(), Some(first));
+    stage.control.stop();
+    assert!(stage.handle.frames.is_closed(), "whoever waits for frames learns that none will come");
+}
+
+#[test]
+fn telemetry_that_nobody_takes_is_counted_and_stops_nothing() {
+    let mut stage = Stage::new(4);
+    for _ in 0..50 {
+        stage.shoot();
+    }
+    let status = stage.status_until(|status| status.steps == 50);
+    assert_eq!(status.telemetry_dropped, 46);
+    let kept: Vec<u64> = std::iter::from_fn(|| stage.telemetry.try_recv().ok()).map(|record| record.frame).collect();
+    assert_eq!(kept, [1, 2, 3, 4], "the records that are kept are whole and in order");
+}
+
+#[test]
+fn a_hanging_policy_does_not_stop_the_view() {
+    let stage = Stage::new(16);
+    stage.script.set(Deed::Hang);
+    stage.handle.send(drive("scripted", None));
+    stage.shoot_until(|record| record.held == Some(Hold::PolicySlow));
+    for _ in 0..50 {
+        assert_eq!(stage.shoot().record.held, Some(Hold::PolicySlow));
+    }
+    stage.script.set(Deed::GoTo(0.7));
+    stage.shoot_until(|record| record.held.is_none());
+    stage.control.stop();
+}
+
+#[test]
+fn a_hanging_policy_does_not_keep_the_loop_from_ending() {
+    let stage = Stage::new(16);
+    stage.script.set(Deed::Hang);
+    stage.handle.send(drive("scripted", None));
+    stage.shoot_until(|record| record.held == Some(Hold::PolicySlow));
+    stage.control.stop();
+    assert!(stage.handle.frames.is_closed());
+    stage.script.set(Deed::GoTo(0.5));
+}
+
+#[test]
+fn a_camera_that_fails_is_told_and_comes_back() {
+    for failure in [Shot::Failure, Shot::Panic] {
+        let mut stage = Stage::new(16);
+        stage.handle.send(drive("scripted", None));
+        stage.shoot_until(|record| record.asked == power(0.6));
+        stage.camera.send(failure).unwrap();
+        let status = stage.status_until(|status| status.held == Some(Hold::CameraFailed));
+        assert!(!status.camera.working && status.lens.working);
+        assert!(status.message.as_ref().unwrap().contains("no frame"), "{:?}", status.message);
+        assert_eq!(stage.lens.position(), power(0.6));
+        let again = stage.status_until(|_| true);
+        assert_eq!(again.policy, status.policy, "the policy stays in charge");
+        stage.shoot();
+        let status = stage.status_until(|status| status.held.is_none());
+        assert!(status.camera.working && status.message.is_none());
+    }
+}
+
+#[test]
+fn the_hand_works_while_the_camera_is_dead() {
+    let mut stage = Stage::new(16);
+    stage.status_until(|status| status.held == Some(Hold::CameraFailed));
+    stage.handle.send(Command::Drive { drive: Drive::Manual(power(0.25)), segment: None });
+    stage.status_until(|status| status.focal_power == power(0.25));
+    assert_eq!(stage.lens.position(), power(0.25));
+}
+
+#[test]
+fn the_status_tells_pace_and_latency() {
+    let mut stage = Stage::new(16);
+    for _ in 0..10 {
+        stage.shoot();
+    }
+    let status = stage.status_until(|status| status.steps_per_second > 0.0);
+    assert!(status.latency_p50_micros > 0 && status.latency_p50_micros <= status.latency_p99_micros);
+}
