@@ -1,5 +1,7 @@
 //! The Optotune driver against an emulated Lens Driver 4 behind a pseudo-terminal.
 
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -113,11 +115,19 @@ fn the_latest_command_wins_and_none_waits_for_the_port() {
 fn the_modelled_glass_follows_the_true_one() {
     let emulator = emulator(quick());
     let mut lens = open(&emulator, "").unwrap();
-    lens.set(power(0.3)).unwrap();
+    let begun = SystemClock.now();
+    for target in [0.3, 0.9, 0.2] {
+        lens.set(power(target)).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    until("the last command arrives", || last_command(&emulator) == Some(2200));
     let (model, glass) = (lens.optics(), emulator.glass());
-    let near = |moment: Moment| model.focal_power_at(moment).distance(glass.focal_power_at(moment)) < 0.01;
-    until("both come to rest", || near(SystemClock.now()));
-    assert!(lens.measured().unwrap().distance(power(0.3)) < 0.3);
+    let moments = || (0..200).map(|millis| begun + Duration::from_millis(millis));
+    let apart = moments().map(|at| model.focal_power_at(at).distance(glass.focal_power_at(at))).sum::<f64>() / 200.0;
+    // A model that stood still would be 0.3 away on average; a busy machine may delay either side by some milliseconds.
+    assert!(apart < 0.15, "{apart} away on average");
+    let later = SystemClock.now() + Duration::from_secs(1);
+    assert!(model.focal_power_at(later).distance(glass.focal_power_at(later)) < 0.005, "the play of the emulated lens");
 }
 
 #[test]
@@ -255,4 +265,83 @@ fn on_closing_the_lens_is_left_without_current() {
     assert_eq!(emulator.mode_and_current().0, 5);
     drop(lens);
     assert_eq!(emulator.mode_and_current(), (1, 0));
+}
+
+fn command_line(arguments: &[&str]) -> (bool, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("lens").args(arguments).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    (output.status.success(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn the_command_line_speaks_the_contracted_json() {
+    let emulator = emulator(quick());
+    let spec = format!("optotune:{}", emulator.path().display());
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        let (success, output, errors) = command_line(arguments);
+        assert!(success, "{errors}");
+        serde_json::from_str(&output).unwrap()
+    };
+    let info = json(&["info", "--lens", &spec, "--json"]);
+    let expected = serde_json::json!({
+        "driver": "Optotune Lens Driver 4", "firmware": "type A, version 1.8.3.1", "serial": "EMUL0001",
+        "min_dioptre": 5.0, "max_dioptre": 10.0, "temperature_celsius": 25.5, "mode": "focal power", "status": [],
+    });
+    assert_eq!(info, expected);
+    assert_eq!(
+        json(&["set", "0.3", "--lens", &spec, "--json"]),
+        serde_json::json!({"focal_power": 0.3, "dioptre": 6.5})
+    );
+    assert_eq!((last_command(&emulator), emulator.mode_and_current().0), (Some(2300), 5), "it stays where it was set");
+    let sweep = json(&["sweep", "--steps", "3", "--lens", &spec, "--json"]);
+    let asked: Vec<_> = sweep.as_array().unwrap().iter().map(|stop| stop["asked"].as_f64().unwrap()).collect();
+    assert_eq!(asked, [0.0, 0.5, 1.0, 1.0, 0.5, 0.0]);
+    assert_eq!(sweep[1]["read_back_dioptre"], 7.5);
+}
+
+#[test]
+fn the_command_line_fails_with_one_sentence() {
+    let (success, output, errors) = command_line(&["info", "--lens", "optotune:/dev/null", "--json"]);
+    assert!(!success && output.is_empty());
+    assert_eq!(errors, "parfocal: the lens does not answer: /dev/null: this is not a serial port\n");
+}
+
+#[test]
+fn an_emulated_driver_can_be_started_from_the_command_line() {
+    let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"))
+        .args(["lens", "emulate", "--serial", "42"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut name = String::new();
+    BufReader::new(process.stdout.take().unwrap()).read_line(&mut name).unwrap();
+    let name = name.trim_end();
+    assert!(name.ends_with("usb-Optotune_LD_Optotune_LD_00000042-if00"));
+    let spec = format!("optotune:{name}");
+    assert_eq!(lens::open(&spec, Arc::new(SystemClock)).unwrap().info().unwrap().serial, "00000042");
+
+    rustix::process::kill_process(rustix::process::Pid::from_child(&process), rustix::process::Signal::INT).unwrap();
+    assert!(process.wait().unwrap().success());
+    assert!(!std::path::Path::new(name).exists(), "nothing is left behind");
+}
+
+/// Prints the time from `set` to the emulated driver's end of the wire at 50 commands a second, with everything else
+/// that the driver's thread does going on. A measurement, not a test: `cargo test --test lens -- --ignored --nocapture`.
+#[test]
+#[ignore = "measures"]
+fn measure_set_to_wire() {
+    let emulator = emulator(Model::default());
+    let mut lens = open(&emulator, "").unwrap();
+    let mut latencies: Vec<_> = (0..500)
+        .map(|step: u32| {
+            let asked = SystemClock.now();
+            lens.set(power(f64::from(step % 2))).unwrap();
+            std::thread::sleep(Duration::from_millis(20));
+            emulator.commands().last().unwrap().0.since(asked)
+        })
+        .collect();
+    latencies.sort_unstable();
+    println!("set to wire: p50 {:?}, p99 {:?}, worst {:?}", latencies[250], latencies[495], latencies[499]);
 }

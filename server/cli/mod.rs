@@ -1,5 +1,6 @@
 //! The command line: one file a command; wires the rooms together.
 
+mod lens;
 mod policies;
 mod serve;
 
@@ -17,6 +18,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Look at a lens, move it by hand, sweep it, or start one that is not there.
+    Lens(lens::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
     /// Start the server: the live view, the control loop and the trial.
@@ -41,6 +44,7 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Failure> {
     match command {
+        Command::Lens(arguments) => lens::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
     }

@@ -58,6 +58,9 @@ pub trait Lens: Send {
         self.measured().ok_or_else(|| LensError::Gone(self.health().message.to_string()))
     }
 
+    /// Makes the lens stay where it is when this is dropped, instead of being put to rest.
+    fn keep_on_close(&mut self) {}
+
     /// The switch for its faults, if the lens is a simulated one.
     fn faults(&self) -> Option<SimulatedFaults> {
         None

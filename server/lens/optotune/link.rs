@@ -134,7 +134,7 @@ impl<'a> Link<'a> {
         let [port, wake] = watched.map(|one| one.revents());
         if wake.contains(PollFlags::IN) {
             let _ = rustix::io::read(&self.shared.wake, &mut [0; 8]);
-            if self.shared.state().stop {
+            if self.shared.state().ending.is_some() {
                 return Err(LinkError::Stopped);
             }
             self.take_command();

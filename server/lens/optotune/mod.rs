@@ -1,8 +1,8 @@
 //! The Optotune Lens Driver 4/4i over USB serial, as a [`Lens`].
 //!
 //! The caller's side only touches memory; a thread of its own talks to the port. When the lens is dropped, that thread
-//! puts the driver into current mode at 0 mA: the lens relaxes to its resting focal power and does not warm up. A process
-//! that is killed leaves the lens at the last focal power commanded, which is safe too, only warm.
+//! puts the driver into current mode at 0 mA: the lens relaxes to its resting focal power and does not warm up (unless
+//! [`Lens::keep_on_close`] was called). A process that is killed leaves the lens at the last focal power commanded.
 
 pub mod codec;
 mod handshake;
@@ -19,7 +19,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 pub use handshake::Settings;
-use shared::Shared;
+use shared::{Ending, Shared};
 
 use super::spec::Options;
 use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
@@ -41,6 +41,7 @@ pub struct OptotuneLens {
     shared: Arc<Shared>,
     name: Arc<str>,
     thread: Option<JoinHandle<()>>,
+    ending: Ending,
 }
 
 impl OptotuneLens {
@@ -57,7 +58,12 @@ impl OptotuneLens {
             .name("lens".into())
             .spawn(move || worker::run(&theirs, &path_of_thread, &settings))
             .map_err(system)?;
-        let lens = Self { shared, name: format!("Optotune lens at {}", path.display()).into(), thread: Some(thread) };
+        let lens = Self {
+            shared,
+            name: format!("Optotune lens at {}", path.display()).into(),
+            thread: Some(thread),
+            ending: Ending::Relaxed,
+        };
         lens.shared.wait_connected(CONNECT)?;
         Ok(lens)
     }
@@ -81,7 +87,7 @@ impl OptotuneLens {
 
 impl Drop for OptotuneLens {
     fn drop(&mut self) {
-        self.shared.stop();
+        self.shared.end(self.ending);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -128,6 +134,10 @@ impl Lens for OptotuneLens {
 
     fn optics(&self) -> Arc<dyn Optics> {
         self.shared.response.clone()
+    }
+
+    fn keep_on_close(&mut self) {
+        self.ending = Ending::AsItIs;
     }
 
     fn read_back(&mut self) -> Result<FocalPower, LensError> {

@@ -41,12 +41,21 @@ pub struct State {
     pub message: Arc<str>,
     /// Why commands are not carried out though the device is connected.
     pub refusal: Option<Arc<str>>,
-    /// The thread is to end.
-    pub stop: bool,
+    /// The thread is to end, and how to leave the lens.
+    pub ending: Option<Ending>,
     /// Someone waits for fresh readings.
     pub refresh: bool,
     /// Counts the times that all readings were fresh.
     refreshed: u64,
+}
+
+/// How to leave the lens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// Without current.
+    Relaxed,
+    /// Where it is.
+    AsItIs,
 }
 
 /// A connected device.
@@ -80,7 +89,7 @@ impl Shared {
             tried: false,
             message: Arc::default(),
             refusal: None,
-            stop: false,
+            ending: None,
             refresh: false,
             refreshed: 0,
         };
@@ -186,14 +195,14 @@ impl Shared {
     pub fn stop_within(&self, time: Duration) -> bool {
         let (state, _) = self
             .changed
-            .wait_timeout_while(self.state(), time, |state| !state.stop)
+            .wait_timeout_while(self.state(), time, |state| state.ending.is_none())
             .unwrap_or_else(PoisonError::into_inner);
-        state.stop
+        state.ending.is_some()
     }
 
-    /// Tells the thread to end.
-    pub fn stop(&self) {
-        self.state().stop = true;
+    /// Tells the thread to end, and how to leave the lens.
+    pub fn end(&self, ending: Ending) {
+        self.state().ending = Some(ending);
         self.changed.notify_all();
         self.wake();
     }

@@ -8,7 +8,7 @@ use super::codec::{Reply, Request, WireError};
 use super::handshake::{self, Settings};
 use super::link::{Link, LinkError, Sent};
 use super::port::Port;
-use super::shared::{Device, Shared};
+use super::shared::{Device, Ending, Shared};
 use crate::clock::Moment;
 use crate::lens::LensError;
 
@@ -228,6 +228,9 @@ impl Session<'_> {
 
     /// Leaves the lens without current: it rests, and warms nobody. Nothing can be done about a device that fails now.
     fn relax(&mut self) {
+        if self.shared.state().ending == Some(Ending::AsItIs) {
+            return;
+        }
         let relaxed = self
             .link
             .ask(Request::CurrentMode)

@@ -1,0 +1,132 @@
+//! `parfocal lens`: what a lens is, moving it by hand, sweeping it, and a lens driver that is not there.
+
+mod emulate;
+mod sweep;
+
+use std::io::Write;
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::Failure;
+use crate::clock::SystemClock;
+use crate::lens::{self, FocalPower, Lens, LensInfo};
+
+/// Arguments of `parfocal lens`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Say what the lens is and how it does.
+    Info {
+        #[command(flatten)]
+        which: Which,
+    },
+    /// Go to a focal power and stay there.
+    Set {
+        /// From 0, the least dioptres of the range in use, to 1, the most.
+        #[arg(value_parser = parse_focal_power)]
+        focal_power: FocalPower,
+        #[command(flatten)]
+        which: Which,
+    },
+    /// Step through the range and tabulate what was asked against what the lens reads back.
+    Sweep(sweep::Arguments),
+    /// Start an emulated Optotune Lens Driver 4, print its port and serve it until Ctrl-C.
+    Emulate(emulate::Arguments),
+}
+
+/// Which lens, and how to tell about it.
+#[derive(Debug, clap::Args)]
+struct Which {
+    /// `simulated`, `optotune:auto` or `optotune:/dev/...`; with `?min=5&max=10` to use only those dioptres.
+    #[arg(long, value_name = "SPEC")]
+    lens: String,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Which {
+    fn open(&self) -> Result<Box<dyn Lens>, Failure> {
+        Ok(lens::open(&self.lens, Arc::new(SystemClock))?)
+    }
+}
+
+/// Where a lens stands (part of the contract).
+#[derive(Debug, Serialize)]
+struct Position {
+    focal_power: f64,
+    dioptre: f64,
+}
+
+/// Does what the arguments say.
+///
+/// # Errors
+/// When the lens cannot be used or does not obey.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.action {
+        Action::Info { which } => info(which),
+        Action::Set { focal_power, which } => set(*focal_power, which),
+        Action::Sweep(arguments) => sweep::run(arguments),
+        Action::Emulate(arguments) => emulate::run(arguments),
+    }
+}
+
+fn info(which: &Which) -> Result<(), Failure> {
+    let mut lens = which.open()?;
+    let info = lens.info()?;
+    if which.json {
+        return print(&(serde_json::to_string(&info)? + "\n"));
+    }
+    let temperature = info.temperature_celsius.map_or("unknown".into(), |celsius| format!("{celsius:.1} °C"));
+    let status = if info.status.is_empty() { "all well".into() } else { info.status.join("; ") };
+    print(&format!(
+        "driver       {}\nfirmware     {}\nserial       {}\nrange        {:.2} to {:.2} dpt\ntemperature  {temperature}\n\
+         mode         {}\nstatus       {status}\n",
+        info.driver, info.firmware, info.serial, info.min_dioptre, info.max_dioptre, info.mode
+    ))
+}
+
+fn set(target: FocalPower, which: &Which) -> Result<(), Failure> {
+    let mut lens = which.open()?;
+    lens.keep_on_close();
+    let position = go(lens.as_mut(), target)?;
+    if which.json {
+        return print(&(serde_json::to_string(&position)? + "\n"));
+    }
+    print(&format!("focal power {:.4}, {:.3} dpt\n", position.focal_power, position.dioptre))
+}
+
+/// Sends the lens to `target`, lets it settle, and reads back where it stands.
+fn go(lens: &mut dyn Lens, target: FocalPower) -> Result<Position, Failure> {
+    lens.set(target)?;
+    std::thread::sleep(settled_after(lens));
+    let read_back = lens.read_back()?;
+    Ok(Position { focal_power: read_back.get(), dioptre: dioptre(&lens.info()?, read_back) })
+}
+
+/// Four times the settling time leaves 1/160 000 of a step.
+fn settled_after(lens: &dyn Lens) -> Duration {
+    let dynamics = lens.dynamics();
+    dynamics.delay + dynamics.settling * 4
+}
+
+fn dioptre(info: &LensInfo, power: FocalPower) -> f64 {
+    info.min_dioptre + power.get() * (info.max_dioptre - info.min_dioptre)
+}
+
+fn parse_focal_power(text: &str) -> Result<FocalPower, String> {
+    let value: f64 = text.parse().map_err(|_| "must be a number from 0 to 1".to_owned())?;
+    FocalPower::new(value).map_err(|error| error.to_string())
+}
+
+fn print(text: &str) -> Result<(), Failure> {
+    std::io::stdout().write_all(text.as_bytes())?;
+    Ok(())
+}
