@@ -1,7 +1,14 @@
 //! Cameras: where frames come from. Knows no policy.
 
+mod pace;
 pub mod phantom;
+mod pool;
+mod spec;
 pub mod walk;
+
+pub use pace::Pace;
+pub use pool::MosaicPool;
+pub use spec::{CameraSettings, open};
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -7,7 +7,7 @@ use std::f32::consts::{PI, TAU};
 use multiversion::multiversion;
 use rand::{Rng, RngExt};
 
-use super::field::{Field, knots};
+use super::field::{Field, Spline, knots};
 use crate::camera::walk::standard_normal;
 
 /// Texels between two knots of the fields that are made coarse.
@@ -37,21 +37,25 @@ pub(super) struct Folding {
 impl Cortex {
     /// A cortex of `side` texels square.
     pub(super) fn fold(side: usize, folding: Folding, rng: &mut impl Rng) -> Self {
-        let waves = folds(side, folding, rng).upsampled(side, CELL);
-        let depth = Field::noise(side, 64, rng);
-        let fissure = fissure(side, rng).upsampled(side, CELL);
-        let opening = opening(side, rng).upsampled(side, CELL);
+        let waves = Spline::new(&folds(side, folding, rng), side, CELL).field();
+        let depth = Spline::noise(side, 64, rng);
+        let fissure = Spline::new(&fissure(side, rng), side, CELL);
+        let opening = Spline::new(&opening(side, rng), side, CELL);
+        let mut lines = [(); 3].map(|()| vec![0.0; side]);
         let blank = || Field::filled(side, 0.0);
         let mut cortex = Self { height: blank(), open: blank(), rim: blank(), crown: blank() };
         for y in 0..side {
+            for (spline, line) in [&depth, &fissure, &opening].into_iter().zip(&mut lines) {
+                spline.row_into(y, line);
+            }
             let (above, below) = (y.saturating_sub(1), (y + 1).min(side - 1));
             let span = y * side..(y + 1) * side;
             shape_row(
                 &Shape {
                     waves: [waves.row(above), waves.row(y), waves.row(below)],
-                    depth: depth.row(y),
-                    fissure: fissure.row(y),
-                    opening: opening.row(y),
+                    depth: &lines[0],
+                    fissure: &lines[1],
+                    opening: &lines[2],
                     gyrus: folding.gyrus,
                 },
                 [

@@ -35,30 +35,53 @@ impl Field {
         let last = (self.side - 1) as f32;
         self.data[y.clamp(0.0, last) as usize * self.side + x.clamp(0.0, last) as usize]
     }
+}
 
+/// A smooth field given by coarse knots: a cubic B-spline with a knot every `cell` places, made row by row as needed.
+pub(super) struct Spline {
+    side: usize,
+    /// The knots' rows, already at full width.
+    wide: Vec<f32>,
+    /// Weights of the four nearest knots, by place within a cell.
+    weights: Vec<[f32; 4]>,
+}
+
+impl Spline {
     /// Smooth noise of mean 0 and standard deviation about 1, whose blobs are about `cell` wide.
     pub(super) fn noise(side: usize, cell: usize, rng: &mut impl Rng) -> Self {
-        let knots = knots(side, cell);
-        let coarse = (0..knots * knots).map(|_| (rng.random::<f32>() * 2.0 - 1.0) / AFTER_SPLINE).collect::<Vec<_>>();
-        Self { side: knots, data: coarse }.upsampled(side, cell)
+        let count = knots(side, cell).pow(2);
+        let data = (0..count).map(|_| (rng.random::<f32>() * 2.0 - 1.0) / AFTER_SPLINE).collect();
+        Self::new(&Field { side: knots(side, cell), data }, side, cell)
     }
 
-    /// This coarse field of [`knots`]`(side, cell)` knots a side as a cubic B-spline with a knot every `cell` places.
-    pub(super) fn upsampled(&self, side: usize, cell: usize) -> Self {
-        debug_assert_eq!(self.side, knots(side, cell));
+    /// The spline over `side` places through a field of [`knots`]`(side, cell)` knots a side.
+    pub(super) fn new(coarse: &Field, side: usize, cell: usize) -> Self {
+        debug_assert_eq!(coarse.side, knots(side, cell));
         let weights: Vec<[f32; 4]> = (0..cell).map(|phase| spline(phase as f32 / cell as f32)).collect();
-        let mut wide = vec![0.0; self.side * side];
-        for (coarse, wide) in self.data.chunks_exact(self.side).zip(wide.chunks_exact_mut(side)) {
-            for (x, out) in wide.iter_mut().enumerate() {
-                let taps = &coarse[x / cell..][..4];
-                *out = taps.iter().zip(weights[x % cell]).map(|(tap, weight)| tap * weight).sum();
+        let mut wide = vec![0.0; coarse.side * side];
+        for (knots, wide) in coarse.data.chunks_exact(coarse.side).zip(wide.chunks_exact_mut(side)) {
+            for (taps, wide) in knots.windows(4).zip(wide.chunks_mut(cell)) {
+                for (out, weights) in wide.iter_mut().zip(&weights) {
+                    *out = taps[0] * weights[0] + taps[1] * weights[1] + taps[2] * weights[2] + taps[3] * weights[3];
+                }
             }
         }
-        let mut data = vec![0.0; side * side];
-        for (y, out) in data.chunks_exact_mut(side).enumerate() {
-            blend(out, &wide[(y / cell) * side..], weights[y % cell]);
+        Self { side, wide, weights }
+    }
+
+    /// One row, into `out`.
+    pub(super) fn row_into(&self, y: usize, out: &mut [f32]) {
+        let cell = self.weights.len();
+        blend(out, &self.wide[(y / cell) * self.side..], self.weights[y % cell]);
+    }
+
+    /// All rows.
+    pub(super) fn field(&self) -> Field {
+        let mut field = Field::filled(self.side, 0.0);
+        for (y, row) in field.data.chunks_exact_mut(self.side).enumerate() {
+            self.row_into(y, row);
         }
-        Self { side, data }
+        field
     }
 }
 
@@ -101,7 +124,7 @@ mod tests {
     fn a_spline_keeps_straight_lines_straight() {
         let (side, cell) = (40, 8);
         let coarse = Field::from_fn(knots(side, cell), |x, y| x as f32 + 10.0 * y as f32);
-        let fine = coarse.upsampled(side, cell);
+        let fine = Spline::new(&coarse, side, cell).field();
         for y in 0..side {
             for x in 0..side {
                 let expected = (x as f32 / 8.0 + 1.0) + 10.0 * (y as f32 / 8.0 + 1.0);
@@ -112,7 +135,7 @@ mod tests {
 
     #[test]
     fn noise_is_centred_and_of_unit_spread() {
-        let noise = Field::noise(512, 4, &mut ChaCha8Rng::seed_from_u64(5));
+        let noise = Spline::noise(512, 4, &mut ChaCha8Rng::seed_from_u64(5)).field();
         let count = noise.data.len() as f32;
         let mean = noise.data.iter().sum::<f32>() / count;
         let variance = noise.data.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / count;

@@ -1,10 +1,136 @@
-//! The brain phantom: a generated brain surface seen by a hand-held camera.
+//! The brain phantom: a generated brain surface seen by a hand-held hyperspectral camera, for work without a device.
 
 mod cortex;
+mod defocus;
 mod field;
+mod hand;
+mod live;
+mod mosaic;
 mod scene;
 mod sensor;
 pub mod spectra;
 mod vessels;
+mod view;
 
+pub use hand::{Hand, Pose};
+pub use live::PhantomCamera;
 pub use scene::{SIDE, Scene};
+
+use crate::imaging::{CELL, Calibration, ContentArea, PATCH_SIDE};
+use crate::lens::FocalPower;
+use defocus::Stack;
+use field::Field;
+use mosaic::Bands;
+use sensor::{AutoExposure, Sensor};
+use view::{Line, Mapping, Optics};
+
+/// Width of the phantom's pictures in samples.
+pub const SENSOR_WIDTH: usize = CELL * view::WIDTH;
+/// Height of the phantom's pictures in samples.
+pub const SENSOR_HEIGHT: usize = CELL * view::HEIGHT;
+
+/// A phantom under its camera. Given the same seed and the same calls, it gives the same samples.
+pub struct Phantom {
+    stack: Stack,
+    relief: Field,
+    optics: Optics,
+    bands: Bands,
+    sensor: Sensor,
+    exposure: AutoExposure,
+    lines: [Line; 3],
+}
+
+impl Phantom {
+    /// The phantom of a seed, under a sensor of the default calibration. Takes about a fifth of a second.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        let scene = Scene::new(seed);
+        Self {
+            stack: Stack::new(scene.texels, SIDE),
+            relief: scene.relief,
+            optics: Optics::new(seed),
+            bands: Bands::new(&Calibration::default()),
+            sensor: Sensor::new(seed, SENSOR_WIDTH, SENSOR_HEIGHT),
+            exposure: AutoExposure::new(),
+            lines: [(); 3].map(|()| view::blank_line()),
+        }
+    }
+
+    /// Where the content area is, in pixels of one band.
+    #[must_use]
+    pub fn content_area(&self) -> ContentArea {
+        self.optics.content_area()
+    }
+
+    /// Takes one exposure: [`SENSOR_WIDTH`] x [`SENSOR_HEIGHT`] 10-bit samples into `samples`, row by row.
+    pub fn expose(&mut self, pose: &Pose, focal_power: FocalPower, samples: &mut [u16]) {
+        let mapping = Mapping::new(&self.optics, pose);
+        let noise = self.sensor.fresh_noise();
+        let mut expected = vec![0.0; SENSOR_WIDTH];
+        view::darken(&mut self.lines[2]);
+        self.look(0, &mapping, focal_power);
+        for (y, rows) in samples.chunks_exact_mut(CELL * SENSOR_WIDTH).enumerate().take(view::HEIGHT) {
+            self.look(y + 1, &mapping, focal_power);
+            let lines = [(y + 2) % 3, y % 3, (y + 1) % 3].map(|line| &self.lines[line]);
+            let (first, last) = self.optics.span(y);
+            let columns = if first <= last { (first, last + 1) } else { (0, 0) };
+            let expected = &mut expected[..CELL * (columns.1 - columns.0)];
+            for (row, out) in rows.chunks_exact_mut(SENSOR_WIDTH).enumerate() {
+                self.bands.expose(expected, lines, row, columns, self.exposure.gain());
+                self.sensor.read_row(out, CELL * y + row, CELL * columns.0, expected, noise[CELL * y + row]);
+            }
+        }
+    }
+
+    /// Auto-exposure: learns from an exposure, for the next.
+    pub fn adjust_exposure(&mut self, samples: &[u16]) {
+        let rows = samples.chunks_exact(SENSOR_WIDTH).enumerate().skip(2).step_by(13);
+        let lit = rows.flat_map(|(y, row)| {
+            let (first, last) = self.optics.span((y / CELL).min(view::HEIGHT - 1));
+            row.iter().take(CELL * (last + 1)).skip(CELL * first).step_by(5).copied()
+        });
+        self.exposure.adjust(lit);
+    }
+
+    /// The focal power at which the patch in the middle of the content area is sharpest: the mean over the patch of
+    /// what would be sharp at each pixel, weighted by the squared contrast that is there to be sharpened.
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "pixels of the patch"
+    )]
+    pub fn optimal(&self, pose: &Pose) -> FocalPower {
+        let mapping = Mapping::new(&self.optics, pose);
+        let area = self.content_area();
+        let corner = [area.x, area.y].map(|centre| centre.round() as usize - PATCH_SIDE / 2);
+        let (mut sum, mut weights) = (0.0_f64, 1e-9);
+        for index in 0..PATCH_SIDE * PATCH_SIDE {
+            let (x, y) = ((corner[0] + index % PATCH_SIDE) as f32, (corner[1] + index / PATCH_SIDE) as f32);
+            let gray = |x: f32, y: f32| {
+                let (u, v) = mapping.place(x, y);
+                let abundances = self.stack.at(u, v, 0.0);
+                abundances.iter().zip(self.bands.gray()).map(|(abundance, weight)| abundance * weight).sum::<f32>()
+            };
+            let (across, down) = (gray(x + 1.0, y) - gray(x - 1.0, y), gray(x, y + 1.0) - gray(x, y - 1.0));
+            let weight = f64::from(across * across + down * down) + 1e-6;
+            let (u, v) = mapping.place(x, y);
+            sum += weight * f64::from(mapping.sharp_at(x, y, view::height_at(&self.relief, u, v)));
+            weights += weight;
+        }
+        FocalPower::nearest(sum / weights)
+    }
+
+    /// Fills the cell row `y` of the ring of three; beyond the sensor there is darkness.
+    #[allow(clippy::cast_possible_truncation, reason = "focal power, in f32")]
+    fn look(&mut self, y: usize, mapping: &Mapping, focal_power: FocalPower) {
+        let line = &mut self.lines[y % 3];
+        if y < view::HEIGHT {
+            let surface = (&self.stack, &self.relief);
+            view::look(line, y, &self.optics, mapping, surface, focal_power.get() as f32);
+        } else {
+            view::darken(line);
+        }
+    }
+}

@@ -12,19 +12,18 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cortex::{Cortex, Folding};
-use super::field::Field;
-use super::spectra::{ARTERIAL, ENDMEMBERS, LAMP, PALE, VENOUS, endmembers_in_band};
+use super::defocus::Texel;
+use super::field::{Field, Spline};
+use super::mosaic::Bands;
+use super::spectra::{ARTERIAL, ENDMEMBERS, LAMP, PALE, VENOUS};
 use super::vessels::{Density, Vessels};
-use crate::imaging::GrayImage;
+use crate::imaging::{Calibration, GrayImage};
 
 /// Side of the square surface in texels; one texel is about one pixel of a band at the usual working distance.
 pub const SIDE: usize = 1024;
 
 /// Value of a texel's abundance that stands for 1: headroom for mirrored lamps of 8 times white.
 pub(super) const UNIT: f32 = 8191.0;
-
-/// What one texel is made of: abundances of the endmembers, in units of 1/8191, lit by the lamp.
-pub(super) type Texel = [u16; ENDMEMBERS];
 
 /// A brain's surface, sharp and without noise.
 pub struct Scene {
@@ -77,37 +76,18 @@ impl Scene {
     pub fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let character = Character::draw(&mut rng);
-        let cortex = Cortex::fold(SIDE, character.folding, &mut rng);
+        let mut cortex = Cortex::fold(SIDE, character.folding, &mut rng);
         let vessels = Vessels::grow(SIDE, character.density, &cortex.crown, &mut rng);
-        let mut noise = |cell| Field::noise(SIDE, cell, &mut rng);
-        let (tint, patches, coarse, fine, rough) = (noise(90), noise(40), noise(17), noise(4), noise(7));
-        let mut surface = cortex.height.clone();
-        raise(&mut surface.data, &vessels.bulge.data, &rough.data, 0.3 * character.roughness);
-        let mut texels = vec![Texel::default(); SIDE * SIDE];
-        for (y, out) in texels.chunks_exact_mut(SIDE).enumerate() {
-            let rows = Rows {
-                surface: [y.saturating_sub(1), y, (y + 1).min(SIDE - 1)].map(|y| surface.row(y)),
-                open: cortex.open.row(y),
-                rim: cortex.rim.row(y),
-                crown: cortex.crown.row(y),
-                arteries: vessels.arteries.row(y),
-                veins: vessels.veins.row(y),
-                tint: tint.row(y),
-                patches: patches.row(y),
-                coarse: coarse.row(y),
-                fine: fine.row(y),
-            };
-            paint_row(out, &rows, &character);
-        }
         let relief = Field::from_fn(SIDE / 2, |x, y| cortex.height.data[2 * y * SIDE + 2 * x]);
-        Self { texels, relief }
+        roughen(&mut cortex.height, &vessels.bulge, 0.3 * character.roughness, &mut rng);
+        Self { texels: paint(&cortex, &vessels, &character, &mut rng), relief }
     }
 
     /// The middle of the scene as the gray picture a perfect lens would give: `width` x `height` texels (at most
     /// [`SIDE`] each; more is cut), linear in light, on the 0..255 scale, exposed so that 1 pixel in 50 is above 200.
     #[must_use]
     pub fn sharp_gray(&self, width: usize, height: usize) -> GrayImage {
-        let weights = mean_reflectance();
+        let weights = Bands::new(&Calibration::default()).gray();
         let mut picture = self.middle(width, height, |texel| mix(texel, weights));
         let scale = 200.0 / percentile_98(&picture.data).max(1e-6);
         picture.data.iter_mut().for_each(|value| *value = (*value * scale).min(255.0));
@@ -124,12 +104,39 @@ impl Scene {
     }
 }
 
-/// Adds the vessels' bulge and a share of the roughness to the surface.
-#[multiversion(targets("x86_64+avx2+fma"))]
-fn raise(surface: &mut [f32], bulge: &[f32], rough: &[f32], share: f32) {
-    for ((height, bulge), rough) in surface.iter_mut().zip(bulge).zip(rough) {
-        *height += bulge + share * rough;
+/// Adds the vessels' bulge and some fine roughness to the surface.
+fn roughen(surface: &mut Field, bulge: &Field, share: f32, rng: &mut impl Rng) {
+    let roughness = Spline::noise(SIDE, 7, rng);
+    let mut rough = vec![0.0; SIDE];
+    for (y, row) in surface.data.chunks_exact_mut(SIDE).enumerate() {
+        roughness.row_into(y, &mut rough);
+        for ((height, bulge), rough) in row.iter_mut().zip(bulge.row(y)).zip(&rough) {
+            *height += bulge + share * rough;
+        }
     }
+}
+
+/// Paints the whole surface.
+fn paint(cortex: &Cortex, vessels: &Vessels, character: &Character, rng: &mut impl Rng) -> Vec<Texel> {
+    let noises = [90, 40, 17, 4].map(|cell| Spline::noise(SIDE, cell, rng));
+    let mut lines = [(); 4].map(|()| vec![0.0; SIDE]);
+    let mut texels = vec![Texel::default(); SIDE * SIDE];
+    for (y, out) in texels.chunks_exact_mut(SIDE).enumerate() {
+        for (noise, line) in noises.iter().zip(&mut lines) {
+            noise.row_into(y, line);
+        }
+        let rows = Rows {
+            surface: [y.saturating_sub(1), y, (y + 1).min(SIDE - 1)].map(|y| cortex.height.row(y)),
+            open: cortex.open.row(y),
+            rim: cortex.rim.row(y),
+            crown: cortex.crown.row(y),
+            arteries: vessels.arteries.row(y),
+            veins: vessels.veins.row(y),
+            noises: [&lines[0], &lines[1], &lines[2], &lines[3]],
+        };
+        paint_row(out, &rows, character);
+    }
+    texels
 }
 
 /// One row of everything a texel's look follows from.
@@ -140,10 +147,8 @@ struct Rows<'a> {
     crown: &'a [f32],
     arteries: &'a [f32],
     veins: &'a [f32],
-    tint: &'a [f32],
-    patches: &'a [f32],
-    coarse: &'a [f32],
-    fine: &'a [f32],
+    /// From the widest to the finest.
+    noises: [&'a [f32]; 4],
 }
 
 /// Paints a row: blood by place, light by slope, the mirrored lamp where the slope meets it.
@@ -152,11 +157,10 @@ fn paint_row(out: &mut [Texel], rows: &Rows<'_>, character: &Character) {
     let side = out.len();
     let [above, here, below] = rows.surface.map(|row| &row[..side]);
     let (open, rim, crown) = (&rows.open[..side], &rows.rim[..side], &rows.crown[..side]);
-    let (arteries, veins, tint) = (&rows.arteries[..side], &rows.veins[..side], &rows.tint[..side]);
-    let (patches, coarse, fine) = (&rows.patches[..side], &rows.coarse[..side], &rows.fine[..side]);
-    for x in 0..side {
-        let (left, right) = (x.saturating_sub(1), (x + 1).min(side - 1));
-        let slope = [0.5 * (here[right] - here[left]), 0.5 * (below[x] - above[x])];
+    let (arteries, veins) = (&rows.arteries[..side], &rows.veins[..side]);
+    let [tint, patches, coarse, fine] = rows.noises.map(|row| &row[..side]);
+    for x in 1..side - 1 {
+        let slope = [0.5 * (here[x + 1] - here[x - 1]), 0.5 * (below[x] - above[x])];
         let steepness = slope[0] * slope[0] + slope[1] * slope[1];
         let light = open[x] * (0.35 + 0.65 / (1.0 + steepness).sqrt());
         let mottling = character.mottling * (0.035 * coarse[x] + 0.03 * fine[x] + 0.02 * patches[x]);
@@ -176,22 +180,14 @@ fn paint_row(out: &mut [Texel], rows: &Rows<'_>, character: &Character) {
         texel[ARTERIAL] = light * (tissue * blood * saturation + artery * (1.0 - vein));
         texel[VENOUS] = light * (tissue * blood * (1.0 - saturation) + vein);
         texel[LAMP] = wet * (1.7 * sharp * sharp * sharp * sharp + 0.03 * sheen * sheen);
-        out[x] = texel.map(|value| (value * UNIT) as u16);
+        out[x] = texel.map(|value| (value * UNIT) as i32 as u16);
     }
-}
-
-/// Mean reflectance of the endmembers over the sensor's bands.
-fn mean_reflectance() -> [f32; ENDMEMBERS] {
-    let mut sum = [0.0; ENDMEMBERS];
-    for (centre, fwhm) in super::sensor::BANDS {
-        let band = endmembers_in_band(centre, fwhm);
-        sum.iter_mut().zip(band).for_each(|(sum, value)| *sum += value);
-    }
-    sum.map(|sum| (sum / super::sensor::BANDS.len() as f64) as f32)
+    out[0] = out[1];
+    out[side - 1] = out[side - 2];
 }
 
 fn mix(texel: Texel, weights: [f32; ENDMEMBERS]) -> f32 {
-    texel.iter().zip(weights).map(|(&abundance, weight)| f32::from(abundance) / UNIT * weight).sum()
+    texel.iter().zip(weights).map(|(&abundance, weight)| f32::from(abundance) * weight).sum()
 }
 
 /// Value that 1 in 50 exceeds, from every 16th value.

@@ -1,0 +1,75 @@
+//! Mosaics whose memory is used again once nobody holds them: a 4.4 MB allocation a frame costs more than the picture.
+
+use std::sync::Arc;
+
+use super::CameraError;
+use crate::imaging::MosaicFrame;
+
+/// Mosaics remembered; the control loop, the imaging thread and a few viewers hold one each.
+const MOST: usize = 8;
+
+/// Frames of one size, handed out shared and taken back when the last other holder drops them.
+#[derive(Debug)]
+pub struct MosaicPool {
+    width: usize,
+    height: usize,
+    given: Vec<Arc<MosaicFrame>>,
+}
+
+impl MosaicPool {
+    /// A pool of `width` x `height` samples a frame; empty as yet.
+    #[must_use]
+    pub const fn new(width: usize, height: usize) -> Self {
+        Self { width, height, given: Vec::new() }
+    }
+
+    /// Memory for a frame's samples; what is in it is left from before.
+    pub fn blank(&mut self) -> Vec<u16> {
+        let free = self.given.iter().position(|frame| Arc::strong_count(frame) == 1);
+        let freed = free.and_then(|index| Arc::try_unwrap(self.given.swap_remove(index)).ok());
+        freed.map_or_else(|| vec![0; self.width * self.height], MosaicFrame::into_samples)
+    }
+
+    /// Samples as a frame to share, remembered for later use.
+    ///
+    /// # Errors
+    /// When the number of samples is not that of a frame.
+    pub fn frame(&mut self, samples: Vec<u16>) -> Result<Arc<MosaicFrame>, CameraError> {
+        let frame = MosaicFrame::new(self.width, self.height, samples);
+        let frame = Arc::new(frame.map_err(|error| CameraError::Failed(error.to_string()))?);
+        if self.given.len() < MOST {
+            self.given.push(Arc::clone(&frame));
+        }
+        Ok(frame)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_used_again_when_nobody_holds_the_frame() {
+        let mut pool = MosaicPool::new(8, 4);
+        let samples = pool.blank();
+        let memory = samples.as_ptr();
+        let frame = pool.frame(samples).unwrap();
+        let other = pool.blank();
+        assert_ne!(other.as_ptr(), memory, "still held");
+        drop(frame);
+        let again = pool.blank();
+        assert_eq!(again.as_ptr(), memory);
+    }
+
+    #[test]
+    fn a_held_frame_never_changes() {
+        let mut pool = MosaicPool::new(4, 4);
+        let held = pool.frame(vec![7; 16]).unwrap();
+        for _ in 0..20 {
+            let mut samples = pool.blank();
+            samples.fill(9);
+            drop(pool.frame(samples).unwrap());
+        }
+        assert_eq!(held.samples(), [7; 16]);
+    }
+}
