@@ -1,19 +1,83 @@
 //! The conductor: carries a session's events from the state machine through the store to the control loop, in that
 //! order, so that what happened is on disk before anyone sees it.
 
+mod allocate;
+mod course;
+mod library;
+mod remarks;
+mod reports;
+mod views;
+
 use std::sync::Arc;
+use std::time::Duration;
 
-use tokio::sync::watch;
+use rand_chacha::ChaCha12Rng;
+use tokio::sync::{Mutex, Notify, watch};
 
+pub use library::{Library, LibraryError, ProtocolSummary};
+pub use reports::{
+    AnswerLine, SessionDetail, SettingDetail, SettingSpan, Timeline, TimelineComment, TimelinePoint, Unblinding,
+};
+
+use crate::autofocus::Registry;
+use crate::clock::Clock;
+use crate::control::{Command, ControlHandle, Drive};
 use crate::ids::SessionId;
-use crate::trial::view::{Action, NewAnswer, NewComment, OperatorView, Role, SurgeonView};
+use crate::store::{Store, StoreError};
+use crate::trial::event::EventKind;
+use crate::trial::session::{Refusal, decide, decide_restart, decide_time};
+use crate::trial::view::{Action, NewAnswer, NewComment, OperatorView, Phase, Role, SurgeonView};
+use course::Course;
+
+/// Time between two sendings of the time left, and the most that a killed server forgets of a segment's clock.
+const BEAT: Duration = Duration::from_secs(1);
+
+/// What a conductor works with.
+pub struct Parts {
+    /// Where everything is kept.
+    pub store: Store,
+    /// The control loop.
+    pub control: ControlHandle,
+    /// The protocols there are.
+    pub library: Library,
+    /// The policies there are.
+    pub registry: Registry,
+    /// Both clocks.
+    pub clock: Arc<dyn Clock>,
+    /// Where ids and seeds come from. The conductor gives each start of the server a stream of its own, so that a
+    /// fixed seed does not make the same ids twice in one database.
+    pub random: ChaCha12Rng,
+}
 
 /// Runs at most one session at a time. Clone freely.
 #[derive(Clone)]
-pub struct Conductor {}
+pub struct Conductor {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    store: Store,
+    control: ControlHandle,
+    library: Library,
+    registry: Registry,
+    clock: Arc<dyn Clock>,
+    /// Held from the decision to the view, so that what is decided is decided on what is on disk.
+    live: Mutex<Live>,
+    surgeon: watch::Sender<Option<Arc<SurgeonView>>>,
+    operator: watch::Sender<Option<Arc<OperatorView>>>,
+    /// Wakes [`Conductor::run`]: the time of the next change may be another.
+    changed: Notify,
+}
+
+struct Live {
+    course: Option<Course>,
+    random: ChaCha12Rng,
+    /// What the control loop was told last.
+    driving: Option<course::Driving>,
+}
 
 /// Why the conductor did not do something.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ConductError {
     /// There is no such session, segment or question, or it is not the one under way.
     #[error("{0}")]
@@ -32,48 +96,259 @@ pub enum ConductError {
     Storage(String),
 }
 
+impl From<StoreError> for ConductError {
+    fn from(error: StoreError) -> Self {
+        Self::Storage(error.to_string())
+    }
+}
+
+impl From<Refusal> for ConductError {
+    fn from(refusal: Refusal) -> Self {
+        let text = refusal.to_string();
+        match refusal {
+            Refusal::NotAllowed(_) => Self::Forbidden(text),
+            Refusal::UnknownSegment => Self::NotFound(text),
+            Refusal::Conflict(_) => Self::Conflict(text),
+            Refusal::Invalid(_) => Self::Invalid(text),
+        }
+    }
+}
+
 impl Conductor {
+    /// Takes up the session that was under way when the server last ended, paused where it was. Something has to await
+    /// [`Conductor::run`] for time limits and prompts to be kept.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn open(parts: Parts) -> Result<Self, ConductError> {
+        let Parts { store, control, library, registry, clock, mut random } = parts;
+        random.set_stream(u64::try_from(store.run()).unwrap_or_default());
+        let course = match store.reader().session_under_way().await? {
+            Some(session) => Course::load(store.reader(), session).await?,
+            None => None,
+        };
+        let shared = Shared {
+            store,
+            control,
+            library,
+            registry,
+            clock,
+            live: Mutex::new(Live { course, random, driving: None }),
+            surgeon: watch::Sender::new(None),
+            operator: watch::Sender::new(None),
+            changed: Notify::new(),
+        };
+        shared.take_up().await?;
+        Ok(Self { shared: Arc::new(shared) })
+    }
+
+    /// Keeps time limits, prompts and the time left. Never ends; drop it to stop.
+    pub async fn run(self) {
+        loop {
+            let wait = self.tick().await;
+            tokio::select! {
+                () = tokio::time::sleep(wait) => {}
+                () = self.shared.changed.notified() => {}
+            }
+        }
+    }
+
+    /// Does what the time now asks for; says how long until it asks for more.
+    pub async fn tick(&self) -> Duration {
+        let mut live = self.shared.live.lock().await;
+        if let Err(error) = self.shared.keep_time(&mut live).await {
+            tracing::error!("a time limit {error}; it is tried again");
+            return BEAT;
+        }
+        self.shared.publish(&live);
+        let Some(course) = live.course.as_ref().filter(|course| course.state.running()) else {
+            return Duration::from_hours(1);
+        };
+        let now = self.shared.clock.now();
+        let inspected = course.state.inspected(now);
+        if let Some(segment) = course.state.segment()
+            && let Err(error) = self.shared.store.note_clock(course.session(), segment, inspected).await
+        {
+            tracing::warn!("the time inspected could not be noted: {error}");
+        }
+        course.until_next_change(inspected).min(BEAT)
+    }
+
     /// The session under way (or just ended, until dismissed) as the surgeon may see it; changes as it changes.
     #[must_use]
     pub fn surgeon_view(&self) -> watch::Receiver<Option<Arc<SurgeonView>>> {
-        todo!()
+        self.shared.surgeon.subscribe()
     }
 
     /// The same for the operator.
     #[must_use]
     pub fn operator_view(&self) -> watch::Receiver<Option<Arc<OperatorView>>> {
-        todo!()
+        self.shared.operator.subscribe()
     }
 
     /// Makes a session for `participant` by `protocol` and draws its allocation; it waits for [`Action::Start`].
     ///
     /// # Errors
     /// When one is under way already, or participant or protocol is unknown.
-    pub async fn create(&self, _by: Role, _participant: &str, _protocol: &str) -> Result<SessionId, ConductError> {
-        todo!()
+    pub async fn create(&self, by: Role, participant: &str, protocol: &str) -> Result<SessionId, ConductError> {
+        let (participant, protocol) = (participant.to_owned(), protocol.to_owned());
+        self.to_the_end(|shared| async move { shared.create(by, &participant, &protocol).await }).await
     }
 
     /// Moves session `session` on.
     ///
     /// # Errors
     /// When `by` may not, or the session is not where the action fits.
-    pub async fn act(&self, _by: Role, _session: SessionId, _action: Action) -> Result<(), ConductError> {
-        todo!()
+    pub async fn act(&self, by: Role, session: SessionId, action: Action) -> Result<(), ConductError> {
+        self.to_the_end(move |shared| async move { shared.act(by, session, &action).await }).await
+    }
+
+    /// Takes an ended session off the screens.
+    ///
+    /// # Errors
+    /// When it has not ended, or `by` is not the operator.
+    pub async fn dismiss(&self, by: Role, session: SessionId) -> Result<(), ConductError> {
+        operator_only(by)?;
+        let mut live = self.shared.live.lock().await;
+        match live.course.as_ref() {
+            Some(course) if course.session() != session => {}
+            Some(course) if !course.state.ended() => {
+                return Err(ConductError::Conflict("the session is under way; abort it to end it".to_owned()));
+            }
+            _ => live.course = None,
+        }
+        self.shared.publish(&live);
+        Ok(())
     }
 
     /// Keeps a comment: when this returns, it is on disk. A comment for a segment just ended is kept with that segment.
     ///
     /// # Errors
     /// When the session does not exist, the text is empty or too long, or the disk failed.
-    pub async fn comment(&self, _comment: NewComment) -> Result<(), ConductError> {
-        todo!()
+    pub async fn comment(&self, comment: NewComment) -> Result<(), ConductError> {
+        self.to_the_end(|shared| async move { shared.comment(comment).await }).await
     }
 
     /// Keeps an answer: when this returns, it is on disk.
     ///
     /// # Errors
-    /// When the question is not asked now, the value does not fit it, or the disk failed.
-    pub async fn answer(&self, _answer: NewAnswer) -> Result<(), ConductError> {
-        todo!()
+    /// When the question has not been asked yet, the value does not fit it, or the disk failed.
+    pub async fn answer(&self, answer: NewAnswer) -> Result<(), ConductError> {
+        self.to_the_end(|shared| async move { shared.answer(answer).await }).await
     }
+
+    /// Runs `work` to its end even if the caller is dropped meanwhile, as a handler is when its browser goes away: what
+    /// is on disk and what is in memory stay the same.
+    async fn to_the_end<T, F>(&self, work: impl FnOnce(Arc<Shared>) -> F) -> Result<T, ConductError>
+    where
+        T: Send + 'static,
+        F: Future<Output = Result<T, ConductError>> + Send + 'static,
+    {
+        let stopped = |_| Err(ConductError::Storage("the server was stopped meanwhile; try again".to_owned()));
+        tokio::spawn(work(Arc::clone(&self.shared))).await.unwrap_or_else(stopped)
+    }
+}
+
+fn operator_only(by: Role) -> Result<(), ConductError> {
+    if by == Role::Operator { Ok(()) } else { Err(ConductError::Forbidden("only the operator can do this".to_owned())) }
+}
+
+impl Shared {
+    async fn act(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+        let mut live = self.live.lock().await;
+        if live.course.as_ref().is_some_and(|course| course.session() == session) {
+            self.keep_time(&mut live).await?;
+        }
+        if let Some(course) = live.course.as_mut().filter(|course| course.session() == session) {
+            let kinds = decide(&course.state, by, action, self.clock.now())?;
+            self.record(course, by, kinds).await?;
+            self.publish(&live);
+            self.drive(&mut live);
+            self.changed.notify_one();
+            return Ok(());
+        }
+        let mut earlier = self.load(session).await?;
+        let kinds = decide(&earlier.state, by, action, self.clock.now())?;
+        self.record(&mut earlier, by, kinds).await
+    }
+
+    async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
+        let course = Course::load(self.store.reader(), session).await?;
+        course.ok_or_else(|| ConductError::NotFound("there is no such session; reload the page".to_owned()))
+    }
+
+    /// Takes up the session that was under way when the server ended.
+    async fn take_up(&self) -> Result<(), ConductError> {
+        let mut live = self.live.lock().await;
+        if let Some(course) = live.course.as_mut() {
+            let inspected = match course.state.segment() {
+                Some(segment) => self.store.reader().noted_clock(segment).await?,
+                None => Duration::ZERO,
+            };
+            let kinds = decide_restart(&course.state, inspected);
+            self.record(course, Role::System, kinds).await?;
+        }
+        self.publish(&live);
+        self.drive(&mut live);
+        Ok(())
+    }
+
+    async fn keep_time(&self, live: &mut Live) -> Result<(), ConductError> {
+        let Some(course) = live.course.as_mut() else { return Ok(()) };
+        let kinds = decide_time(&course.state, self.clock.now());
+        if kinds.is_empty() {
+            return Ok(());
+        }
+        self.record(course, Role::System, kinds).await?;
+        self.publish(live);
+        self.drive(live);
+        Ok(())
+    }
+
+    /// To disk, then into the state.
+    async fn record(&self, course: &mut Course, by: Role, kinds: Vec<EventKind>) -> Result<(), ConductError> {
+        if kinds.is_empty() {
+            return Ok(());
+        }
+        let events = course.number(by, kinds, self.clock.now(), self.clock.wall());
+        self.store.append_events(course.session(), &events).await?;
+        for event in events {
+            course.apply(event);
+        }
+        Ok(())
+    }
+
+    fn publish(&self, live: &Live) {
+        let now = self.clock.now();
+        let (surgeon, operator) = live.course.as_ref().map(|course| views::both(course, now)).unzip();
+        replace_if_changed(&self.surgeon, surgeon);
+        replace_if_changed(&self.operator, operator);
+    }
+
+    /// Tells the control loop what the session now asks of it, if that changed.
+    fn drive(&self, live: &mut Live) {
+        let wanted = live.course.as_ref().and_then(Course::driving);
+        if wanted == live.driving {
+            return;
+        }
+        let drive = match (&wanted, live.course.as_ref()) {
+            (Some(wanted), _) => Some(wanted.command()),
+            (None, Some(course)) if course.state.phase() == Phase::Ready => None,
+            (None, _) => Some(Command::Drive { drive: Drive::Hold, segment: None }),
+        };
+        live.driving = wanted;
+        if let Some(command) = drive {
+            self.control.send(command);
+        }
+    }
+}
+
+fn replace_if_changed<T: PartialEq>(sender: &watch::Sender<Option<Arc<T>>>, value: Option<T>) {
+    sender.send_if_modified(|shown| {
+        let changed = shown.as_deref() != value.as_ref();
+        if changed {
+            *shown = value.map(Arc::new);
+        }
+        changed
+    });
 }

@@ -107,6 +107,21 @@ pub enum Hold {
     Paused,
 }
 
+impl Hold {
+    /// Its name, as in the database and in exports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PolicyPanicked => "policy-panicked",
+            Self::PolicyNonsense => "policy-nonsense",
+            Self::PolicySlow => "policy-slow",
+            Self::LensFailed => "lens-failed",
+            Self::CameraFailed => "camera-failed",
+            Self::Paused => "paused",
+        }
+    }
+}
+
 /// A frame with everything the loop knew when it was done with it. Goes to the imaging thread.
 #[derive(Debug, Clone)]
 pub struct ControlledFrame {

@@ -1,1 +1,231 @@
 //! Store: everything SQLite; the only place with SQL. Decides nothing.
+//!
+//! One file, `parfocal.db`, in WAL mode. Three ways in: trial data on a connection that syncs every commit to the disk
+//! before it is acknowledged; telemetry on its own, which does not; readers that never write. A lock on the folder keeps a
+//! second server out, while programs that only read come and go.
+
+mod error;
+pub mod export;
+mod reader;
+mod remarks;
+mod rows;
+mod sessions;
+pub mod telemetry;
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use sqlx::migrate::Migrator;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use tokio::sync::{Mutex, MutexGuard};
+
+use crate::clock::Moment;
+
+pub use error::StoreError;
+pub use reader::Reader;
+pub use remarks::Kept;
+pub use rows::*;
+pub use sessions::{NewSession, SetMember, StoredSession};
+
+/// The migrations, each with its way down.
+pub static MIGRATOR: Migrator = sqlx::migrate!("./migrations");
+
+/// Name of the database in the data folder.
+const DATABASE: &str = "parfocal.db";
+/// Name of the lock in the data folder.
+const LOCK: &str = "parfocal.lock";
+
+/// A start of the server.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// When, by the wall clock.
+    pub wall: Timestamp,
+    /// When, by the monotonic clock.
+    pub at: Moment,
+    /// The camera, described.
+    pub camera: String,
+    /// The lens, described.
+    pub lens: String,
+    /// The seed given on the command line.
+    pub seed: Option<u64>,
+}
+
+/// The database of a data folder, held by this process alone. Clone freely.
+#[derive(Clone, Debug)]
+pub struct Store {
+    inner: Arc<Inner>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    trial: SqlitePool,
+    telemetry: SqlitePool,
+    reader: Reader,
+    /// `SQLite` lets one connection write at a time and polls for its turn; this queue is fair and wakes at once.
+    turn: Mutex<()>,
+    run: i64,
+    telemetry_counts: telemetry::Counts,
+    /// Released when dropped, or by the kernel when the process ends in whatever way.
+    _lock: File,
+}
+
+impl Store {
+    /// Opens the data folder `folder`, making it and its database or bringing the database up to date where needed, and
+    /// records the start of `run`.
+    ///
+    /// # Errors
+    /// When another server has the folder, the database is from a newer version, or the disk does not let itself be
+    /// written.
+    pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
+        std::fs::create_dir_all(folder).map_err(|error| StoreError::folder(folder, &error))?;
+        let lock = lock(folder)?;
+        let file = folder.join(DATABASE);
+        let options = SqliteConnectOptions::new()
+            .filename(&file)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5));
+        let trial = connect(options.clone().synchronous(SqliteSynchronous::Full)).await?;
+        MIGRATOR.run(&trial).await?;
+        // Checkpoints are made between batches (see telemetry), so that none falls on a comment's commit.
+        let relaxed = options.synchronous(SqliteSynchronous::Normal).pragma("wal_autocheckpoint", "0");
+        let telemetry = connect(relaxed).await?;
+        let reader = Reader::open_file(&file).await?;
+        let run = begin_run(&trial, run).await?;
+        let inner = Inner {
+            trial,
+            telemetry,
+            reader,
+            turn: Mutex::new(()),
+            run,
+            telemetry_counts: telemetry::Counts::default(),
+            _lock: lock,
+        };
+        Ok(Self { inner: Arc::new(inner) })
+    }
+
+    /// Number of this start of the server, from 1.
+    #[must_use]
+    pub fn run(&self) -> i64 {
+        self.inner.run
+    }
+
+    /// For reading.
+    #[must_use]
+    pub fn reader(&self) -> &Reader {
+        &self.inner.reader
+    }
+
+    /// What became of telemetry since the start.
+    #[must_use]
+    pub fn telemetry_counts(&self) -> &telemetry::Counts {
+        &self.inner.telemetry_counts
+    }
+
+    /// Closes the database; what was acknowledged is on disk with or without it.
+    pub async fn close(&self) {
+        self.inner.reader.close().await;
+        self.inner.telemetry.close().await;
+        self.inner.trial.close().await;
+    }
+
+    async fn turn(&self) -> MutexGuard<'_, ()> {
+        self.inner.turn.lock().await
+    }
+
+    /// Records that a device began or ceased to work.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        sqlx::query(
+            "INSERT INTO device_events (run, wall, monotonic_ns, device, working, message) VALUES (?, ?, ?, ?, ?, ?)",
+        )
+        .bind(self.inner.run)
+        .bind(event.wall.to_string())
+        .bind(nanoseconds(event.at))
+        .bind(&event.device)
+        .bind(event.working)
+        .bind(&event.message)
+        .execute(&self.inner.telemetry)
+        .await?;
+        Ok(())
+    }
+
+    /// Adds participant `code`; one that is there already stays as it is.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")
+            .bind(code)
+            .bind(wall.to_string())
+            .execute(&self.inner.trial)
+            .await?;
+        Ok(())
+    }
+
+    /// Lets no more than `pages` pages be written, as a full disk would: for tests.
+    #[doc(hidden)]
+    pub async fn limit_pages(&self, pages: u32) -> Result<(), StoreError> {
+        let pragma = sqlx::AssertSqlSafe(format!("PRAGMA max_page_count = {pages}"));
+        sqlx::query(pragma).execute(&self.inner.trial).await?;
+        Ok(())
+    }
+}
+
+async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
+    // One connection, kept for good: its settings and prepared statements with it.
+    let pool = SqlitePoolOptions::new().max_connections(1).min_connections(1).idle_timeout(None).max_lifetime(None);
+    Ok(pool.connect_with(options).await?)
+}
+
+async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
+    let done =
+        sqlx::query("INSERT INTO runs (wall, monotonic_ns, version, camera, lens, seed) VALUES (?, ?, ?, ?, ?, ?)")
+            .bind(run.wall.to_string())
+            .bind(nanoseconds(run.at))
+            .bind(env!("CARGO_PKG_VERSION"))
+            .bind(&run.camera)
+            .bind(&run.lens)
+            .bind(run.seed.map(u64::cast_signed))
+            .execute(trial)
+            .await?;
+    Ok(done.last_insert_rowid())
+}
+
+fn lock(folder: &Path) -> Result<File, StoreError> {
+    let path: PathBuf = folder.join(LOCK);
+    let failed = |error: std::io::Error| StoreError::folder(folder, &error);
+    let mut file =
+        OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+    match file.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            let mut holder = String::new();
+            let _ = file.read_to_string(&mut holder);
+            return Err(StoreError::InUse { folder: folder.to_owned(), process: holder.trim().to_owned() });
+        }
+        Err(TryLockError::Error(error)) => return Err(failed(error)),
+    }
+    // Only for the message above; the lock is the kernel's.
+    file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())).map_err(failed)?;
+    Ok(file)
+}
+
+/// A moment as the database keeps it; it holds for the next 292 years of uptime.
+fn nanoseconds(at: Moment) -> i64 {
+    i64::try_from(at.as_nanos()).unwrap_or(i64::MAX)
+}
+
+/// Not below zero in a sound database.
+fn moment(nanoseconds: i64) -> Moment {
+    Moment::from_nanos(u64::try_from(nanoseconds).unwrap_or(0))
+}

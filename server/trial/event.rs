@@ -108,6 +108,15 @@ impl EventKind {
         }
     }
 
+    /// The same without what only the researcher may read: a reason for unblinding may name a policy.
+    #[must_use]
+    pub fn for_the_blinded(&self) -> Self {
+        match self {
+            Self::Unblinded { emergency, .. } => Self::Unblinded { reason: String::new(), emergency: *emergency },
+            other => other.clone(),
+        }
+    }
+
     /// What happened, in words; `setting` tells the number of a segment, from 1.
     #[must_use]
     pub fn in_words(&self, setting: impl Fn(SegmentId) -> usize) -> String {
@@ -128,6 +137,7 @@ impl EventKind {
             Self::ServerRestarted { .. } => "The server restarted; paused where it was".to_owned(),
             Self::Completed => "Session completed".to_owned(),
             Self::Aborted { reason, .. } => format!("Session aborted: {reason}"),
+            Self::Unblinded { reason, .. } if reason.is_empty() => "Unblinded by the researcher".to_owned(),
             Self::Unblinded { reason, emergency: false } => format!("Unblinded: {reason}"),
             Self::Unblinded { reason, emergency: true } => format!("Unblinded while under way: {reason}"),
         }

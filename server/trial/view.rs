@@ -211,6 +211,25 @@ pub enum Role {
     System,
 }
 
+impl Role {
+    /// Its name, as in the database and in exports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Surgeon => "surgeon",
+            Self::Operator => "operator",
+            Self::Researcher => "researcher",
+            Self::System => "system",
+        }
+    }
+
+    /// The role called `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Surgeon, Self::Operator, Self::Researcher, Self::System].into_iter().find(|role| role.name() == name)
+    }
+}
+
 /// The session under way as the operator sees it. No policy either: the operator stands beside the surgeon.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct OperatorView {

@@ -1,0 +1,107 @@
+//! What the surgeon says: comments and answers, kept whatever state the session is in.
+
+use super::course::Course;
+use super::{ConductError, Live, Shared};
+use crate::ids::SessionId;
+use crate::store::{Answer, Comment, Kept, Stamp};
+use crate::trial::answers;
+use crate::trial::view::{NewAnswer, NewComment, Said};
+
+impl Shared {
+    pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {
+        check_said(&new.said)?;
+        let mut live = self.live.lock().await;
+        let earlier = self.earlier(&live, new.session).await?;
+        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(no_session()) };
+        // A segment that is not this session's can only come from a broken page: what was said is kept all the same.
+        let segment = new.segment.filter(|&segment| course.state.plan().position(segment).is_some());
+        let comment = Comment {
+            key: new.key,
+            session: new.session,
+            segment,
+            frame: new.frame,
+            client_millis: new.client_millis,
+            stamp: self.stamp(),
+            said: new.said,
+        };
+        let kept = self.store.keep_comment(&comment).await?;
+        if kept == Kept::New
+            && earlier.is_none()
+            && let Some(course) = live.course.as_mut()
+        {
+            course.heard(comment);
+            self.publish(&live);
+        }
+        unless_taken(kept)
+    }
+
+    pub(super) async fn answer(&self, new: NewAnswer) -> Result<(), ConductError> {
+        let mut live = self.live.lock().await;
+        let earlier = self.earlier(&live, new.session).await?;
+        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(no_session()) };
+        check_answer(course, &new)?;
+        let answer = Answer {
+            key: new.key,
+            session: new.session,
+            segment: new.segment,
+            question: new.question,
+            value: new.value,
+            stamp: self.stamp(),
+        };
+        let kept = self.store.keep_answer(&answer).await?;
+        if kept == Kept::New
+            && earlier.is_none()
+            && let Some(course) = live.course.as_mut()
+        {
+            course.state.keep_answer(answer.segment, &answer.question, answer.value);
+            self.publish(&live);
+        }
+        unless_taken(kept)
+    }
+
+    /// Session `session` from the database, unless it is the one in memory.
+    async fn earlier(&self, live: &Live, session: SessionId) -> Result<Option<Course>, ConductError> {
+        if live.course.as_ref().is_some_and(|course| course.session() == session) {
+            return Ok(None);
+        }
+        self.load(session).await.map(Some)
+    }
+
+    fn stamp(&self) -> Stamp {
+        Stamp { wall: self.clock.wall(), at: self.clock.now() }
+    }
+}
+
+fn check_said(said: &Said) -> Result<(), ConductError> {
+    let (Said::Text(text) | Said::Quick(text)) = said else { return Ok(()) };
+    if text.trim().is_empty() {
+        return Err(ConductError::Invalid("the comment is empty".to_owned()));
+    }
+    answers::check_length(text).map_err(|misfit| ConductError::Invalid(misfit.to_string()))
+}
+
+fn check_answer(course: &Course, new: &NewAnswer) -> Result<(), ConductError> {
+    let known = new.segment.is_none_or(|segment| course.state.plan().position(segment).is_some());
+    let question =
+        course.protocol.question(&new.question, new.segment.is_some()).filter(|_| known).ok_or_else(|| {
+            ConductError::NotFound("this session asks no such question of this setting; reload the page".to_owned())
+        })?;
+    if !course.state.takes_answers(new.segment) {
+        return Err(ConductError::Conflict("this question has not been asked yet".to_owned()));
+    }
+    answers::check(question, &new.value, course.state.plan().segments.len())
+        .map_err(|misfit| ConductError::Invalid(misfit.to_string()))
+}
+
+fn unless_taken(kept: Kept) -> Result<(), ConductError> {
+    match kept {
+        Kept::New | Kept::Before => Ok(()),
+        Kept::KeyTaken => {
+            Err(ConductError::Conflict("its key already stands for something else; send it with a new key".to_owned()))
+        }
+    }
+}
+
+fn no_session() -> ConductError {
+    ConductError::NotFound("there is no such session; reload the page".to_owned())
+}

@@ -1,0 +1,326 @@
+//! What the operator's and researcher's pages read: participants, protocols, sessions, one session in detail.
+
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::course::Course;
+use super::{ConductError, Conductor, ProtocolSummary, operator_only};
+use crate::autofocus::PolicyName;
+use crate::ids::{SegmentId, SessionId};
+use crate::store::{Participant, PathPoint, SessionLine};
+use crate::trial::answers::sus_score;
+use crate::trial::event::{Event, EventKind};
+use crate::trial::participant::ParticipantCode;
+use crate::trial::view::{AnswerValue, LogLine, QuestionKind, Role, Said};
+
+/// A session in detail, for the researcher. Policies are in it once it was unblinded, and not before.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SessionDetail {
+    /// Its line in the list.
+    #[serde(flatten)]
+    pub line: SessionLine,
+    /// Protocol's title for researchers.
+    pub researcher_title: String,
+    /// Algorithm that drew the order.
+    pub algorithm: &'static str,
+    /// SHA-256 that commits to the order since the session was made.
+    pub commitment: String,
+    /// Its settings, in order.
+    pub settings_detail: Vec<SettingDetail>,
+    /// Answers that count, in the order they were given.
+    pub answers: Vec<AnswerLine>,
+    /// Everything that happened, oldest first.
+    pub log: Vec<LogLine>,
+    /// What unblinding told, if it happened.
+    pub unblinding: Option<Unblinding>,
+}
+
+/// A setting of a session.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SettingDetail {
+    /// Number, from 1.
+    pub setting: usize,
+    /// Segment.
+    pub segment: SegmentId,
+    /// When inspection began, by the server's wall clock.
+    #[schema(value_type = Option<String>)]
+    pub started: Option<Timestamp>,
+    /// Time inspected without pauses, seconds, once it is over.
+    pub inspected_seconds: Option<f64>,
+}
+
+/// An answer for reading.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AnswerLine {
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// Setting, from 1; none for a closing question.
+    pub setting: Option<usize>,
+    /// Question's id.
+    pub question: String,
+    /// The question.
+    pub text: String,
+    /// The answer.
+    pub value: AnswerValue,
+    /// The System Usability Scale's score, 0..=100, for its ten items.
+    pub sus_score: Option<f64>,
+    /// Whether it replaced an earlier answer.
+    pub changed: bool,
+}
+
+/// What unblinding told.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Unblinding {
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// Why.
+    pub reason: String,
+    /// Whether the session was still under way.
+    pub emergency: bool,
+    /// The policy of each setting, in order.
+    #[schema(value_type = Vec<String>)]
+    pub policies: Vec<PolicyName>,
+}
+
+/// A session over time. Seconds count from its start by the server's clocks, pauses included.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Timeline {
+    /// When each setting was inspected.
+    pub settings: Vec<SettingSpan>,
+    /// The focal path.
+    pub points: Vec<TimelinePoint>,
+    /// What was said.
+    pub comments: Vec<TimelineComment>,
+}
+
+/// When a setting was inspected.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SettingSpan {
+    /// Setting, from 1.
+    pub setting: usize,
+    /// From, seconds.
+    pub from: f64,
+    /// To, seconds; none while it lasts.
+    pub to: Option<f64>,
+}
+
+/// A point of the focal path.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TimelinePoint {
+    /// Setting, from 1.
+    pub setting: i64,
+    /// Seconds.
+    pub seconds: f64,
+    /// Frame's number.
+    pub frame: i64,
+    /// Focal power asked for, 0..=1.
+    pub asked: f64,
+    /// Focal power that the frame was exposed at, 0..=1.
+    pub measured: Option<f64>,
+    /// The optimum, 0..=1, where a simulation knows it.
+    pub optimal: Option<f64>,
+}
+
+/// A comment on the timeline.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TimelineComment {
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// Seconds.
+    pub seconds: f64,
+    /// Setting, from 1.
+    pub setting: Option<usize>,
+    /// Number of the frame that was on screen.
+    pub frame: Option<u64>,
+    /// What was said.
+    #[serde(flatten)]
+    pub said: Said,
+}
+
+impl Conductor {
+    /// The participants, by code.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn participants(&self) -> Result<Vec<Participant>, ConductError> {
+        Ok(self.shared.store.reader().participants().await?)
+    }
+
+    /// Adds a participant; one that is there already stays.
+    ///
+    /// # Errors
+    /// When `code` is no code, or the disk failed.
+    pub async fn add_participant(&self, by: Role, code: &str) -> Result<(), ConductError> {
+        if by != Role::Researcher {
+            operator_only(by)?;
+        }
+        let code = ParticipantCode::new(code).map_err(|error| ConductError::Invalid(error.to_string()))?;
+        Ok(self.shared.store.add_participant(code.as_str(), self.shared.clock.wall()).await?)
+    }
+
+    /// The protocols, by name.
+    #[must_use]
+    pub fn protocols(&self) -> Vec<ProtocolSummary> {
+        self.shared.library.summaries()
+    }
+
+    /// The sessions, newest first; practice only where `practice` is set.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, ConductError> {
+        Ok(self.shared.store.reader().sessions(practice).await?)
+    }
+
+    /// Session `session` in detail.
+    ///
+    /// # Errors
+    /// When there is none, or the database failed.
+    pub async fn session_detail(&self, session: SessionId) -> Result<SessionDetail, ConductError> {
+        let course = self.shared.load(session).await?;
+        let lines = self.sessions(true).await?;
+        let line = lines.into_iter().find(|line| line.session == session);
+        let line = line.ok_or_else(|| ConductError::NotFound("there is no such session".to_owned()))?;
+        Ok(SessionDetail {
+            line,
+            researcher_title: course.protocol.researcher_title.clone(),
+            algorithm: course.made.algorithm.name(),
+            commitment: course.made.commitment.clone(),
+            settings_detail: settings(&course),
+            answers: self.answer_lines(&course).await?,
+            log: log(&course),
+            unblinding: unblinding(&course),
+        })
+    }
+
+    /// Session `session` over time, its focal path thinned to about `points` a setting.
+    ///
+    /// # Errors
+    /// When there is none, or the database failed.
+    pub async fn timeline(&self, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
+        let course = self.shared.load(session).await?;
+        let reader = self.shared.store.reader();
+        let runs = reader.run_clocks().await?;
+        let events = reader.events(session).await?;
+        let events: Vec<(Timestamp, Event)> =
+            events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();
+        let started = events.iter().find(|(_, event)| event.kind == EventKind::Started);
+        let start = started.map_or(course.made.stamp.wall, |(at, _)| *at);
+        let point = |point: PathPoint| TimelinePoint {
+            seconds: seconds(start, runs.wall(point.run, point.exposed)),
+            setting: point.setting,
+            frame: point.frame,
+            asked: point.asked,
+            measured: point.measured,
+            optimal: point.optimal,
+        };
+        let comments = reader.comments(session).await?;
+        let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
+            at: comment.stamp.wall,
+            seconds: seconds(start, runs.wall(run, comment.stamp.at)),
+            setting: comment.segment.map(|segment| course.setting(segment)),
+            frame: comment.frame,
+            said: comment.said,
+        });
+        Ok(Timeline {
+            settings: spans(&course, &events, start),
+            points: reader.focal_path(session, points).await?.into_iter().map(point).collect(),
+            comments: comments.collect(),
+        })
+    }
+
+    async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
+        let mut latest: BTreeMap<(Option<SegmentId>, String), usize> = BTreeMap::new();
+        let mut lines: Vec<Option<AnswerLine>> = Vec::new();
+        for (_, answer) in self.shared.store.reader().answers(course.session()).await? {
+            let question = course.protocol.question(&answer.question, answer.segment.is_some());
+            let before = latest.insert((answer.segment, answer.question.clone()), lines.len());
+            if let Some(before) = before {
+                lines[before] = None;
+            }
+            lines.push(Some(AnswerLine {
+                at: answer.stamp.wall,
+                setting: answer.segment.map(|segment| course.setting(segment)),
+                text: question.map(|question| question.text.clone()).unwrap_or_default(),
+                sus_score: match (question.map(|question| &question.kind), &answer.value) {
+                    (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
+                    _ => None,
+                },
+                question: answer.question,
+                value: answer.value,
+                changed: before.is_some(),
+            }));
+        }
+        Ok(lines.into_iter().flatten().collect())
+    }
+}
+
+fn settings(course: &Course) -> Vec<SettingDetail> {
+    let detail = |(&segment, setting): (&SegmentId, usize)| {
+        let of_it = || course.events.iter().filter(move |event| event.kind.segment() == Some(segment));
+        SettingDetail {
+            setting,
+            segment,
+            started: of_it()
+                .find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }))
+                .map(|event| event.wall),
+            inspected_seconds: of_it().find_map(|event| match event.kind {
+                EventKind::SegmentFinished { inspected_ms, .. } => {
+                    Some(std::time::Duration::from_millis(inspected_ms).as_secs_f64())
+                }
+                _ => None,
+            }),
+        }
+    };
+    course.state.plan().segments.iter().zip(1..).map(detail).collect()
+}
+
+fn spans(course: &Course, events: &[(Timestamp, Event)], start: Timestamp) -> Vec<SettingSpan> {
+    let mut spans: Vec<SettingSpan> = Vec::new();
+    for (at, event) in events {
+        let at = seconds(start, *at);
+        match event.kind {
+            EventKind::SegmentStarted { segment } => {
+                spans.push(SettingSpan { setting: course.setting(segment), from: at, to: None });
+            }
+            EventKind::SegmentFinished { .. } | EventKind::Aborted { .. } => {
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    open.to = Some(at);
+                }
+            }
+            _ => {}
+        }
+    }
+    spans
+}
+
+fn log(course: &Course) -> Vec<LogLine> {
+    let line = |event: &Event| LogLine {
+        at: event.wall,
+        by: event.by,
+        text: event.kind.in_words(|segment| course.setting(segment)),
+    };
+    course.events.iter().map(line).collect()
+}
+
+fn unblinding(course: &Course) -> Option<Unblinding> {
+    course.events.iter().find_map(|event| match &event.kind {
+        EventKind::Unblinded { reason, emergency } => Some(Unblinding {
+            at: event.wall,
+            reason: reason.clone(),
+            emergency: *emergency,
+            policies: course.made.segments.iter().map(|(_, policy)| policy.clone()).collect(),
+        }),
+        _ => None,
+    })
+}
+
+fn seconds(from: Timestamp, to: Timestamp) -> f64 {
+    to.duration_since(from).as_secs_f64()
+}

@@ -1,0 +1,71 @@
+//! From a session to what each role sees of it. Policies stay behind here.
+
+use std::collections::BTreeMap;
+
+use super::course::{Course, LATEST};
+use crate::clock::Moment;
+use crate::trial::event::Event;
+use crate::trial::session::PauseCause;
+use crate::trial::view::{AnswerValue, LogLine, OperatorView, Phase, SurgeonView};
+
+/// The surgeon's and the operator's view of `course` at `now`.
+pub(super) fn both(course: &Course, now: Moment) -> (SurgeonView, OperatorView) {
+    let surgeon = surgeon(course, now);
+    let operator = OperatorView {
+        surgeon: surgeon.clone(),
+        participant: course.made.participant.clone(),
+        protocol: course.made.protocol.clone(),
+        latest_comments: course.latest_comments.iter().rev().cloned().collect(),
+        log: log(course),
+    };
+    (surgeon, operator)
+}
+
+fn surgeon(course: &Course, now: Moment) -> SurgeonView {
+    let state = &course.state;
+    let inspected = state.inspected(now);
+    let inspecting = state.phase() == Phase::Inspecting;
+    SurgeonView {
+        session: course.session(),
+        phase: state.phase(),
+        paused: state.paused().is_some(),
+        may_resume: state.paused() == Some(PauseCause::Restart),
+        practice: course.made.practice,
+        title: course.protocol.title.clone(),
+        segment: state.segment(),
+        setting: setting(course),
+        settings: state.plan().segments.len(),
+        remaining_seconds: inspecting.then(|| state.plan().limit.saturating_sub(inspected).as_secs_f64()),
+        prompt: course.protocol.prompt_at(inspected).filter(|_| inspecting).map(|prompt| prompt.text.clone()),
+        quick_comments: course.protocol.quick_comments.clone(),
+        questions: state.questions().to_vec(),
+        answers: answers(course),
+        comments: course.comments,
+    }
+}
+
+/// The setting in progress; at the end, the last one.
+fn setting(course: &Course) -> usize {
+    let state = &course.state;
+    match state.phase() {
+        Phase::Ready => 0,
+        Phase::Notice | Phase::Inspecting | Phase::Questions => state.done() + 1,
+        Phase::Closing | Phase::Completed | Phase::Aborted => state.done().min(state.plan().segments.len()),
+    }
+}
+
+fn answers(course: &Course) -> BTreeMap<String, AnswerValue> {
+    let state = &course.state;
+    let kept = |id: &String| state.answer(state.segment(), id).cloned();
+    state.questions().iter().filter_map(|question| Some((question.id.clone(), kept(&question.id)?))).collect()
+}
+
+/// The latest events in words. A reason for unblinding may name a policy, so it is the researcher's alone.
+fn log(course: &Course) -> Vec<LogLine> {
+    let line = |event: &Event| LogLine {
+        at: event.wall,
+        by: event.by,
+        text: event.kind.for_the_blinded().in_words(|segment| course.setting(segment)),
+    };
+    course.events.iter().rev().take(LATEST).map(line).collect()
+}

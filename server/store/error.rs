@@ -1,0 +1,101 @@
+//! What can go wrong with the disk and the database, said so that the reader knows what to do.
+
+use std::path::{Path, PathBuf};
+
+use sqlx::migrate::MigrateError;
+
+/// A failure of the store. Nothing was acknowledged; what was acknowledged before is safe.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// Another server runs on the folder.
+    #[error(
+        "the data folder {} is in use by another parfocal server (process {process}); stop that one, or choose another folder with --data-dir",
+        .folder.display()
+    )]
+    InUse {
+        /// The folder.
+        folder: PathBuf,
+        /// Its process id.
+        process: String,
+    },
+    /// The database was made by a newer version.
+    #[error(
+        "the database was made by a newer version of parfocal (migration {version} is unknown here); install that version or choose another folder with --data-dir; nothing was changed"
+    )]
+    Newer {
+        /// The migration that this version does not have.
+        version: i64,
+    },
+    /// The database was made by an older version, and is open for reading only.
+    #[error(
+        "the database is not of this version of parfocal; start `parfocal serve` on it once to bring it up to date"
+    )]
+    Outdated,
+    /// The folder cannot be used.
+    #[error("the data folder {} cannot be used: {reason}", .folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// Why, and what to do.
+        reason: String,
+    },
+    /// There is no database.
+    #[error("there is no database {}; name the server's data folder with --data-dir", .0.display())]
+    Missing(PathBuf),
+    /// The disk is full.
+    #[error("the disk is full; make room and try again; what was saved before is safe")]
+    Full,
+    /// The disk or file cannot be written.
+    #[error("the database cannot be written: the disk or the file is read-only; make it writable and try again")]
+    ReadOnly,
+    /// The file is no database, or damaged.
+    #[error("the database is damaged ({0}); keep a copy of the data folder before anything else")]
+    Damaged(String),
+    /// Anything else that the database says.
+    #[error("the database failed: {0}")]
+    Database(sqlx::Error),
+}
+
+impl StoreError {
+    pub(super) fn folder(folder: &Path, error: &std::io::Error) -> Self {
+        let reason = match error.kind() {
+            std::io::ErrorKind::PermissionDenied => {
+                "you may not write there; change its permissions or choose another folder with --data-dir".to_owned()
+            }
+            std::io::ErrorKind::ReadOnlyFilesystem => {
+                "its disk is read-only; choose another folder with --data-dir".to_owned()
+            }
+            std::io::ErrorKind::StorageFull => {
+                "its disk is full; make room or choose another with --data-dir".to_owned()
+            }
+            _ => format!("{error}; choose another folder with --data-dir"),
+        };
+        Self::Folder { folder: folder.to_owned(), reason }
+    }
+}
+
+/// `SQLite`'s result codes (sqlite.org/rescode.html); an extended code's lowest byte is its primary code.
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        let code = error
+            .as_database_error()
+            .and_then(sqlx::error::DatabaseError::code)
+            .and_then(|code| code.parse::<u32>().ok());
+        match code.map(|code| code & 0xff) {
+            Some(13) => Self::Full,
+            Some(8) => Self::ReadOnly,
+            Some(11 | 26) => Self::Damaged(error.to_string()),
+            _ => Self::Database(error),
+        }
+    }
+}
+
+impl From<MigrateError> for StoreError {
+    fn from(error: MigrateError) -> Self {
+        match error {
+            MigrateError::VersionMissing(version) => Self::Newer { version },
+            MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _) => error.into(),
+            other => Self::Damaged(other.to_string()),
+        }
+    }
+}

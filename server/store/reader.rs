@@ -1,0 +1,158 @@
+//! Reading: lists and timelines for the pages, also from outside the server while it runs.
+
+use std::path::Path;
+use std::time::Duration;
+
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
+use sqlx::{Row, migrate::Migrate};
+
+use super::sessions::{parsed, stamp};
+use super::{DATABASE, MIGRATOR, Participant, PathPoint, RunClocks, SessionLine, SessionStatus, StoreError, moment};
+use crate::ids::SessionId;
+
+/// A database open for reading. Clone freely.
+#[derive(Clone, Debug)]
+pub struct Reader {
+    pool: SqlitePool,
+}
+
+impl Reader {
+    /// Opens the database of data folder `folder`, whether or not a server has it open.
+    ///
+    /// # Errors
+    /// When there is none, or it is not of this version.
+    pub async fn open(folder: &Path) -> Result<Self, StoreError> {
+        let file = folder.join(DATABASE);
+        if !file.is_file() {
+            return Err(StoreError::Missing(file));
+        }
+        let reader = Self::open_file(&file).await?;
+        reader.check_version().await?;
+        Ok(reader)
+    }
+
+    pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
+        let options = SqliteConnectOptions::new().filename(file).read_only(true).busy_timeout(Duration::from_secs(5));
+        Ok(Self { pool: SqlitePoolOptions::new().max_connections(3).connect_with(options).await? })
+    }
+
+    async fn check_version(&self) -> Result<(), StoreError> {
+        let mut connection = self.pool.acquire().await?;
+        let applied = connection.list_applied_migrations("_sqlx_migrations").await?;
+        if let Some(newer) = applied.iter().find(|migration| !MIGRATOR.version_exists(migration.version)) {
+            return Err(StoreError::Newer { version: newer.version });
+        }
+        let missing = MIGRATOR.iter().any(|ours| !applied.iter().any(|migration| migration.version == ours.version));
+        if missing { Err(StoreError::Outdated) } else { Ok(()) }
+    }
+
+    pub(super) const fn pool(&self) -> &SqlitePool {
+        &self.pool
+    }
+
+    pub(super) async fn close(&self) {
+        self.pool.close().await;
+    }
+
+    /// The participants, by code.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn participants(&self) -> Result<Vec<Participant>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT code, wall, (SELECT count(*) FROM sessions WHERE participant = code AND NOT practice) AS sessions
+             FROM participants ORDER BY code",
+        )
+        .fetch_all(&self.pool)
+        .await?;
+        let participant = |row: &SqliteRow| {
+            let (code, sessions) = (row.try_get("code")?, row.try_get("sessions")?);
+            Ok(Participant { code, added: parsed(row, "wall")?, sessions })
+        };
+        rows.iter().map(participant).collect()
+    }
+
+    /// The sessions, newest first; practice only where `practice` is set.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT session, wall, participant, protocol, practice,
+                 (SELECT kind FROM events AS e WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
+                 (SELECT count(*) FROM events AS e WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
+                 (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
+                 (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments,
+                 (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
+                     AS emergency
+             FROM sessions AS s WHERE practice = 0 OR ?1 ORDER BY s.rowid DESC",
+        )
+        .bind(practice)
+        .fetch_all(&self.pool)
+        .await?;
+        rows.iter().map(line).collect()
+    }
+
+    /// The clocks at each start of the server.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn run_clocks(&self) -> Result<RunClocks, StoreError> {
+        let rows = sqlx::query("SELECT run, wall, monotonic_ns FROM runs").fetch_all(&self.pool).await?;
+        let clocks = rows.iter().map(|row| Ok((row.try_get("run")?, stamp(row)?)));
+        Ok(RunClocks(clocks.collect::<Result<_, StoreError>>()?))
+    }
+
+    /// The focal path of `session`: about `points` steps of each setting, evenly spread over its steps.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn focal_path(&self, session: SessionId, points: u32) -> Result<Vec<PathPoint>, StoreError> {
+        let rows = sqlx::query(
+            "WITH steps AS (
+                 SELECT t.*, g.setting, row_number() OVER w AS step, count(*) OVER (PARTITION BY t.segment) AS steps
+                 FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+                 WHERE g.session = ?1 WINDOW w AS (PARTITION BY t.segment ORDER BY t.number))
+             SELECT * FROM steps WHERE (step - 1) % max(1, steps / ?2) = 0 ORDER BY setting, number",
+        )
+        .bind(session.to_string())
+        .bind(points.max(1))
+        .fetch_all(&self.pool)
+        .await?;
+        rows.iter().map(path_point).collect()
+    }
+}
+
+fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
+    let ended: Option<String> = row.try_get("ended")?;
+    let emergency: Option<bool> = row.try_get("emergency")?;
+    Ok(SessionLine {
+        session: parsed(row, "session")?,
+        created: parsed(row, "wall")?,
+        participant: row.try_get("participant")?,
+        protocol: row.try_get("protocol")?,
+        practice: row.try_get("practice")?,
+        status: match ended.as_deref() {
+            None => SessionStatus::UnderWay,
+            Some("completed") => SessionStatus::Completed,
+            Some(_) => SessionStatus::Aborted,
+        },
+        finished_settings: row.try_get("finished")?,
+        settings: row.try_get("settings")?,
+        comments: row.try_get("comments")?,
+        unblinded: emergency.is_some(),
+        emergency: emergency == Some(true),
+    })
+}
+
+fn path_point(row: &SqliteRow) -> Result<PathPoint, StoreError> {
+    Ok(PathPoint {
+        setting: row.try_get("setting")?,
+        frame: row.try_get("frame")?,
+        run: row.try_get("run")?,
+        exposed: moment(row.try_get("exposed_ns")?),
+        asked: row.try_get("asked")?,
+        measured: row.try_get("measured")?,
+        optimal: row.try_get("optimal")?,
+    })
+}

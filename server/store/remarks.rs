@@ -1,0 +1,169 @@
+//! Comments and answers: kept once each, however often they are sent, and never changed.
+
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+use super::sessions::{parsed, stamp};
+use super::{Answer, Comment, Reader, Store, StoreError, nanoseconds};
+use crate::ids::{IdempotencyKey, SegmentId, SessionId};
+use crate::trial::view::{AnswerValue, Said};
+
+/// What became of something given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kept {
+    /// It is on disk.
+    New,
+    /// It was on disk already, from an earlier time it was sent.
+    Before,
+    /// Its key stands for something else.
+    KeyTaken,
+}
+
+impl Store {
+    /// Keeps a comment. On disk when this returns.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn keep_comment(&self, comment: &Comment) -> Result<Kept, StoreError> {
+        let _turn = self.turn().await;
+        let (kind, text) = said_columns(&comment.said);
+        let done = sqlx::query(
+            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, client_millis, frame, kind, text)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
+        )
+        .bind(comment.key.to_string())
+        .bind(comment.session.to_string())
+        .bind(comment.segment.map(|segment| segment.to_string()))
+        .bind(self.inner.run)
+        .bind(comment.stamp.wall.to_string())
+        .bind(nanoseconds(comment.stamp.at))
+        .bind(comment.client_millis)
+        .bind(comment.frame.map(u64::cast_signed))
+        .bind(kind)
+        .bind(text)
+        .execute(&self.inner.trial)
+        .await?;
+        if done.rows_affected() == 1 {
+            return Ok(Kept::New);
+        }
+        let row = sqlx::query("SELECT session, kind, text FROM comments WHERE key = ?")
+            .bind(comment.key.to_string())
+            .fetch_one(&self.inner.trial)
+            .await?;
+        let same = parsed::<SessionId>(&row, "session")? == comment.session && said(&row)? == comment.said;
+        Ok(if same { Kept::Before } else { Kept::KeyTaken })
+    }
+
+    /// Keeps an answer. On disk when this returns.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn keep_answer(&self, answer: &Answer) -> Result<Kept, StoreError> {
+        let _turn = self.turn().await;
+        let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
+        let done = sqlx::query(
+            "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
+        )
+        .bind(answer.key.to_string())
+        .bind(answer.session.to_string())
+        .bind(answer.segment.map(|segment| segment.to_string()))
+        .bind(&answer.question)
+        .bind(&value)
+        .bind(self.inner.run)
+        .bind(answer.stamp.wall.to_string())
+        .bind(nanoseconds(answer.stamp.at))
+        .execute(&self.inner.trial)
+        .await?;
+        if done.rows_affected() == 1 {
+            return Ok(Kept::New);
+        }
+        let kept: (String, Option<String>, String, String) =
+            sqlx::query_as("SELECT session, segment, question, value FROM answers WHERE key = ?")
+                .bind(answer.key.to_string())
+                .fetch_one(&self.inner.trial)
+                .await?;
+        let segment = answer.segment.map(|segment| segment.to_string());
+        let same = kept == (answer.session.to_string(), segment, answer.question.clone(), value);
+        Ok(if same { Kept::Before } else { Kept::KeyTaken })
+    }
+}
+
+impl Reader {
+    /// The comments of `session`, in the order they were kept, each with the start of the server that kept it.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn comments(&self, session: SessionId) -> Result<Vec<(i64, Comment)>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM comments WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(|row| Ok((row.try_get("run")?, comment(row)?))).collect()
+    }
+
+    /// The answers of `session`, changed ones included, in the order they were kept, each with the start of the server
+    /// that kept it.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn answers(&self, session: SessionId) -> Result<Vec<(i64, Answer)>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM answers WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(|row| Ok((row.try_get("run")?, answer(row)?))).collect()
+    }
+}
+
+fn comment(row: &SqliteRow) -> Result<Comment, StoreError> {
+    let frame: Option<i64> = row.try_get("frame")?;
+    Ok(Comment {
+        key: parsed::<IdempotencyKey>(row, "key")?,
+        session: parsed(row, "session")?,
+        segment: segment(row)?,
+        frame: frame.map(i64::cast_unsigned),
+        client_millis: row.try_get("client_millis")?,
+        stamp: stamp(row)?,
+        said: said(row)?,
+    })
+}
+
+fn answer(row: &SqliteRow) -> Result<Answer, StoreError> {
+    let value: String = row.try_get("value")?;
+    let value: AnswerValue =
+        serde_json::from_str(&value).map_err(|error| StoreError::Damaged(format!("answer {value}: {error}")))?;
+    Ok(Answer {
+        key: parsed::<IdempotencyKey>(row, "key")?,
+        session: parsed(row, "session")?,
+        segment: segment(row)?,
+        question: row.try_get("question")?,
+        value,
+        stamp: stamp(row)?,
+    })
+}
+
+fn segment(row: &SqliteRow) -> Result<Option<SegmentId>, StoreError> {
+    let text: Option<String> = row.try_get("segment")?;
+    text.map(|_| parsed(row, "segment")).transpose()
+}
+
+fn said(row: &SqliteRow) -> Result<Said, StoreError> {
+    let kind: String = row.try_get("kind")?;
+    let text: Option<String> = row.try_get("text")?;
+    match (kind.as_str(), text) {
+        ("text", Some(text)) => Ok(Said::Text(text)),
+        ("quick", Some(text)) => Ok(Said::Quick(text)),
+        ("mark", None) => Ok(Said::Mark),
+        _ => Err(StoreError::Damaged(format!("comment of kind '{kind}'"))),
+    }
+}
+
+/// A comment's kind and text, as in the database and in exports.
+pub(super) fn said_columns(said: &Said) -> (&'static str, Option<&str>) {
+    match said {
+        Said::Text(text) => ("text", Some(text)),
+        Said::Quick(text) => ("quick", Some(text)),
+        Said::Mark => ("mark", None),
+    }
+}

@@ -1,0 +1,156 @@
+//! What is read from and written to the database, as plain records.
+
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::clock::Moment;
+use crate::ids::{IdempotencyKey, SegmentId, SessionId};
+use crate::trial::view::{AnswerValue, Said};
+
+/// When and by which server something was recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stamp {
+    /// By the server's wall clock.
+    pub wall: Timestamp,
+    /// By the monotonic clock.
+    pub at: Moment,
+}
+
+/// A comment kept, or to be kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comment {
+    /// The browser's idempotency key.
+    pub key: IdempotencyKey,
+    /// Its session.
+    pub session: SessionId,
+    /// Its segment, if it belongs to one.
+    pub segment: Option<SegmentId>,
+    /// Number of the frame on screen.
+    pub frame: Option<u64>,
+    /// The browser's clock, milliseconds since 1970.
+    pub client_millis: Option<i64>,
+    /// When it was kept.
+    pub stamp: Stamp,
+    /// What was said.
+    pub said: Said,
+}
+
+/// An answer kept, or to be kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// The browser's idempotency key.
+    pub key: IdempotencyKey,
+    /// Its session.
+    pub session: SessionId,
+    /// Its segment; none for a closing question.
+    pub segment: Option<SegmentId>,
+    /// The question's id.
+    pub question: String,
+    /// The answer.
+    pub value: AnswerValue,
+    /// When it was kept.
+    pub stamp: Stamp,
+}
+
+/// A participant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Participant {
+    /// Code.
+    pub code: String,
+    /// When it was added, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub added: Timestamp,
+    /// Sessions, practice excluded.
+    pub sessions: i64,
+}
+
+/// A session in a list. Says nothing of policies.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct SessionLine {
+    /// Session.
+    pub session: SessionId,
+    /// When it was made, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub created: Timestamp,
+    /// Participant's code.
+    pub participant: String,
+    /// Protocol's name.
+    pub protocol: String,
+    /// Whether it is practice.
+    pub practice: bool,
+    /// How far it came.
+    pub status: SessionStatus,
+    /// Settings inspected to the end.
+    pub finished_settings: i64,
+    /// Settings in all.
+    pub settings: i64,
+    /// Comments kept.
+    pub comments: i64,
+    /// Whether it was told which policies ran.
+    pub unblinded: bool,
+    /// Whether that was while it was under way.
+    pub emergency: bool,
+}
+
+/// How far a session came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SessionStatus {
+    /// Neither completed nor aborted.
+    UnderWay,
+    /// Every answer is in.
+    Completed,
+    /// Ended early.
+    Aborted,
+}
+
+/// A point of a session's focal path. No metric and no timing: those differ by policy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathPoint {
+    /// Setting, from 1.
+    pub setting: i64,
+    /// Frame's number.
+    pub frame: i64,
+    /// Start of the server that it belongs to.
+    pub run: i64,
+    /// End of the exposure.
+    pub exposed: Moment,
+    /// Focal power asked for, 0..=1.
+    pub asked: f64,
+    /// Focal power that the frame was exposed at, 0..=1.
+    pub measured: Option<f64>,
+    /// The optimum, 0..=1, where a simulation knows it.
+    pub optimal: Option<f64>,
+}
+
+/// A device began or ceased to work.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeviceEvent {
+    /// By the server's wall clock.
+    pub wall: Timestamp,
+    /// By the monotonic clock.
+    pub at: Moment,
+    /// `camera` or `lens`.
+    pub device: String,
+    /// Whether it works now.
+    pub working: bool,
+    /// What it says of itself.
+    pub message: String,
+}
+
+/// The clocks at each start of the server: by them a moment of any run has a time of day.
+#[derive(Debug, Clone, Default)]
+pub struct RunClocks(pub(super) BTreeMap<i64, Stamp>);
+
+impl RunClocks {
+    /// The time of day of `at` in run `run`, by the wall clock as it was when that run began; so times within a run keep
+    /// their distances when the wall clock is set.
+    #[must_use]
+    pub fn wall(&self, run: i64, at: Moment) -> Timestamp {
+        let Some(start) = self.0.get(&run) else { return Timestamp::UNIX_EPOCH };
+        start.wall.saturating_add(at.since(start.at)).unwrap_or(start.wall)
+    }
+}

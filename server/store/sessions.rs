@@ -1,0 +1,324 @@
+//! Sessions, their segments and events: made, extended and read back whole.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+use super::{Reader, Stamp, Store, StoreError, moment, nanoseconds};
+use crate::autofocus::PolicyName;
+use crate::ids::{SegmentId, SessionId};
+use crate::trial::allocation::{Algorithm, Seed};
+use crate::trial::event::{Event, EventKind};
+use crate::trial::view::Role;
+
+/// A session to be made.
+#[derive(Debug, Clone)]
+pub struct NewSession {
+    /// Its id.
+    pub session: SessionId,
+    /// When.
+    pub stamp: Stamp,
+    /// Participant's code.
+    pub participant: String,
+    /// Protocol's name.
+    pub protocol: String,
+    /// Protocol's text.
+    pub protocol_toml: String,
+    /// SHA-256 of that text, hexadecimal.
+    pub protocol_sha256: String,
+    /// Whether it is practice.
+    pub practice: bool,
+    /// How its order was drawn.
+    pub algorithm: Algorithm,
+    /// From which seed.
+    pub seed: Seed,
+    /// Index in the set that shares the seed.
+    pub set_index: usize,
+    /// Commitment to all that.
+    pub commitment: String,
+    /// Its segments, in order, each with its policy.
+    pub segments: Vec<(SegmentId, PolicyName)>,
+}
+
+/// A session read back.
+#[derive(Debug, Clone)]
+pub struct StoredSession {
+    /// As it was made.
+    pub made: NewSession,
+    /// The start of the server that made it.
+    pub run: i64,
+    /// Its events so far, each with the start of the server that recorded it.
+    pub events: Vec<(i64, Event)>,
+}
+
+/// A session of a set that shares a seed.
+#[derive(Debug, Clone, Copy)]
+pub struct SetMember {
+    /// The seed.
+    pub seed: Seed,
+    /// Index in the set.
+    pub index: usize,
+    /// Whether it was aborted.
+    pub aborted: bool,
+    /// Whether it was unblinded.
+    pub unblinded: bool,
+}
+
+impl Store {
+    /// Makes a session with its first event, or nothing.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn create_session(&self, new: &NewSession, created: &Event) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        let mut transaction = self.inner.trial.begin().await?;
+        sqlx::query(
+            "INSERT INTO sessions (session, run, wall, monotonic_ns, participant, protocol, protocol_toml,
+             protocol_sha256, practice, algorithm, seed, set_index, commitment)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )
+        .bind(new.session.to_string())
+        .bind(self.inner.run)
+        .bind(new.stamp.wall.to_string())
+        .bind(nanoseconds(new.stamp.at))
+        .bind(&new.participant)
+        .bind(&new.protocol)
+        .bind(&new.protocol_toml)
+        .bind(&new.protocol_sha256)
+        .bind(new.practice)
+        .bind(new.algorithm.name())
+        .bind(new.seed.to_hex())
+        .bind(i64::try_from(new.set_index).unwrap_or(i64::MAX))
+        .bind(&new.commitment)
+        .execute(&mut *transaction)
+        .await?;
+        for ((segment, policy), setting) in new.segments.iter().zip(1_i64..) {
+            sqlx::query("INSERT INTO segments (segment, session, setting, policy) VALUES (?, ?, ?, ?)")
+                .bind(segment.to_string())
+                .bind(new.session.to_string())
+                .bind(setting)
+                .bind(policy.as_str())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        insert_event(&mut transaction, self.inner.run, new.session, created).await?;
+        Ok(transaction.commit().await?)
+    }
+
+    /// Appends `events` to `session`, all or none.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn append_events(&self, session: SessionId, events: &[Event]) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        let mut transaction = self.inner.trial.begin().await?;
+        for event in events {
+            insert_event(&mut transaction, self.inner.run, session, event).await?;
+        }
+        Ok(transaction.commit().await?)
+    }
+
+    /// Notes how far the clock of `segment`, under way in `session`, has come.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn note_clock(
+        &self,
+        session: SessionId,
+        segment: SegmentId,
+        inspected: Duration,
+    ) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        sqlx::query(
+            "INSERT INTO session_clocks (session, segment, inspected_ms) VALUES (?, ?, ?)
+             ON CONFLICT (session) DO UPDATE SET segment = excluded.segment, inspected_ms = excluded.inspected_ms",
+        )
+        .bind(session.to_string())
+        .bind(segment.to_string())
+        .bind(i64::try_from(inspected.as_millis()).unwrap_or(i64::MAX))
+        .execute(&self.inner.telemetry)
+        .await?;
+        Ok(())
+    }
+}
+
+async fn insert_event(
+    connection: &mut SqliteConnection,
+    run: i64,
+    session: SessionId,
+    event: &Event,
+) -> Result<(), StoreError> {
+    let payload = serde_json::to_string(&event.kind).map_err(|error| StoreError::Damaged(error.to_string()))?;
+    sqlx::query(
+        "INSERT INTO events (session, number, run, wall, monotonic_ns, role, kind, payload)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(session.to_string())
+    .bind(event.number)
+    .bind(run)
+    .bind(event.wall.to_string())
+    .bind(nanoseconds(event.at))
+    .bind(event.by.name())
+    .bind(event.kind.name())
+    .bind(payload)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+impl Reader {
+    /// Session `session` whole, or `None` where there is none.
+    ///
+    /// # Errors
+    /// When the database failed or holds what this version cannot read.
+    pub async fn session(&self, session: SessionId) -> Result<Option<StoredSession>, StoreError> {
+        let row = sqlx::query("SELECT * FROM sessions WHERE session = ?")
+            .bind(session.to_string())
+            .fetch_optional(self.pool())
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let made = NewSession {
+            session,
+            stamp: stamp(&row)?,
+            participant: row.try_get("participant")?,
+            protocol: row.try_get("protocol")?,
+            protocol_toml: row.try_get("protocol_toml")?,
+            protocol_sha256: row.try_get("protocol_sha256")?,
+            practice: row.try_get("practice")?,
+            algorithm: algorithm(&row)?,
+            seed: seed(&row)?,
+            set_index: index(&row)?,
+            commitment: row.try_get("commitment")?,
+            segments: self.segments(session).await?,
+        };
+        Ok(Some(StoredSession { made, run: row.try_get("run")?, events: self.events(session).await? }))
+    }
+
+    async fn segments(&self, session: SessionId) -> Result<Vec<(SegmentId, PolicyName)>, StoreError> {
+        let rows = sqlx::query("SELECT segment, policy FROM segments WHERE session = ? ORDER BY setting")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(|row| Ok((parsed(row, "segment")?, PolicyName::new(row.try_get("policy")?)))).collect()
+    }
+
+    /// The events of `session`, each with the start of the server that recorded it.
+    ///
+    /// # Errors
+    /// When the database failed or holds what this version cannot read.
+    pub async fn events(&self, session: SessionId) -> Result<Vec<(i64, Event)>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT run, number, wall, monotonic_ns, role, payload FROM events WHERE session = ? ORDER BY number",
+        )
+        .bind(session.to_string())
+        .fetch_all(self.pool())
+        .await?;
+        rows.iter().map(|row| Ok((row.try_get("run")?, event(row)?))).collect()
+    }
+
+    /// The latest session that is neither completed nor aborted.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn session_under_way(&self) -> Result<Option<SessionId>, StoreError> {
+        let row = sqlx::query(
+            "SELECT session FROM sessions WHERE NOT EXISTS (
+                 SELECT 1 FROM events WHERE events.session = sessions.session AND kind IN ('completed', 'aborted'))
+             ORDER BY rowid DESC LIMIT 1",
+        )
+        .fetch_optional(self.pool())
+        .await?;
+        row.map(|row| parsed(&row, "session")).transpose()
+    }
+
+    /// How far the clock of `segment` had come when it was last noted; zero where it never was.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn noted_clock(&self, segment: SegmentId) -> Result<Duration, StoreError> {
+        let noted: Option<i64> = sqlx::query_scalar("SELECT inspected_ms FROM session_clocks WHERE segment = ?")
+            .bind(segment.to_string())
+            .fetch_optional(self.pool())
+            .await?;
+        Ok(Duration::from_millis(noted.and_then(|noted| u64::try_from(noted).ok()).unwrap_or(0)))
+    }
+
+    /// The sessions that share the seed of the latest session by the protocol with this hash and algorithm.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn latest_set(&self, protocol_sha256: &str, algorithm: Algorithm) -> Result<Vec<SetMember>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT seed, set_index,
+                 EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'aborted') AS aborted,
+                 EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'unblinded') AS unblinded
+             FROM sessions AS s WHERE protocol_sha256 = ?1 AND algorithm = ?2 AND seed = (
+                 SELECT seed FROM sessions WHERE protocol_sha256 = ?1 AND algorithm = ?2 ORDER BY rowid DESC LIMIT 1)",
+        )
+        .bind(protocol_sha256)
+        .bind(algorithm.name())
+        .fetch_all(self.pool())
+        .await?;
+        let member = |row: &SqliteRow| {
+            let (aborted, unblinded) = (row.try_get("aborted")?, row.try_get("unblinded")?);
+            Ok(SetMember { seed: seed(row)?, index: index(row)?, aborted, unblinded })
+        };
+        rows.iter().map(member).collect()
+    }
+
+    /// Whether every session that shares `seed` was unblinded, so that the seed gives nothing away.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn set_unblinded(&self, seed: Seed) -> Result<bool, StoreError> {
+        let blinded: i64 = sqlx::query_scalar(
+            "SELECT count(*) FROM sessions AS s WHERE seed = ? AND NOT EXISTS (
+                 SELECT 1 FROM events WHERE events.session = s.session AND kind = 'unblinded')",
+        )
+        .bind(seed.to_hex())
+        .fetch_one(self.pool())
+        .await?;
+        Ok(blinded == 0)
+    }
+}
+
+fn event(row: &SqliteRow) -> Result<Event, StoreError> {
+    let role: String = row.try_get("role")?;
+    let by = Role::named(&role).ok_or_else(|| StoreError::Damaged(format!("unknown role '{role}'")))?;
+    let payload: String = row.try_get("payload")?;
+    let kind: EventKind =
+        serde_json::from_str(&payload).map_err(|error| StoreError::Damaged(format!("event {payload}: {error}")))?;
+    let Stamp { wall, at } = stamp(row)?;
+    Ok(Event { number: row.try_get("number")?, by, at, wall, kind })
+}
+
+fn algorithm(row: &SqliteRow) -> Result<Algorithm, StoreError> {
+    let name: String = row.try_get("algorithm")?;
+    Algorithm::named(&name).ok_or_else(|| StoreError::Damaged(format!("unknown algorithm '{name}'")))
+}
+
+fn seed(row: &SqliteRow) -> Result<Seed, StoreError> {
+    let text: String = row.try_get("seed")?;
+    Seed::from_hex(&text).ok_or_else(|| StoreError::Damaged("a seed is not 64 hexadecimal digits".to_owned()))
+}
+
+fn index(row: &SqliteRow) -> Result<usize, StoreError> {
+    let index: i64 = row.try_get("set_index")?;
+    usize::try_from(index).map_err(|_| StoreError::Damaged(format!("set index {index}")))
+}
+
+/// The two clocks of a row.
+pub(super) fn stamp(row: &SqliteRow) -> Result<Stamp, StoreError> {
+    Ok(Stamp { wall: parsed::<Timestamp>(row, "wall")?, at: moment(row.try_get("monotonic_ns")?) })
+}
+
+/// Column `column` of `row`, written as text.
+pub(super) fn parsed<T>(row: &SqliteRow, column: &str) -> Result<T, StoreError>
+where
+    T: std::str::FromStr<Err: std::fmt::Display>,
+{
+    let text: String = row.try_get(column)?;
+    text.parse().map_err(|error| StoreError::Damaged(format!("column {column}, '{text}': {error}")))
+}

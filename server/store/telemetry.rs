@@ -1,0 +1,197 @@
+//! Telemetry into SQLite: in batches, on a connection of its own, so that it delays nothing and nothing waits for it.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use sqlx::sqlite::SqliteConnection;
+use tokio::sync::mpsc::Receiver;
+use tokio::time::{Instant, timeout_at};
+
+use super::{Store, StoreError, nanoseconds};
+use crate::autofocus::PolicyName;
+use crate::control::{Hold, StepRecord};
+use crate::ids::SegmentId;
+use crate::lens::FocalPower;
+
+/// A batch is written when it is this old,
+const BATCH_TIME: Duration = Duration::from_millis(250);
+/// or has this many records.
+const BATCH_RECORDS: usize = 256;
+/// Records kept for another try while the disk fails: some three minutes at 50 a second.
+const MOST_WAITING: usize = 9_000;
+/// Batches between two checkpoints: about every 16 s.
+const CHECKPOINT_BATCHES: u32 = 64;
+
+/// What became of telemetry since the start.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Records written.
+    pub written: AtomicU64,
+    /// Batches that could not be written at the first try.
+    pub failed_batches: AtomicU64,
+    /// Records given up, the disk having failed for too long.
+    pub lost: AtomicU64,
+}
+
+/// Writes what comes until the sender is gone. A failing disk is logged, counted and tried again; it never ends this.
+pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
+    let mut writer = Writer::default();
+    let mut batches = 0_u32;
+    let mut open = true;
+    while open {
+        open = writer.collect(&mut receiver).await;
+        writer.flush(&store).await;
+        batches = batches.wrapping_add(1);
+        if batches.is_multiple_of(CHECKPOINT_BATCHES) {
+            checkpoint(&store).await;
+        }
+    }
+}
+
+#[derive(Default)]
+struct Writer {
+    waiting: Vec<StepRecord>,
+    failing: bool,
+    names: Names,
+}
+
+impl Writer {
+    /// Gathers the next batch; `false` once the sender is gone.
+    async fn collect(&mut self, receiver: &mut Receiver<StepRecord>) -> bool {
+        let Some(first) = receiver.recv().await else { return false };
+        self.waiting.push(first);
+        let end = Instant::now() + BATCH_TIME;
+        let enough = self.waiting.len() + BATCH_RECORDS;
+        while self.waiting.len() < enough {
+            let room = enough - self.waiting.len();
+            match timeout_at(end, receiver.recv_many(&mut self.waiting, room)).await {
+                Ok(0) => return false,
+                Ok(_) => {}
+                Err(_) => break,
+            }
+        }
+        true
+    }
+
+    async fn flush(&mut self, store: &Store) {
+        let counts = store.telemetry_counts();
+        match self.write(store).await {
+            Ok(()) => {
+                counts.written.fetch_add(self.waiting.len() as u64, Ordering::Relaxed);
+                self.waiting.clear();
+                if std::mem::take(&mut self.failing) {
+                    tracing::info!("telemetry is being written again");
+                }
+            }
+            Err(error) => {
+                // What was interned in a transaction that was undone means nothing.
+                self.names = Names::default();
+                counts.failed_batches.fetch_add(1, Ordering::Relaxed);
+                if !std::mem::replace(&mut self.failing, true) {
+                    tracing::error!("telemetry cannot be written: {error}; it is kept in memory for a while");
+                }
+                let too_many = self.waiting.len().saturating_sub(MOST_WAITING);
+                self.waiting.drain(..too_many);
+                counts.lost.fetch_add(too_many as u64, Ordering::Relaxed);
+            }
+        }
+    }
+
+    async fn write(&mut self, store: &Store) -> Result<(), StoreError> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        let _turn = store.turn().await;
+        let mut transaction = store.inner.telemetry.begin().await?;
+        for record in &self.waiting {
+            let segment = self.names.segment(&mut transaction, record.segment).await?;
+            let policy = self.names.policy(&mut transaction, record.policy.as_ref()).await?;
+            insert(&mut transaction, store.run(), record, segment, policy).await?;
+        }
+        Ok(transaction.commit().await?)
+    }
+}
+
+async fn insert(
+    connection: &mut SqliteConnection,
+    run: i64,
+    record: &StepRecord,
+    segment: Option<i64>,
+    policy: Option<i64>,
+) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO telemetry (run, frame, exposed_ns, segment, policy, asked, measured, metric, policy_micros,
+         latency_micros, held, optimal) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(run)
+    .bind(record.frame.cast_signed())
+    .bind(nanoseconds(record.exposed_at))
+    .bind(segment)
+    .bind(policy)
+    .bind(record.asked.get())
+    .bind(record.measured.map(FocalPower::get))
+    // SQLite has no "not a number".
+    .bind(record.metric.filter(|metric| metric.is_finite()))
+    .bind(record.policy_micros)
+    .bind(record.latency_micros)
+    .bind(record.held.map(Hold::name))
+    .bind(record.optimal.map(FocalPower::get))
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Numbers that stand for segments and policies in the rows.
+#[derive(Default)]
+struct Names {
+    segments: HashMap<SegmentId, Option<i64>>,
+    policies: HashMap<PolicyName, i64>,
+}
+
+impl Names {
+    async fn segment(
+        &mut self,
+        connection: &mut SqliteConnection,
+        segment: Option<SegmentId>,
+    ) -> Result<Option<i64>, StoreError> {
+        let Some(segment) = segment else { return Ok(None) };
+        if let Some(&number) = self.segments.get(&segment) {
+            return Ok(number);
+        }
+        let number = sqlx::query_scalar("SELECT number FROM segments WHERE segment = ?")
+            .bind(segment.to_string())
+            .fetch_optional(connection)
+            .await?;
+        self.segments.insert(segment, number);
+        Ok(number)
+    }
+
+    async fn policy(
+        &mut self,
+        connection: &mut SqliteConnection,
+        policy: Option<&PolicyName>,
+    ) -> Result<Option<i64>, StoreError> {
+        let Some(policy) = policy else { return Ok(None) };
+        if let Some(&number) = self.policies.get(policy) {
+            return Ok(Some(number));
+        }
+        // The update changes nothing; it makes the row come back when it was there before.
+        let number = sqlx::query_scalar(
+            "INSERT INTO policies (name) VALUES (?) ON CONFLICT (name) DO UPDATE SET name = name RETURNING number",
+        )
+        .bind(policy.as_str())
+        .fetch_one(connection)
+        .await?;
+        self.policies.insert(policy.clone(), number);
+        Ok(Some(number))
+    }
+}
+
+/// Moves what was written from the log into the database, as far as no reader stands in the way. Not in a turn: writers
+/// go on meanwhile.
+async fn checkpoint(store: &Store) {
+    if let Err(error) = sqlx::query("PRAGMA wal_checkpoint(PASSIVE)").execute(&store.inner.telemetry).await {
+        tracing::warn!("the database's log could not be folded in: {error}; it is tried again");
+    }
+}
