@@ -1,19 +1,25 @@
 //! `parfocal serve`: wires camera, lens, loop, trial and pages together and serves them.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
+use getrandom::SysRng;
+use rand::SeedableRng;
+use rand_chacha::ChaCha12Rng;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
 use super::Failure;
+use crate::autofocus::Registry;
 use crate::clock::{Clock, SystemClock};
+use crate::conductor::{Conductor, Library, Parts};
 use crate::http::keys::{Keys, ROLES};
 use crate::http::{self, App};
 use crate::live;
+use crate::store::{self, Store};
 
 /// Arguments of `parfocal serve`.
 #[derive(Debug, Args)]
@@ -66,18 +72,32 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let address = listener.local_addr()?;
     std::fs::create_dir_all(&arguments.data_dir)
         .map_err(|error| format!("cannot make the data folder {}: {error}", arguments.data_dir.display()))?;
-    let keys = Keys::load_or_create(&arguments.data_dir)?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+    let store = open_store(arguments, clock.as_ref()).await?;
+    let keys = Keys::load_or_create(&arguments.data_dir)?;
     let control = standin::control(Arc::clone(&clock), arguments.fps);
+    let registry = Registry::standard();
+    let conductor = Conductor::open(Parts {
+        library: protocols(arguments, &registry)?,
+        store: store.clone(),
+        control: control.clone(),
+        registry: registry.clone(),
+        clock: Arc::clone(&clock),
+        random: arguments
+            .seed
+            .map_or_else(|| ChaCha12Rng::try_from_rng(&mut SysRng), |seed| Ok(ChaCha12Rng::seed_from_u64(seed)))?,
+    })
+    .await?;
+    let conducting = tokio::spawn(conductor.clone().run());
     let (live, imaging) = live::start(control.clone())?;
     let (end, shutdown) = watch::channel(false);
     let app = Arc::new(App {
         clock,
         live,
-        conductor: crate::conductor::Conductor {},
-        surgeon_view: watch::channel(None).1,
-        operator_view: watch::channel(None).1,
-        registry: crate::autofocus::Registry::default(),
+        surgeon_view: conductor.surgeon_view(),
+        operator_view: conductor.operator_view(),
+        conductor,
+        registry,
         keys: keys.clone(),
         loopback_only: address.ip().is_loopback(),
         metrics: http::Metrics::default(),
@@ -96,7 +116,28 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let _ = tokio::time::timeout(GRACE, async { (server.await, end.closed().await) }).await;
     control.frames.close();
     let _ = imaging.join();
+    conducting.abort();
+    store.close().await;
     Ok(())
+}
+
+async fn open_store(arguments: &Arguments, clock: &dyn Clock) -> Result<Store, Failure> {
+    let run = store::Run {
+        wall: clock.wall(),
+        at: clock.now(),
+        camera: arguments.camera.clone(),
+        lens: arguments.lens.clone(),
+        seed: arguments.seed,
+    };
+    Ok(Store::open(&arguments.data_dir, &run).await?)
+}
+
+/// The shipped protocols and those of the folder asked for, or of `trial-protocols` where there is one.
+fn protocols(arguments: &Arguments, registry: &Registry) -> Result<Library, Failure> {
+    let beside = Path::new("trial-protocols");
+    let folder = arguments.protocols.as_deref().or_else(|| beside.is_dir().then_some(beside));
+    let known: Vec<_> = registry.entries().into_iter().map(|entry| entry.name).collect();
+    Ok(Library::load(folder, &known)?)
 }
 
 fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {

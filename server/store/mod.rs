@@ -5,6 +5,7 @@
 //! second server out, while programs that only read come and go.
 
 mod error;
+mod export_rows;
 pub mod export;
 mod reader;
 mod remarks;

@@ -108,6 +108,18 @@ impl EventKind {
         }
     }
 
+    /// Time inspected in the segment by then, milliseconds, where it says.
+    #[must_use]
+    pub const fn inspected_ms(&self) -> Option<u64> {
+        match self {
+            Self::SegmentFinished { inspected_ms, .. }
+            | Self::Paused { inspected_ms, .. }
+            | Self::ServerRestarted { inspected_ms }
+            | Self::Aborted { inspected_ms, .. } => Some(*inspected_ms),
+            _ => None,
+        }
+    }
+
     /// The same without what only the researcher may read: a reason for unblinding may name a policy.
     #[must_use]
     pub fn for_the_blinded(&self) -> Self {

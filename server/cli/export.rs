@@ -1,0 +1,50 @@
+//! `parfocal export`: a session's data as a folder, while the server runs or not.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Failure;
+use crate::ids::SessionId;
+use crate::store::Reader;
+use crate::store::export::export;
+
+/// Arguments of `parfocal export`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The session, by its id on the researcher's page.
+    session: SessionId,
+    /// Folder to write; new or empty.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Tell which policy ran in which setting; only after unblinding.
+    #[arg(long)]
+    unblinded: bool,
+    /// Folder of the server's database.
+    #[arg(long, value_name = "DIR", default_value = "data")]
+    data_dir: PathBuf,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Writes the export.
+///
+/// # Errors
+/// When there is no such session, it is asked for unblinded before it was, or the folder cannot be written.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(write(arguments))
+}
+
+async fn write(arguments: &Arguments) -> Result<(), Failure> {
+    let reader = Reader::open(&arguments.data_dir).await?;
+    let summary = export(&reader, arguments.session, &arguments.out, arguments.unblinded).await?;
+    if arguments.json {
+        println!("{}", serde_json::to_string(&summary)?);
+    } else {
+        let kind = if summary.unblinded { "unblinded" } else { "blinded" };
+        let practice = if summary.practice { ", practice" } else { "" };
+        println!("{} files ({kind}{practice}) in {}", summary.files.len(), summary.folder.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,247 @@
+//! The blinded part of an export. What it holds has no field for a policy, the order, the seed, or a reason that may
+//! name them.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use super::ExportError;
+use super::description::{ANSWERS, COMMENTS, EVENTS, RUNS, SEGMENTS, SESSIONS, TELEMETRY};
+use super::folder::Folder;
+use super::table::{Row, Table};
+use crate::ids::{SegmentId, SessionId};
+use crate::store::remarks::said_columns;
+use crate::store::sessions::StoredSession;
+use crate::store::{Answer, Comment, Reader, SessionLine, StoreError, nanoseconds};
+use crate::trial::answers::sus_score;
+use crate::trial::event::{Event, EventKind};
+use crate::trial::protocol::Protocol;
+use crate::trial::view::{AnswerValue, QuestionKind};
+
+/// A session without what unblinding tells.
+pub struct Blinded {
+    line: SessionLine,
+    run: i64,
+    protocol_toml: String,
+    protocol_sha256: String,
+    /// `None` where this version cannot read it; then questions stand without their text.
+    protocol: Option<Protocol>,
+    algorithm: &'static str,
+    commitment: String,
+    segments: Vec<SegmentId>,
+    events: Vec<(i64, Event)>,
+    comments: Vec<(i64, Comment)>,
+    answers: Vec<(i64, Answer)>,
+}
+
+impl Blinded {
+    /// The blinded part of `stored`.
+    pub async fn of(reader: &Reader, stored: StoredSession) -> Result<Self, StoreError> {
+        let session = stored.made.session;
+        let lines = reader.sessions(true).await?;
+        let line = lines.into_iter().find(|line| line.session == session);
+        let line = line.ok_or_else(|| StoreError::Damaged(format!("session {session} is not in the list")))?;
+        let known: Vec<_> = stored.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
+        let blind = |(run, event): (i64, Event)| (run, Event { kind: event.kind.for_the_blinded(), ..event });
+        Ok(Self {
+            line,
+            run: stored.run,
+            protocol: Protocol::parse(&stored.made.protocol_toml, "protocol.toml", &known).ok(),
+            protocol_toml: stored.made.protocol_toml,
+            protocol_sha256: stored.made.protocol_sha256,
+            algorithm: stored.made.algorithm.name(),
+            commitment: stored.made.commitment,
+            segments: stored.made.segments.into_iter().map(|(segment, _)| segment).collect(),
+            events: stored.events.into_iter().map(blind).collect(),
+            comments: reader.comments(session).await?,
+            answers: reader.answers(session).await?,
+        })
+    }
+
+    /// Whether the session is practice.
+    pub const fn practice(&self) -> bool {
+        self.line.practice
+    }
+
+    const fn session(&self) -> SessionId {
+        self.line.session
+    }
+
+    /// Writes all its files but the description.
+    pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
+        let tables: [(Table, Vec<Row>); 6] = [
+            (RUNS, reader.export_runs(self.session()).await?),
+            (SESSIONS, vec![self.session_row()]),
+            (SEGMENTS, self.segment_rows()),
+            (COMMENTS, self.comment_rows()),
+            (ANSWERS, self.answer_rows()),
+            (EVENTS, self.event_rows()),
+        ];
+        let mut all = json!({});
+        for (table, rows) in &tables {
+            folder.table(table, rows)?;
+            all[table.name] = table.objects(rows);
+        }
+        folder.json("session.json", &all)?;
+        folder.file("protocol.toml", self.protocol_toml.as_bytes())?;
+        let mut file = folder.begin(&TELEMETRY)?;
+        reader.export_telemetry(self.session(), |row| file.row(&row)).await?;
+        folder.end(&TELEMETRY, file)
+    }
+
+    /// The description of the whole, without its tables.
+    pub fn package(&self, unblinded: bool) -> Value {
+        let name = super::folder_name(self.session(), unblinded);
+        json!({
+            "profile": "tabular-data-package",
+            "name": name,
+            "title": format!("Usability trial of autofocus policies: session {}", self.session()),
+            "description": "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json holds all tables but telemetry and policy_steps.",
+            "parfocal": {
+                "version": env!("CARGO_PKG_VERSION"),
+                "practice": self.line.practice,
+                "blinded": !unblinded,
+                "unblinded": self.unblinded(),
+            },
+        })
+    }
+
+    const fn unblinded(&self) -> &'static str {
+        match (self.line.unblinded, self.line.emergency) {
+            (false, _) => "no",
+            (true, false) => "after-end",
+            (true, true) => "while-under-way",
+        }
+    }
+
+    fn setting(&self, segment: Option<SegmentId>) -> Option<usize> {
+        self.segments.iter().position(|&known| Some(known) == segment).map(|position| position + 1)
+    }
+
+    fn session_row(&self) -> Row {
+        let line = &self.line;
+        vec![
+            text(line.session),
+            json!(line.participant),
+            json!(line.protocol),
+            json!(self.protocol_sha256),
+            json!(line.practice),
+            json!(self.algorithm),
+            json!(self.commitment),
+            text(line.created),
+            json!(self.run),
+            json!(line.status),
+            json!(line.settings),
+            json!(line.finished_settings),
+            json!(line.comments),
+            json!(self.unblinded()),
+        ]
+    }
+
+    fn segment_rows(&self) -> Vec<Row> {
+        let row = |&segment: &SegmentId| {
+            let of_it = || self.events.iter().map(|(_, event)| event).filter(move |e| e.kind.segment() == Some(segment));
+            let started = of_it().find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }));
+            let finished = of_it().find(|event| matches!(event.kind, EventKind::SegmentFinished { .. }));
+            vec![
+                text(self.session()),
+                json!(self.setting(Some(segment))),
+                text(segment),
+                json!(started.map(|event| event.wall)),
+                json!(finished.map(|event| event.wall)),
+                json!(finished.map(|event| event.by)),
+                json!(finished.and_then(|event| event.kind.inspected_ms()).map(seconds)),
+            ]
+        };
+        self.segments.iter().map(row).collect()
+    }
+
+    fn comment_rows(&self) -> Vec<Row> {
+        let row = |((run, comment), number): (&(i64, Comment), u32)| {
+            let (kind, said) = said_columns(&comment.said);
+            vec![
+                json!(number),
+                text(comment.key),
+                text(comment.session),
+                json!(self.setting(comment.segment)),
+                json!(comment.segment),
+                json!(kind),
+                json!(said),
+                json!(comment.frame),
+                text(comment.stamp.wall),
+                json!(run),
+                json!(nanoseconds(comment.stamp.at)),
+                json!(comment.client_millis),
+            ]
+        };
+        self.comments.iter().zip(1..).map(row).collect()
+    }
+
+    fn answer_rows(&self) -> Vec<Row> {
+        let mut revisions: BTreeMap<(Option<SegmentId>, &str), u32> = BTreeMap::new();
+        for (_, answer) in &self.answers {
+            *revisions.entry((answer.segment, &answer.question)).or_default() += 1;
+        }
+        let row = |((run, answer), number): (&(i64, Answer), u32)| {
+            let key = (answer.segment, answer.question.as_str());
+            let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
+            let kind = question.map(|question| &question.kind);
+            let score = match (kind, &answer.value) {
+                (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
+                _ => None,
+            };
+            let revision = self.answers[..number as usize].iter().filter(|(_, a)| key == (a.segment, &a.question)).count();
+            vec![
+                json!(number),
+                text(answer.key),
+                text(answer.session),
+                json!(self.setting(answer.segment)),
+                json!(answer.segment),
+                json!(answer.question),
+                json!(question.map(|question| &question.text)),
+                json!(kind.map(QuestionKind::name)),
+                json!(revision),
+                json!(revisions.get(&key) == u32::try_from(revision).ok().as_ref()),
+                json!(serde_json::to_string(&answer.value).ok()),
+                json!(score),
+                text(answer.stamp.wall),
+                json!(run),
+                json!(nanoseconds(answer.stamp.at)),
+            ]
+        };
+        self.answers.iter().zip(1..).map(row).collect()
+    }
+
+    fn event_rows(&self) -> Vec<Row> {
+        let row = |(run, event): &(i64, Event)| {
+            let (reason, emergency) = match &event.kind {
+                EventKind::Paused { reason, .. } | EventKind::Aborted { reason, .. } => (Some(reason), None),
+                EventKind::Unblinded { emergency, .. } => (None, Some(emergency)),
+                _ => (None, None),
+            };
+            vec![
+                text(self.session()),
+                json!(event.number),
+                text(event.wall),
+                json!(run),
+                json!(nanoseconds(event.at)),
+                json!(event.by),
+                json!(event.kind.name()),
+                json!(self.setting(event.kind.segment())),
+                json!(event.kind.segment()),
+                json!(event.kind.inspected_ms()),
+                json!(reason),
+                json!(emergency),
+            ]
+        };
+        self.events.iter().map(row).collect()
+    }
+}
+
+fn text(value: impl std::fmt::Display) -> Value {
+    Value::String(value.to_string())
+}
+
+fn seconds(milliseconds: u64) -> f64 {
+    std::time::Duration::from_millis(milliseconds).as_secs_f64()
+}

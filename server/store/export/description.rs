@@ -1,0 +1,200 @@
+//! The data dictionary: every table and column of an export.
+
+use super::table::Type::{Boolean, Datetime, Integer, Number, String};
+use super::table::{Column, Table, Type};
+
+const fn column(name: &'static str, kind: Type, unit: &'static str, description: &'static str) -> Column {
+    Column { name, kind, unit, description }
+}
+
+const SESSION: Column = column("session", String, "", "Session's random id");
+const SETTING: Column = column("setting", Integer, "", "Number of the setting in the session, from 1, as the surgeon read it");
+const SEGMENT: Column = column("segment", String, "", "Segment's random id, never shared by two segments");
+const WALL: Column = column("wall", Datetime, "UTC", "When it was recorded, by the server's wall clock");
+const RUN: Column = column("run", Integer, "", "Start of the server that recorded it; see runs");
+const MONOTONIC: Column =
+    column("monotonic_ns", Integer, "ns", "When it was recorded, by the monotonic clock; comparable within a run");
+const FRAME: Column = column("frame", Integer, "", "Frame's number within the run");
+const EXPOSED: Column = column("exposed_ns", Integer, "ns", "End of the exposure, by the monotonic clock");
+const KEY: Column = column("key", String, "", "Key by which the browser could send it again without it counting twice");
+
+/// Starts of the server.
+pub const RUNS: Table = Table {
+    name: "runs",
+    description: "The starts of the server that the session's records belong to; by their clocks a monotonic time has a time of day",
+    columns: &[
+        column("run", Integer, "", "Start of the server, counting from 1"),
+        column("wall", Datetime, "UTC", "The wall clock at the start"),
+        column("monotonic_ns", Integer, "ns", "The monotonic clock at the start"),
+        column("version", String, "", "Version of parfocal"),
+        column("camera", String, "", "The camera"),
+        column("lens", String, "", "The lens"),
+    ],
+    key: &["run"],
+};
+
+/// The session.
+pub const SESSIONS: Table = Table {
+    name: "sessions",
+    description: "The session",
+    columns: &[
+        SESSION,
+        column("participant", String, "", "Participant's code"),
+        column("protocol", String, "", "Protocol's name; its text is protocol.toml"),
+        column("protocol_sha256", String, "", "SHA-256 of protocol.toml"),
+        column("practice", Boolean, "", "Whether it is practice, never to be mixed with real data"),
+        column("algorithm", String, "", "Algorithm that drew the order from the seed"),
+        column("commitment", String, "", "SHA-256 published when the session was made; commits to seed and order"),
+        column("wall", Datetime, "UTC", "When it was made, by the server's wall clock"),
+        column("run", Integer, "", "Start of the server that made it; see runs"),
+        column("status", String, "", "under-way, completed or aborted"),
+        column("settings", Integer, "", "Settings in all"),
+        column("finished_settings", Integer, "", "Settings inspected to the end"),
+        column("comments", Integer, "", "Comments kept"),
+        column("unblinded", String, "", "no; after-end; or while-under-way, which is emergency unblinding"),
+    ],
+    key: &["session"],
+};
+
+/// Its segments.
+pub const SEGMENTS: Table = Table {
+    name: "segments",
+    description: "The session's settings in order, one policy's segment each; which, allocation.csv tells after unblinding",
+    columns: &[
+        SESSION,
+        SETTING,
+        SEGMENT,
+        column("started", Datetime, "UTC", "When inspection began, by the server's wall clock; empty if it never did"),
+        column("finished", Datetime, "UTC", "When inspection ended, by the server's wall clock"),
+        column("finished_by", String, "", "Who ended it: surgeon, operator, or system at the time limit"),
+        column("inspected_seconds", Number, "s", "Time inspected, without pauses"),
+    ],
+    key: &["segment"],
+};
+
+/// What was said.
+pub const COMMENTS: Table = Table {
+    name: "comments",
+    description: "What the surgeon said, in the order it was kept",
+    columns: &[
+        column("number", Integer, "", "Order of the comment in the session, from 1"),
+        KEY,
+        SESSION,
+        SETTING,
+        SEGMENT,
+        column("kind", String, "", "text (typed), quick (one tap) or mark (\"mark this moment\")"),
+        column("text", String, "", "What was said, as it was said; empty for a mark"),
+        column("frame", Integer, "", "Number of the frame on the surgeon's screen"),
+        WALL,
+        RUN,
+        MONOTONIC,
+        column("client_millis", Integer, "ms", "The browser's clock, milliseconds since 1970-01-01 UTC"),
+    ],
+    key: &["key"],
+};
+
+/// Answers.
+pub const ANSWERS: Table = Table {
+    name: "answers",
+    description: "Answers in the order they were given, replaced ones included",
+    columns: &[
+        column("number", Integer, "", "Order of the answer in the session, from 1"),
+        KEY,
+        SESSION,
+        column("setting", Integer, "", "Setting asked about, from 1; empty for a closing question"),
+        column("segment", String, "", "Segment asked about; empty for a closing question"),
+        column("question", String, "", "Question's id in the protocol"),
+        column("question_text", String, "", "The question as the surgeon read it"),
+        column("kind", String, "", "text, likert, ranking or sus"),
+        column("revision", Integer, "", "1 for the first answer to the question, then counting up"),
+        column("counts", Boolean, "", "Whether it is the latest answer to the question"),
+        column(
+            "value",
+            String,
+            "",
+            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of 1..5 (sus)",
+        ),
+        column("sus_score", Number, "points", "System Usability Scale score, 0..100"),
+        WALL,
+        RUN,
+        MONOTONIC,
+    ],
+    key: &["key"],
+};
+
+/// Events.
+pub const EVENTS: Table = Table {
+    name: "events",
+    description: "Everything that happened to the session, in order and without gaps",
+    columns: &[
+        SESSION,
+        column("number", Integer, "", "Order of the event in the session, from 1"),
+        WALL,
+        RUN,
+        MONOTONIC,
+        column("role", String, "", "Who: surgeon, operator, researcher, or system (a time limit, a restart)"),
+        column(
+            "kind",
+            String,
+            "",
+            "created, started, segment-started, segment-finished, questions-finished, paused, resumed, server-restarted, completed, aborted or unblinded",
+        ),
+        SETTING,
+        SEGMENT,
+        column("inspected_ms", Integer, "ms", "Time inspected in the segment by then, without pauses"),
+        column("reason", String, "", "Reason given; an unblinding's stands in allocation.json alone, as it may name a policy"),
+        column("emergency", Boolean, "", "For an unblinding: whether the session was still under way"),
+    ],
+    key: &["session", "number"],
+};
+
+/// Telemetry, blinded.
+pub const TELEMETRY: Table = Table {
+    name: "telemetry",
+    description: "Every step of the control loop during the settings. Metric and timing are left to policy_steps.csv, as they tell the policy; the focal path itself may suggest one to an expert",
+    columns: &[
+        SETTING,
+        RUN,
+        FRAME,
+        EXPOSED,
+        column("asked", Number, "focal power, 0..1", "Focal power asked of the lens after the frame"),
+        column("measured", Number, "focal power, 0..1", "Focal power that the frame was exposed at, as far as the lens knows"),
+        column("held", Boolean, "", "Whether the lens was held, by a pause or the watchdog"),
+        column("optimal", Number, "focal power, 0..1", "The optimum, where camera and lens are simulated"),
+    ],
+    key: &["run", "frame"],
+};
+
+/// Which policy ran.
+pub const ALLOCATION: Table = Table {
+    name: "allocation",
+    description: "Which policy ran in which setting",
+    columns: &[SESSION, SETTING, SEGMENT, column("policy", String, "", "Policy's name")],
+    key: &["segment"],
+};
+
+/// Telemetry that tells the policy.
+pub const POLICY_STEPS: Table = Table {
+    name: "policy_steps",
+    description: "What of each step tells the policy; belongs to telemetry.csv by run and frame",
+    columns: &[
+        SETTING,
+        RUN,
+        FRAME,
+        column("policy", String, "", "Policy that was asked; empty where none was"),
+        column("metric", Number, "", "The policy's focus metric (mean gradient magnitude or mean local ratio)"),
+        column("policy_micros", Integer, "us", "Duration of the policy's step"),
+        column("latency_micros", Integer, "us", "From the end of the exposure to the lens command"),
+        column(
+            "held",
+            String,
+            "",
+            "Why the lens was held: paused, policy-panicked, policy-nonsense, policy-slow, lens-failed or camera-failed",
+        ),
+    ],
+    key: &["run", "frame"],
+};
+
+/// Every table that an export may have.
+pub const ALL: [Table; 9] =
+    [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, TELEMETRY, ALLOCATION, POLICY_STEPS];

@@ -1,0 +1,112 @@
+//! Tables: rows of typed cells under described columns. CSV, JSON and the data dictionary come from the same.
+
+use serde_json::{Map, Value, json};
+
+/// Type of a column, by its Frictionless name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Type {
+    /// Text.
+    String,
+    /// Whole number.
+    Integer,
+    /// Number.
+    Number,
+    /// `true` or `false`.
+    Boolean,
+    /// RFC 3339 in UTC.
+    Datetime,
+}
+
+/// A column.
+#[derive(Debug, Clone, Copy)]
+pub struct Column {
+    pub name: &'static str,
+    pub kind: Type,
+    /// Unit; empty where there is none.
+    pub unit: &'static str,
+    pub description: &'static str,
+}
+
+/// A table without its rows.
+#[derive(Debug, Clone, Copy)]
+pub struct Table {
+    /// Name; its file is `NAME.csv`.
+    pub name: &'static str,
+    pub description: &'static str,
+    pub columns: &'static [Column],
+    /// Columns that together name a row.
+    pub key: &'static [&'static str],
+}
+
+/// A row: a cell for each column, null where there is nothing.
+pub type Row = Vec<Value>;
+
+impl Type {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::String => "string",
+            Self::Integer => "integer",
+            Self::Number => "number",
+            Self::Boolean => "boolean",
+            Self::Datetime => "datetime",
+        }
+    }
+
+    /// Whether `cell`, as it stands in a CSV file, is of this type or empty.
+    pub fn accepts(self, cell: &str) -> bool {
+        cell.is_empty()
+            || match self {
+                Self::String => true,
+                Self::Integer => cell.parse::<i128>().is_ok(),
+                Self::Number => cell.parse::<f64>().is_ok_and(f64::is_finite),
+                Self::Boolean => matches!(cell, "true" | "false"),
+                Self::Datetime => cell.parse::<jiff::Timestamp>().is_ok(),
+            }
+    }
+}
+
+impl Table {
+    /// The table's file.
+    pub fn file(&self) -> String {
+        format!("{}.csv", self.name)
+    }
+
+    /// The names of its columns.
+    pub fn header(&self) -> impl Iterator<Item = &'static str> {
+        self.columns.iter().map(|column| column.name)
+    }
+
+    /// Its rows as JSON objects.
+    pub fn objects(&self, rows: &[Row]) -> Value {
+        let object = |row: &Row| {
+            let cells = self.header().map(str::to_owned).zip(row.iter().cloned());
+            Value::Object(cells.collect::<Map<_, _>>())
+        };
+        rows.iter().map(object).collect()
+    }
+
+    /// Its Frictionless schema.
+    pub fn schema(&self) -> Value {
+        let fields: Vec<Value> = self.columns.iter().map(Column::field).collect();
+        json!({ "fields": fields, "primaryKey": self.key, "missingValues": [""] })
+    }
+}
+
+impl Column {
+    fn field(&self) -> Value {
+        let mut field = json!({ "name": self.name, "type": self.kind.name(), "description": self.description });
+        if !self.unit.is_empty() {
+            field["unit"] = self.unit.into();
+        }
+        field
+    }
+}
+
+/// A cell as CSV has it.
+pub fn csv_cell(cell: &Value) -> String {
+    match cell {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,114 @@
+//! The rows of an export that come straight from the database, one by one: telemetry is too much to gather first.
+
+use futures_util::TryStreamExt;
+use serde_json::{Value, json};
+use sqlx::Row as _;
+use sqlx::sqlite::SqliteRow;
+
+use super::{Reader, StoreError};
+use crate::ids::SessionId;
+
+impl Reader {
+    /// The starts of the server that `session` has records of.
+    pub(super) async fn export_runs(&self, session: SessionId) -> Result<Vec<Vec<Value>>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT run, wall, monotonic_ns, version, camera, lens FROM runs WHERE run IN (
+                 SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
+                 UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1)
+             ORDER BY run",
+        )
+        .bind(session.to_string())
+        .fetch_all(self.pool())
+        .await?;
+        let row = |row: &SqliteRow| {
+            Ok(vec![
+                integer(row, "run")?,
+                string(row, "wall")?,
+                integer(row, "monotonic_ns")?,
+                string(row, "version")?,
+                string(row, "camera")?,
+                string(row, "lens")?,
+            ])
+        };
+        rows.iter().map(row).collect()
+    }
+
+    /// Hands the blinded telemetry of `session` to `take`, row by row.
+    pub(super) async fn export_telemetry<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        mut take: impl FnMut(Vec<Value>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let session = session.to_string();
+        let mut rows = sqlx::query(
+            "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured, t.held IS NOT NULL AS held, t.optimal
+             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+             WHERE g.session = ? ORDER BY g.setting, t.number",
+        )
+        .bind(&session)
+        .fetch(self.pool());
+        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
+            take(telemetry_row(&row)?)?;
+        }
+        Ok(())
+    }
+
+    /// Hands what of the telemetry of `session` tells the policy to `take`, row by row.
+    pub(super) async fn export_policy_steps<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        mut take: impl FnMut(Vec<Value>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let session = session.to_string();
+        let mut rows = sqlx::query(
+            "SELECT g.setting, t.run, t.frame, p.name, t.metric, t.policy_micros, t.latency_micros, t.held
+             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number LEFT JOIN policies AS p ON p.number = t.policy
+             WHERE g.session = ? ORDER BY g.setting, t.number",
+        )
+        .bind(&session)
+        .fetch(self.pool());
+        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
+            take(policy_row(&row)?)?;
+        }
+        Ok(())
+    }
+}
+
+fn telemetry_row(row: &SqliteRow) -> Result<Vec<Value>, StoreError> {
+    let held: bool = row.try_get("held")?;
+    Ok(vec![
+        integer(row, "setting")?,
+        integer(row, "run")?,
+        integer(row, "frame")?,
+        integer(row, "exposed_ns")?,
+        number(row, "asked")?,
+        number(row, "measured")?,
+        json!(held),
+        number(row, "optimal")?,
+    ])
+}
+
+fn policy_row(row: &SqliteRow) -> Result<Vec<Value>, StoreError> {
+    Ok(vec![
+        integer(row, "setting")?,
+        integer(row, "run")?,
+        integer(row, "frame")?,
+        string(row, "name")?,
+        number(row, "metric")?,
+        integer(row, "policy_micros")?,
+        integer(row, "latency_micros")?,
+        string(row, "held")?,
+    ])
+}
+
+fn integer(row: &SqliteRow, column: &str) -> Result<Value, StoreError> {
+    Ok(json!(row.try_get::<Option<i64>, _>(column)?))
+}
+
+fn number(row: &SqliteRow, column: &str) -> Result<Value, StoreError> {
+    Ok(json!(row.try_get::<Option<f64>, _>(column)?))
+}
+
+fn string(row: &SqliteRow, column: &str) -> Result<Value, StoreError> {
+    Ok(json!(row.try_get::<Option<String>, _>(column)?))
+}
