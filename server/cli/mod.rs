@@ -1,8 +1,10 @@
 //! The command line: one file a command; wires the rooms together.
 
+mod export;
 mod lens;
 mod policies;
 mod serve;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -18,12 +20,16 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Write a session's data as a folder of CSV and JSON.
+    Export(export::Arguments),
     /// Look at a lens, move it by hand, sweep it, or start one that is not there.
     Lens(lens::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
     /// Start the server: the live view, the control loop and the trial.
     Serve(serve::Arguments),
+    /// Check that an export is whole, unchanged and true to its commitment.
+    Verify(verify::Arguments),
 }
 
 /// A command's failure: one clear sentence that says what to do.
@@ -44,8 +50,10 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Failure> {
     match command {
+        Command::Export(arguments) => export::run(&arguments),
         Command::Lens(arguments) => lens::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
     }
 }

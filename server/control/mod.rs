@@ -115,6 +115,7 @@ impl Hold {
             Self::PolicyPanicked => "policy-panicked",
             Self::PolicyNonsense => "policy-nonsense",
             Self::PolicySlow => "policy-slow",
+            Self::PolicyUnavailable => "policy-unavailable",
             Self::LensFailed => "lens-failed",
             Self::CameraFailed => "camera-failed",
             Self::Paused => "paused",

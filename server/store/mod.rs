@@ -5,8 +5,8 @@
 //! second server out, while programs that only read come and go.
 
 mod error;
-mod export_rows;
 pub mod export;
+mod export_rows;
 mod reader;
 mod remarks;
 mod rows;

@@ -140,7 +140,8 @@ impl Blinded {
 
     fn segment_rows(&self) -> Vec<Row> {
         let row = |&segment: &SegmentId| {
-            let of_it = || self.events.iter().map(|(_, event)| event).filter(move |e| e.kind.segment() == Some(segment));
+            let of_it =
+                || self.events.iter().map(|(_, event)| event).filter(move |e| e.kind.segment() == Some(segment));
             let started = of_it().find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }));
             let finished = of_it().find(|event| matches!(event.kind, EventKind::SegmentFinished { .. }));
             vec![
@@ -190,7 +191,8 @@ impl Blinded {
                 (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
                 _ => None,
             };
-            let revision = self.answers[..number as usize].iter().filter(|(_, a)| key == (a.segment, &a.question)).count();
+            let revision =
+                self.answers[..number as usize].iter().filter(|(_, a)| key == (a.segment, &a.question)).count();
             vec![
                 json!(number),
                 text(answer.key),

@@ -8,7 +8,8 @@ const fn column(name: &'static str, kind: Type, unit: &'static str, description:
 }
 
 const SESSION: Column = column("session", String, "", "Session's random id");
-const SETTING: Column = column("setting", Integer, "", "Number of the setting in the session, from 1, as the surgeon read it");
+const SETTING: Column =
+    column("setting", Integer, "", "Number of the setting in the session, from 1, as the surgeon read it");
 const SEGMENT: Column = column("segment", String, "", "Segment's random id, never shared by two segments");
 const WALL: Column = column("wall", Datetime, "UTC", "When it was recorded, by the server's wall clock");
 const RUN: Column = column("run", Integer, "", "Start of the server that recorded it; see runs");
@@ -142,7 +143,12 @@ pub const EVENTS: Table = Table {
         SETTING,
         SEGMENT,
         column("inspected_ms", Integer, "ms", "Time inspected in the segment by then, without pauses"),
-        column("reason", String, "", "Reason given; an unblinding's stands in allocation.json alone, as it may name a policy"),
+        column(
+            "reason",
+            String,
+            "",
+            "Reason given; an unblinding's stands in allocation.json alone, as it may name a policy",
+        ),
         column("emergency", Boolean, "", "For an unblinding: whether the session was still under way"),
     ],
     key: &["session", "number"],
@@ -158,7 +164,12 @@ pub const TELEMETRY: Table = Table {
         FRAME,
         EXPOSED,
         column("asked", Number, "focal power, 0..1", "Focal power asked of the lens after the frame"),
-        column("measured", Number, "focal power, 0..1", "Focal power that the frame was exposed at, as far as the lens knows"),
+        column(
+            "measured",
+            Number,
+            "focal power, 0..1",
+            "Focal power that the frame was exposed at, as far as the lens knows",
+        ),
         column("held", Boolean, "", "Whether the lens was held, by a pause or the watchdog"),
         column("optimal", Number, "focal power, 0..1", "The optimum, where camera and lens are simulated"),
     ],
@@ -189,12 +200,11 @@ pub const POLICY_STEPS: Table = Table {
             "held",
             String,
             "",
-            "Why the lens was held: paused, policy-panicked, policy-nonsense, policy-slow, lens-failed or camera-failed",
+            "Why the lens was held: paused, policy-panicked, policy-nonsense, policy-slow, policy-unavailable, lens-failed or camera-failed",
         ),
     ],
     key: &["run", "frame"],
 };
 
 /// Every table that an export may have.
-pub const ALL: [Table; 9] =
-    [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, TELEMETRY, ALLOCATION, POLICY_STEPS];
+pub const ALL: [Table; 9] = [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, TELEMETRY, ALLOCATION, POLICY_STEPS];

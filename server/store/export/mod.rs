@@ -68,12 +68,7 @@ pub enum ExportError {
 ///
 /// # Errors
 /// When there is no such session, it is asked for unblinded before it was, or `out` cannot be written.
-pub async fn export(
-    reader: &Reader,
-    session: SessionId,
-    out: &Path,
-    unblinded: bool,
-) -> Result<Summary, ExportError> {
+pub async fn export(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
     let Some(stored) = reader.session(session).await? else {
         return Err(ExportError::NoSession { session, known: known_sessions(reader).await? });
     };

@@ -41,7 +41,9 @@ impl Unblinded {
 
     fn rows(&self) -> Vec<Row> {
         let session = self.made.session.to_string();
-        let row = |((segment, policy), setting): (&(_, _), u32)| vec![json!(session), json!(setting), json!(segment), json!(policy)];
+        let row = |((segment, policy), setting): (&(_, _), u32)| {
+            vec![json!(session), json!(setting), json!(segment), json!(policy)]
+        };
         self.made.segments.iter().zip(1..).map(row).collect()
     }
 

@@ -39,7 +39,8 @@ pub enum Verdict {
 /// Checks the export in `folder`: every check, in order.
 #[must_use]
 pub fn verify(folder: &Path) -> Vec<Check> {
-    let check = |name, outcome: Result<Verdict, String>| Check { name, verdict: outcome.unwrap_or_else(Verdict::Failed) };
+    let check =
+        |name, outcome: Result<Verdict, String>| Check { name, verdict: outcome.unwrap_or_else(Verdict::Failed) };
     vec![
         check("checksums", checksums(folder)),
         check("columns", columns(folder)),
@@ -151,8 +152,8 @@ fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
     if !folder.join("allocation.json").exists() {
         return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
     }
-    let told: Told = serde_json::from_str(&text(folder, "allocation.json")?)
-        .map_err(|error| format!("allocation.json: {error}"))?;
+    let told: Told =
+        serde_json::from_str(&text(folder, "allocation.json")?).map_err(|error| format!("allocation.json: {error}"))?;
     let Some(seed) = told.seed else {
         let why = "the seed is withheld while other sessions of its balanced set are blinded";
         return Ok(Err(Verdict::NotChecked(why.to_owned())));
@@ -211,7 +212,8 @@ fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, String> 
 fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
     let mut reader = csv(folder, file)?;
     let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?;
-    let place = headers.iter().position(|name| name == column).ok_or_else(|| format!("{file} has no column {column}"))?;
+    let place =
+        headers.iter().position(|name| name == column).ok_or_else(|| format!("{file} has no column {column}"))?;
     reader
         .records()
         .map(|row| Ok(row.map_err(|error| format!("{file}: {error}"))?.get(place).unwrap_or_default().to_owned()))
