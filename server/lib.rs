@@ -7,6 +7,7 @@ pub mod clock;
 pub mod ids;
 pub mod imaging;
 pub mod lens;
+pub mod options;
 
 pub mod autofocus;
 pub mod camera;

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::clock::{Clock, Moment, SystemClock};
+use parfocal::clock::{Clock, SystemClock};
 use parfocal::lens::emulator::{Emulator, Fault, Model};
 use parfocal::lens::{self, FocalPower, Lens, LensError, LensInfo, Optics};
 
@@ -65,8 +65,14 @@ fn says_what_it_is_and_goes_where_it_is_sent() {
     assert_eq!(last_command(&emulator), Some(2800));
     assert_eq!(lens.read_back(), Ok(power(0.8)));
     let health = lens.health();
-    assert!(health.working && !health.simulated);
+    assert!(health.working && health.simulated, "an emulated unit is no real lens");
     assert_eq!(&*health.message, "follows commands between 5.00 and 10.00 dpt, at 25.5 °C");
+}
+
+#[test]
+fn a_unit_that_is_not_emulated_is_taken_for_real() {
+    let emulator = emulator(Model { serial: *b"AREA0042", ..quick() });
+    assert!(!open(&emulator, "").unwrap().health().simulated);
 }
 
 #[test]
@@ -318,9 +324,9 @@ fn an_emulated_driver_can_be_started_from_the_command_line() {
     let mut name = String::new();
     BufReader::new(process.stdout.take().unwrap()).read_line(&mut name).unwrap();
     let name = name.trim_end();
-    assert!(name.ends_with("usb-Optotune_LD_Optotune_LD_00000042-if00"));
+    assert!(name.ends_with("usb-Optotune_LD_Optotune_LD_EMUL0042-if00"));
     let spec = format!("optotune:{name}");
-    assert_eq!(lens::open(&spec, Arc::new(SystemClock)).unwrap().info().unwrap().serial, "00000042");
+    assert_eq!(lens::open(&spec, Arc::new(SystemClock)).unwrap().info().unwrap().serial, "EMUL0042");
 
     rustix::process::kill_process(rustix::process::Pid::from_child(&process), rustix::process::Signal::INT).unwrap();
     assert!(process.wait().unwrap().success());

@@ -18,6 +18,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::clock::Moment;
+use crate::options::BadOptions;
 
 /// A focus-tunable lens.
 ///
@@ -114,6 +115,12 @@ pub struct LensDynamics {
     pub delay: Duration,
     /// From first movement to within 5 % of the step.
     pub settling: Duration,
+}
+
+impl From<BadOptions> for LensError {
+    fn from(error: BadOptions) -> Self {
+        Self::BadSpec(error.to_string())
+    }
 }
 
 /// Why a lens did not do as it was told.

@@ -8,9 +8,9 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::response::Response;
-use super::spec::Options;
 use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics};
 use crate::clock::Clock;
+use crate::options::Options;
 
 /// A step of a tunable liquid lens settles in about 15 ms (Optics Express 27, 2085, 2019); 2 ms is what a command takes
 /// over USB and through the driver.

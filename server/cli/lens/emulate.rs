@@ -20,8 +20,8 @@ Ctrl-C ends it";
 /// Arguments of `parfocal lens emulate`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Serial number, at most eight characters.
-    #[arg(long, default_value = "EMUL0001", value_parser = parse_serial)]
+    /// Serial number: one to four letters and digits, which follow on EMUL.
+    #[arg(long, default_value = "0001", value_parser = parse_serial)]
     serial: [u8; 8],
 }
 
@@ -80,12 +80,12 @@ fn befall(emulator: &mut Emulator, line: &str) -> Result<(), String> {
     Ok(())
 }
 
+/// The number behind the prefix that marks an emulated unit.
 fn parse_serial(text: &str) -> Result<[u8; 8], String> {
-    let allowed = |byte: &u8| byte.is_ascii_alphanumeric();
-    if text.is_empty() || text.len() > 8 || !text.as_bytes().iter().all(allowed) {
-        return Err("must be one to eight letters and digits".into());
+    if text.is_empty() || text.len() > 4 || !text.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
+        return Err("must be one to four letters and digits".into());
     }
-    let mut serial = [b'0'; 8];
+    let mut serial = *b"EMUL0000";
     serial.iter_mut().rev().zip(text.bytes().rev()).for_each(|(place, byte)| *place = byte);
     Ok(serial)
 }

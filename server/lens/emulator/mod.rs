@@ -2,7 +2,8 @@
 //! without a bench (`parfocal lens emulate`).
 //!
 //! It shares no code with the driver's codec, down to the checksum: written from the protocol's description alone, so
-//! that one misreading cannot hide in both.
+//! that one misreading cannot hide in both. Serial numbers begin with `EMUL`, by which the driver knows that no glass
+//! moves and has it said on every page.
 
 mod firmware;
 mod pty;

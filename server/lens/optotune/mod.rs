@@ -21,15 +21,18 @@ use std::time::Duration;
 pub use handshake::Settings;
 use shared::{Ending, Shared};
 
-use super::spec::Options;
 use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
 use crate::clock::Clock;
+use crate::options::Options;
 
 /// Until it is measured on the bench: see the simulated lens's figures.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
 /// In °C; room temperature to a lens warmed by its own coil.
 const TEMPERATURES: (f64, f64) = (20.0, 40.0);
+
+/// How serial numbers of emulated units begin (see [`super::emulator`]): behind those no glass moves.
+const EMULATED: &str = "EMUL";
 
 /// Longest wait for a device to say who it is, with a second attempt at greeting.
 const CONNECT: Duration = Duration::from_secs(2);
@@ -42,6 +45,7 @@ pub struct OptotuneLens {
     name: Arc<str>,
     thread: Option<JoinHandle<()>>,
     ending: Ending,
+    emulated: bool,
 }
 
 impl OptotuneLens {
@@ -58,13 +62,14 @@ impl OptotuneLens {
             .name("lens".into())
             .spawn(move || worker::run(&theirs, &path_of_thread, &settings))
             .map_err(system)?;
-        let lens = Self {
+        let mut lens = Self {
             shared,
             name: format!("Optotune lens at {}", path.display()).into(),
             thread: Some(thread),
             ending: Ending::Relaxed,
+            emulated: false,
         };
-        lens.shared.wait_connected(CONNECT)?;
+        lens.emulated = lens.shared.wait_connected(CONNECT)?.serial.starts_with(EMULATED);
         Ok(lens)
     }
 
@@ -111,7 +116,7 @@ impl Lens for OptotuneLens {
             (Ok(_), Some(refusal)) => (false, refusal.clone()),
             (Err(trouble), _) => (false, Arc::from(format!("{trouble}; trying again"))),
         };
-        LensHealth { name: self.name.clone(), simulated: false, working, message }
+        LensHealth { name: self.name.clone(), simulated: self.emulated, working, message }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {

@@ -159,16 +159,16 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// Waits for the end of the first attempt to connect, at most `timeout`.
+    /// Waits for the end of the first attempt to connect, at most `timeout`, and returns the device.
     ///
     /// # Errors
     /// With what stood in the way.
-    pub fn wait_connected(&self, timeout: Duration) -> Result<(), LensError> {
+    pub fn wait_connected(&self, timeout: Duration) -> Result<Device, LensError> {
         let (state, _) = self
             .changed
             .wait_timeout_while(self.state(), timeout, |state| !state.tried)
             .unwrap_or_else(PoisonError::into_inner);
-        state.device.as_ref().map(|_| ()).map_err(Clone::clone)
+        state.device.clone()
     }
 
     /// Has everything read afresh, waits for it at most `timeout`, and returns it.
