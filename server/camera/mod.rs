@@ -42,10 +42,21 @@ pub struct Frame {
     pub number: u64,
     /// End of the exposure, taken once, here; every later stage carries it on.
     pub exposed_at: Moment,
+    /// Length of the exposure; zero where the camera does not tell.
+    pub exposure: Duration,
     /// The picture.
     pub image: FrameImage,
     /// What only a simulation knows. For reports; no policy sees it.
     pub truth: Option<Truth>,
+}
+
+impl Frame {
+    /// The middle of the exposure: when the lens was where most of the light saw it.
+    #[must_use]
+    pub fn middle(&self) -> Moment {
+        let half = u64::try_from(self.exposure.as_nanos() / 2).unwrap_or(u64::MAX);
+        Moment::from_nanos(self.exposed_at.as_nanos().saturating_sub(half))
+    }
 }
 
 /// A frame's picture, shared, never copied.

@@ -226,7 +226,7 @@ mod standin {
         let image = FrameImage::Rgb(Arc::new(RgbImage { width, height, data }));
         let exposed_at = clock.now();
         ControlledFrame {
-            frame: Frame { number, exposed_at, image, truth: None },
+            frame: Frame { number, exposed_at, exposure: Duration::ZERO, image, truth: None },
             patch: PatchArea { x: 240, y: 120, width: 32, height: 32 },
             content_area: Some(ContentArea { x: 256.0, y: 136.0, radius: 150.0, confidence: 0.5 }),
             record: StepRecord {

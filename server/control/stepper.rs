@@ -145,11 +145,11 @@ impl Stepper {
                     // Frames from a lens that does not move would teach the policy wrong.
                     return unasked(Err(fault.clone()));
                 }
-                if !placed && !self.attribution.settled(frame.exposed_at) {
+                if !placed && !self.attribution.settled(frame.middle()) {
                     return unasked(Ok(None));
                 }
                 self.drive = Driver::Policy { placed: true };
-                let focal_power = self.attribution.focal_power(frame.exposed_at);
+                let focal_power = self.attribution.focal_power(frame.middle());
                 let outcome = self.pilot.ask(&Observation { patch, focal_power }).map(Some);
                 Choice { policy: self.pilot.policy().cloned(), outcome }
             }

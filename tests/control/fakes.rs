@@ -23,7 +23,8 @@ pub fn frame(number: u64, exposed_at: Moment) -> Frame {
 
 pub fn sized_frame(number: u64, exposed_at: Moment, side: usize) -> Frame {
     let picture = RgbImage::new(side, side, vec![90; 3 * side * side]).unwrap();
-    Frame { number, exposed_at, image: FrameImage::Rgb(Arc::new(picture)), truth: None }
+    let image = FrameImage::Rgb(Arc::new(picture));
+    Frame { number, exposed_at, exposure: Duration::ZERO, image, truth: None }
 }
 
 /// What the policy named `scripted` does at each step.

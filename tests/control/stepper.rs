@@ -238,22 +238,39 @@ fn drive_and_segment_change_together_between_two_frames() {
     assert_eq!((record.policy, record.segment, record.asked), (None, None, power(0.2)));
 }
 
-/// The lens takes 17 ms: the first frame after the command was exposed on the way, so the policy is first asked with the
-/// second one, and is told that it was exposed at the start.
+/// From 0.9 to 0.5 the lens needs 2 ms of dead time and 21 ms until it is within 0.006 of its destination: the frames
+/// exposed 0 and 20 ms after the command show it on the way, the one after 40 ms at its start.
 #[test]
 fn a_policy_begins_once_the_lens_is_at_its_start() {
     let lens = FakeLens::at(power(0.9)).slow(Duration::from_millis(2), Duration::from_millis(15));
     let mut bench = Bench::with_lens(PATIENT, lens);
     bench.step();
-    bench.clock.advance(Duration::from_millis(10));
     let start = Drive::Policy { name: PolicyName::new("scripted"), start: Some(power(0.5)) };
     bench.stepper.obey(Command::Drive { drive: start, segment: None });
     assert_eq!(bench.lens.position(), power(0.5), "without waiting for a frame");
-    let (exposed_before, number) = (bench.clock.now(), bench.number + 1);
-    let early = bench.stepper.step(frame(number, exposed_before)).unwrap().record;
-    assert_eq!((early.policy, early.asked, early.held), (None, power(0.5), None));
+    for pace in [Duration::ZERO, FRAME] {
+        let early = bench.step_after(pace);
+        assert_eq!((early.policy, early.asked, early.held), (None, power(0.5), None));
+    }
     assert_eq!(bench.step().asked, power(0.6));
     assert_eq!(bench.script.seen(), [0.5]);
+}
+
+/// Half a step of 0.4 is left after 15 ln 2 / ln 20 = 3.47 ms: a frame whose exposure of 20 ms ended 15.47 ms after the
+/// command (2 ms of which were dead time) has its middle there.
+#[test]
+fn a_long_exposure_is_attributed_to_its_middle() {
+    let lens = FakeLens::at(power(0.5)).slow(Duration::from_millis(2), Duration::from_millis(15));
+    let mut bench = Bench::with_lens(PATIENT, lens);
+    bench.script.set(Deed::GoTo(0.9));
+    bench.stepper.obey(drive("scripted", None));
+    bench.step();
+    bench.clock.advance(Duration::from_micros(15_470));
+    let mut late = frame(2, bench.clock.now());
+    late.exposure = FRAME;
+    bench.stepper.step(late).unwrap();
+    let seen = bench.script.seen();
+    assert!((seen[1] - 0.7).abs() < 1e-3, "{seen:?}");
 }
 
 #[test]

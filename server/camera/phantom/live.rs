@@ -50,7 +50,13 @@ impl Camera for PhantomCamera {
         let optimal = self.phantom.optimal(&pose);
         let exposed_at = self.settings.clock.now();
         self.pace.delivered(exposed_at);
-        Ok(Frame { number, exposed_at, image: FrameImage::Mosaic(image), truth: Some(Truth { optimal, exposed }) })
+        Ok(Frame {
+            number,
+            exposed_at,
+            exposure: exposed_at.since(looked) * 2,
+            image: FrameImage::Mosaic(image),
+            truth: Some(Truth { optimal, exposed }),
+        })
     }
 
     fn health(&self) -> CameraHealth {
