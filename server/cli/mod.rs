@@ -1,5 +1,7 @@
 //! The command line: one file a command; wires the rooms together.
 
+mod announce;
+mod devices;
 mod export;
 mod lens;
 mod policies;

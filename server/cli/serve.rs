@@ -1,5 +1,6 @@
 //! `parfocal serve`: wires camera, lens, loop, trial and pages together and serves them.
 
+use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,19 +8,27 @@ use std::time::Duration;
 
 use clap::Args;
 use getrandom::SysRng;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use tokio::net::TcpListener;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
+use tokio::time::timeout;
+use tracing_subscriber::EnvFilter;
 
 use super::Failure;
+use super::announce::announcement;
+use super::devices;
 use crate::autofocus::Registry;
+use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Library, Parts};
-use crate::http::keys::{Keys, ROLES};
+use crate::control::{ControlLoop, Rig, Settings};
+use crate::http::keys::Keys;
 use crate::http::{self, App};
-use crate::live;
-use crate::store::{self, Store};
+use crate::imaging::{Calibration, Reconstructor};
+use crate::store::{self, Store, telemetry};
+use crate::{lens, live};
 
 /// Arguments of `parfocal serve`.
 #[derive(Debug, Args)]
@@ -37,7 +46,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SPEC", default_value = "simulated")]
     lens: String,
     /// Frames a second to ask of the camera.
-    #[arg(long, value_name = "N", default_value_t = 50)]
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
     /// Seed of everything random, so that a trial can be replayed; without it, a fresh one.
     #[arg(long, value_name = "N")]
@@ -50,8 +59,11 @@ pub struct Arguments {
     calibration: Option<PathBuf>,
 }
 
-/// Open connections get this long to end by themselves.
-const GRACE: Duration = Duration::from_secs(1);
+/// Telemetry that may wait for the disk: a quarter of a minute at 50 frames a second.
+const TELEMETRY_CAPACITY: usize = 750;
+
+/// Open connections get this long to end by themselves, and then the disk as long to take what is left.
+const GRACE: Duration = Duration::from_millis(700);
 
 /// Serves until Ctrl-C or SIGTERM.
 ///
@@ -59,37 +71,42 @@ const GRACE: Duration = Duration::from_secs(1);
 /// When the address is taken, or a folder, camera or lens cannot be used.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     tracing_subscriber::fmt()
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info,sqlx=warn".into()),
-        )
+        .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| "info,sqlx=warn".into()))
+        .with_ansi(std::io::stderr().is_terminal())
         .with_writer(std::io::stderr)
         .init();
     tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(serve(arguments))
 }
 
 async fn serve(arguments: &Arguments) -> Result<(), Failure> {
+    let mut signals = Signals::new()?;
+    // First of all: what cannot be reached need not be set up, and early visitors wait in its queue.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
     let address = listener.local_addr()?;
-    std::fs::create_dir_all(&arguments.data_dir)
-        .map_err(|error| format!("cannot make the data folder {}: {error}", arguments.data_dir.display()))?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let store = open_store(arguments, clock.as_ref()).await?;
     let keys = Keys::load_or_create(&arguments.data_dir)?;
-    let control = standin::control(Arc::clone(&clock), arguments.fps);
+    let mut random = random(arguments)?;
     let registry = Registry::standard();
+    let library = protocols(arguments, &registry)?;
+    let reconstructor = Reconstructor::new(&calibration(arguments)?);
+    let rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), random.random())?;
+    let frame_period = Duration::from_secs(1) / arguments.fps;
+    let (control_loop, control, records) =
+        ControlLoop::spawn(Settings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY }, rig)?;
+    let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
+    tokio::spawn(devices::record(store.clone(), Arc::clone(&clock), control.status.clone()));
+    let (live, imaging) = live::start(control.clone(), reconstructor)?;
     let conductor = Conductor::open(Parts {
-        library: protocols(arguments, &registry)?,
         store: store.clone(),
         control: control.clone(),
+        library,
         registry: registry.clone(),
         clock: Arc::clone(&clock),
-        random: arguments
-            .seed
-            .map_or_else(|| ChaCha12Rng::try_from_rng(&mut SysRng), |seed| Ok(ChaCha12Rng::seed_from_u64(seed)))?,
+        random,
     })
     .await?;
     let conducting = tokio::spawn(conductor.clone().run());
-    let (live, imaging) = live::start(control.clone())?;
     let (end, shutdown) = watch::channel(false);
     let app = Arc::new(App {
         clock,
@@ -104,20 +121,15 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         shutdown,
         control: control.clone(),
     });
-    for role in ROLES {
-        println!("{:<11} http://{address}/enter?key={}", http::error::role_name(role), keys.of(role));
-    }
-    let mut server = tokio::spawn(http::run(listener, app));
-    tokio::select! {
-        ended = &mut server => return Ok(ended??),
-        () = asked_to_end() => {}
-    }
+    let server = tokio::spawn(http::run(listener, app));
+    print!("{}", announcement(address, &keys, &control.status.borrow()));
+    signals.any().await;
+    tracing::info!("ending");
     let _ = end.send(true);
-    let _ = tokio::time::timeout(GRACE, async { (server.await, end.closed().await) }).await;
-    control.frames.close();
-    let _ = imaging.join();
+    let _ = timeout(GRACE, async { (server.await, end.closed().await) }).await;
     conducting.abort();
-    store.close().await;
+    tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join())).await?.1.ok();
+    let _ = timeout(GRACE, async { (writer.await, store.close().await) }).await;
     Ok(())
 }
 
@@ -132,12 +144,41 @@ async fn open_store(arguments: &Arguments, clock: &dyn Clock) -> Result<Store, F
     Ok(Store::open(&arguments.data_dir, &run).await?)
 }
 
+fn random(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
+    Ok(match arguments.seed {
+        Some(seed) => ChaCha12Rng::seed_from_u64(seed),
+        None => ChaCha12Rng::try_from_rng(&mut SysRng)?,
+    })
+}
+
 /// The shipped protocols and those of the folder asked for, or of `trial-protocols` where there is one.
 fn protocols(arguments: &Arguments, registry: &Registry) -> Result<Library, Failure> {
     let beside = Path::new("trial-protocols");
     let folder = arguments.protocols.as_deref().or_else(|| beside.is_dir().then_some(beside));
     let known: Vec<_> = registry.entries().into_iter().map(|entry| entry.name).collect();
     Ok(Library::load(folder, &known)?)
+}
+
+/// The calibration file's, or a typical sensor's.
+fn calibration(arguments: &Arguments) -> Result<Calibration, Failure> {
+    let Some(path) = &arguments.calibration else { return Ok(Calibration::default()) };
+    let text = std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    Ok(Calibration::from_toml(&text).map_err(|error| format!("{}: {error}", path.display()))?)
+}
+
+/// Opens lens and camera.
+fn rig(
+    arguments: &Arguments,
+    clock: &Arc<dyn Clock>,
+    reconstructor: Reconstructor,
+    registry: Registry,
+    seed: u64,
+) -> Result<Rig, Failure> {
+    let clock = Arc::clone(clock);
+    let lens = lens::open(&arguments.lens, Arc::clone(&clock))?;
+    let settings = CameraSettings { fps: arguments.fps.into(), seed, optics: lens.optics(), clock: Arc::clone(&clock) };
+    let camera = camera::open(&arguments.camera, settings)?;
+    Ok(Rig { camera, lens, reconstructor, registry, clock })
 }
 
 fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
@@ -150,99 +191,21 @@ fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
     }
 }
 
-async fn asked_to_end() {
-    let terminated = async {
-        match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
-            Ok(mut signal) => {
-                signal.recv().await;
-            }
-            Err(_) => std::future::pending().await,
-        }
-    };
-    tokio::select! {
-        _ = tokio::signal::ctrl_c() => {}
-        () = terminated => {}
-    }
+/// Ctrl-C, or the end that a service manager asks for. Made before anything is announced, so that no signal is missed.
+struct Signals {
+    interrupt: Signal,
+    terminate: Signal,
 }
 
-/// Moving bars in place of camera and loop.
-mod standin {
-    use super::{Arc, Clock, Duration};
-    use crate::camera::{CameraHealth, Frame, FrameImage};
-    use crate::control::{ControlHandle, ControlStatus, ControlledFrame, LatestSlot, StepRecord};
-    use crate::imaging::{ContentArea, PatchArea, RgbImage};
-    use crate::lens::{FocalPower, LensHealth};
-
-    pub fn control(clock: Arc<dyn Clock>, fps: u32) -> ControlHandle {
-        let status = ControlStatus {
-            camera: CameraHealth {
-                name: "test bars (simulated)".into(),
-                simulated: true,
-                working: true,
-                message: "no camera is open".into(),
-                fps: f64::from(fps),
-                lost: 0,
-            },
-            lens: LensHealth {
-                name: "no lens".into(),
-                simulated: true,
-                working: true,
-                message: "no lens is open".into(),
-            },
-            policy: None,
-            focal_power: FocalPower::MIDDLE,
-            held: None,
-            message: None,
-            steps_per_second: f64::from(fps),
-            steps: 0,
-            telemetry_dropped: 0,
-            latency_p50_micros: 0,
-            latency_p99_micros: 0,
-        };
-        let (commands, _) = tokio::sync::mpsc::unbounded_channel();
-        let (sender, status) = tokio::sync::watch::channel(Arc::new(status));
-        let frames = Arc::new(LatestSlot::default());
-        let slot = Arc::clone(&frames);
-        std::thread::spawn(move || {
-            let _sender = sender;
-            for number in 1.. {
-                std::thread::sleep(Duration::from_secs(1) / fps);
-                slot.put(frame(number, clock.as_ref()));
-            }
-        });
-        ControlHandle { commands, status, frames }
+impl Signals {
+    fn new() -> std::io::Result<Self> {
+        Ok(Self { interrupt: signal(SignalKind::interrupt())?, terminate: signal(SignalKind::terminate())? })
     }
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "a test picture")]
-    fn frame(number: u64, clock: &dyn Clock) -> ControlledFrame {
-        let (width, height) = (512, 272);
-        let data = (0..width * height)
-            .flat_map(|index| {
-                let bar = ((index % width) as u64 + number * 2) as u8;
-                [bar, (index / width) as u8, bar.wrapping_mul(3)]
-            })
-            .collect();
-        let wave = (number as f64 / 50.0).sin() / 2.0 + 0.5;
-        let image = FrameImage::Rgb(Arc::new(RgbImage { width, height, data }));
-        let exposed_at = clock.now();
-        ControlledFrame {
-            frame: Frame { number, exposed_at, exposure: Duration::ZERO, image, truth: None },
-            patch: PatchArea { x: 240, y: 120, width: 32, height: 32 },
-            content_area: Some(ContentArea { x: 256.0, y: 136.0, radius: 150.0, confidence: 0.5 }),
-            record: StepRecord {
-                frame: number,
-                exposed_at,
-                segment: None,
-                policy: None,
-                asked: FocalPower::nearest(wave),
-                measured: Some(FocalPower::nearest(wave)),
-                metric: Some(wave * 10.0),
-                policy_micros: 0,
-                latency_micros: 0,
-                held: None,
-                optimal: None,
-            },
-            belief: None,
+    async fn any(&mut self) {
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
         }
     }
 }

@@ -27,6 +27,7 @@ macro_rules! assets {
 /// Every file of `web/static/`, by name.
 static ASSETS: &[Asset] = &assets![
     "api.js",
+    "canvas.js",
     "change.js",
     "compose.js",
     "devices.js",
@@ -45,7 +46,9 @@ static ASSETS: &[Asset] = &assets![
     "surgeon.css",
     "surgeon.js",
     "timeline.js",
-    "viewer.js"
+    "traces.js",
+    "viewer.css",
+    "viewer.js",
 ];
 
 /// Hash of all files, in hexadecimal.
@@ -99,4 +102,19 @@ fn content_type(name: &str) -> &'static str {
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(asset))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_of_the_folder_is_part_of_the_program() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/web/static");
+        for file in std::fs::read_dir(folder).unwrap() {
+            let name = file.unwrap().file_name().into_string().unwrap();
+            assert!(ASSETS.iter().any(|asset| asset.name == name), "{name} is missing from the table");
+            assert_ne!(content_type(&name), "application/octet-stream", "{name}");
+        }
+    }
 }

@@ -28,6 +28,8 @@ pub(super) struct SurgeonFrame {
     width: usize,
     /// Height in pixels.
     height: usize,
+    /// Whether the colours are estimated from bands that hold no red.
+    estimated: bool,
     /// Where the focus is looked for.
     #[schema(value_type = Object)]
     patch: PatchArea,
@@ -51,6 +53,7 @@ impl SurgeonFrame {
             age,
             width: picture.width,
             height: picture.height,
+            estimated: picture.estimated,
             patch: picture.patch,
             area: picture.content_area.map(|area| Circle { x: area.x, y: area.y, radius: area.radius }),
         }
@@ -71,7 +74,6 @@ pub(super) struct SurgeonStatus {
 impl SurgeonStatus {
     fn new(status: &ControlStatus) -> Self {
         let notice = match status.held {
-            _ if !status.camera.working => Some("The camera is not delivering pictures."),
             Some(Hold::CameraFailed) => Some("The camera is not delivering pictures."),
             Some(Hold::Paused) | None => None,
             Some(_) => Some("The focus is being held for the moment."),

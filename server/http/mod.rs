@@ -1,6 +1,7 @@
 //! HTTP: routes, pages, streams, roles. Holds no trial rule.
 
 pub mod assets;
+mod connections;
 pub mod error;
 mod health;
 pub mod keys;
@@ -20,12 +21,10 @@ mod surgeon;
 pub use metrics::Metrics;
 pub use state::{App, AppState};
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::http::StatusCode;
-use axum::serve::ListenerExt;
 use axum::{Extension, Router, middleware};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
@@ -80,17 +79,9 @@ fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
 }
 
 /// Serves `app` on `listener` until `app.shutdown` turns true and what is under way is answered.
-///
-/// # Errors
-/// When the listener fails.
-pub async fn run(listener: TcpListener, app: AppState) -> std::io::Result<()> {
-    let mut shutdown = app.shutdown.clone();
-    let listener = listener.tap_io(|stream| {
-        // A frame is of use now or never: it does not wait for more to fill a packet.
-        let _ = stream.set_nodelay(true);
-    });
-    let service = router(app).into_make_service_with_connect_info::<SocketAddr>();
-    axum::serve(listener, service).with_graceful_shutdown(async move { ended(&mut shutdown).await }).await
+pub async fn run(listener: TcpListener, app: AppState) {
+    let shutdown = app.shutdown.clone();
+    connections::serve(listener, router(app), shutdown).await;
 }
 
 /// Waits until the server is to end.

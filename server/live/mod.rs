@@ -1,6 +1,7 @@
 //! Live: the imaging thread. Each frame is made once into what every viewer gets; a viewer who is slow misses frames and
 //! holds up nobody.
 
+mod area;
 mod picture;
 mod thread;
 

@@ -22,6 +22,8 @@ pub struct Picture {
     pub height: usize,
     /// The colour picture as JPEG.
     pub jpeg: Bytes,
+    /// Whether its colours are estimated from bands that hold no red.
+    pub estimated: bool,
     /// Where the patch was taken.
     pub patch: PatchArea,
     /// The content area in use when it was.

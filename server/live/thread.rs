@@ -1,5 +1,6 @@
-//! The imaging thread: takes the loop's latest frame, finds the content area for the loop, and makes the picture.
+//! The imaging thread: takes the loop's latest frame, makes the picture, and looks for the content area.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
@@ -8,65 +9,140 @@ use std::time::Duration;
 use bytes::Bytes;
 use tokio::sync::watch;
 
+use super::area::AreaWatch;
 use super::{Counts, EncodedFrame, Insight, LiveHandle, Picture};
 use crate::camera::FrameImage;
-use crate::control::{ControlHandle, ControlledFrame};
-use crate::imaging::RgbImage;
+use crate::control::{Command, ControlHandle, ControlledFrame};
+use crate::imaging::{GrayImage, JpegEncoder, JpegError, Reconstructor, RgbImage, content_area, rgb_to_gray};
+
+/// The content area is looked for in every so many frames: it moves as slowly as a hand lets an eyepiece slip.
+const DETECT_EVERY: u64 = 10;
+
+/// Longest wait for a frame before it is asked whether there will be any.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Starts the thread; it ends when the loop closes its slot.
 ///
 /// # Errors
-/// When the system cannot make a thread.
-pub fn start(control: ControlHandle) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
+/// When the system cannot make a thread or an encoder.
+pub fn start(control: ControlHandle, reconstructor: Reconstructor) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
     let (sender, frames) = watch::channel(None);
     let counts = Arc::new(Counts::default());
     let handle = LiveHandle { frames, counts: Arc::clone(&counts) };
-    let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || run(&control, &sender, &counts))?;
+    let studio = Studio::new(reconstructor).map_err(std::io::Error::other)?;
+    let worker = Worker { control, sender, counts, studio, areas: AreaWatch::default() };
+    let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || worker.run())?;
     Ok((handle, thread))
 }
 
-fn run(control: &ControlHandle, sender: &watch::Sender<Option<Arc<EncodedFrame>>>, counts: &Counts) {
-    while !control.frames.is_closed() {
-        let Some(controlled) = control.frames.take(Duration::from_millis(500)) else { continue };
-        if counts.viewers() == 0 {
-            continue;
+struct Worker {
+    control: ControlHandle,
+    sender: watch::Sender<Option<Arc<EncodedFrame>>>,
+    counts: Arc<Counts>,
+    studio: Studio,
+    areas: AreaWatch,
+}
+
+impl Worker {
+    fn run(mut self) {
+        while !self.control.frames.is_closed() {
+            let Some(frame) = self.control.frames.take(PATIENCE) else { continue };
+            // One bad picture must not end the live view.
+            if catch_unwind(AssertUnwindSafe(|| self.turn(frame))).is_err() {
+                tracing::error!("a picture could not be made; going on with the next");
+            }
         }
-        if let Some(encoded) = encode(controlled) {
-            counts.encoded.fetch_add(1, Ordering::Relaxed);
-            counts.jpeg_bytes.fetch_add(encoded.picture.jpeg.len() as u64, Ordering::Relaxed);
-            sender.send_replace(Some(Arc::new(encoded)));
+    }
+
+    fn turn(&mut self, frame: ControlledFrame) {
+        let watched = self.counts.viewers() > 0;
+        let detect = frame.frame.number.is_multiple_of(DETECT_EVERY);
+        if !watched && !detect {
+            return;
         }
+        let image = frame.frame.image.clone();
+        self.studio.develop(&image);
+        if watched {
+            match self.studio.encode(&image) {
+                Ok(jpeg) => self.publish(frame, &image, jpeg),
+                Err(error) => tracing::error!(%error, "a picture could not be encoded"),
+            }
+        }
+        // After the picture has left: nobody waits for this.
+        if detect && let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {
+            self.control.send(Command::ContentArea(news));
+        }
+    }
+
+    fn publish(&self, controlled: ControlledFrame, image: &FrameImage, jpeg: Bytes) {
+        self.counts.encoded.fetch_add(1, Ordering::Relaxed);
+        self.counts.jpeg_bytes.fetch_add(jpeg.len() as u64, Ordering::Relaxed);
+        let (width, height) = size(image);
+        let ControlledFrame { frame, patch, content_area, record, belief } = controlled;
+        self.sender.send_replace(Some(Arc::new(EncodedFrame {
+            picture: Picture {
+                number: frame.number,
+                exposed_at: frame.exposed_at,
+                width,
+                height,
+                jpeg,
+                estimated: matches!(image, FrameImage::Mosaic(_)),
+                patch,
+                content_area,
+            },
+            insight: Insight {
+                asked: record.asked,
+                measured: record.measured,
+                metric: record.metric,
+                held: record.held,
+                belief,
+            },
+        })));
     }
 }
 
-fn encode(controlled: ControlledFrame) -> Option<EncodedFrame> {
-    let FrameImage::Rgb(rgb) = &controlled.frame.image else { return None };
-    let jpeg = jpeg(rgb)?;
-    let record = controlled.record;
-    Some(EncodedFrame {
-        picture: Picture {
-            number: controlled.frame.number,
-            exposed_at: controlled.frame.exposed_at,
-            width: rgb.width,
-            height: rgb.height,
-            jpeg,
-            patch: controlled.patch,
-            content_area: controlled.content_area,
-        },
-        insight: Insight {
-            asked: record.asked,
-            measured: record.measured,
-            metric: record.metric,
-            held: record.held,
-            belief: controlled.belief,
-        },
-    })
+/// Size of the picture that is made of `image`.
+fn size(image: &FrameImage) -> (usize, usize) {
+    match image {
+        FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
+        FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
+    }
 }
 
-fn jpeg(rgb: &RgbImage) -> Option<Bytes> {
-    let mut bytes = Vec::new();
-    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 80);
-    let (width, height) = (u32::try_from(rgb.width).ok()?, u32::try_from(rgb.height).ok()?);
-    image::ImageEncoder::write_image(encoder, &rgb.data, width, height, image::ExtendedColorType::Rgb8).ok()?;
-    Some(bytes.into())
+/// Makes pictures, in memory that is used again for each.
+struct Studio {
+    reconstructor: Reconstructor,
+    encoder: JpegEncoder,
+    rgb: RgbImage,
+    gray: GrayImage,
+}
+
+impl Studio {
+    fn new(reconstructor: Reconstructor) -> Result<Self, JpegError> {
+        let encoder = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY)?;
+        Ok(Self { reconstructor, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
+    }
+
+    /// Makes colour and gray of a mosaic; a colour picture is as it is.
+    fn develop(&mut self, image: &FrameImage) {
+        if let FrameImage::Mosaic(mosaic) = image {
+            self.reconstructor.reconstruct(mosaic, &mut self.rgb, &mut self.gray);
+        }
+    }
+
+    /// JPEG of `image`, which was developed last.
+    fn encode(&mut self, image: &FrameImage) -> Result<Bytes, JpegError> {
+        match image {
+            FrameImage::Mosaic(_) => self.encoder.encode(&self.rgb),
+            FrameImage::Rgb(rgb) => self.encoder.encode(rgb),
+        }
+    }
+
+    /// Gray picture of `image`, which was developed last.
+    fn gray(&mut self, image: &FrameImage) -> &GrayImage {
+        if let FrameImage::Rgb(rgb) = image {
+            rgb_to_gray(rgb, &mut self.gray);
+        }
+        &self.gray
+    }
 }

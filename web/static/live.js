@@ -1,8 +1,8 @@
-// The live connection: one WebSocket a page, for pictures and state. Reconnects by itself.
+// The live connection: one WebSocket a page, for pictures and state. It reconnects by itself.
 //
-// Events (all CustomEvents):
-//   "frame"       { header, bitmap, receivedAt }   a decoded picture; whoever listens draws it at once
-//   "session"     view or null
+// Events, all CustomEvents; `detail` is:
+//   "frame"       { header, bitmap, receivedAt }: a decoded picture, to be drawn before the handler returns
+//   "session"     the session's view, or null
 //   "status"      the devices' state
 //   "connection"  { open }
 
@@ -10,17 +10,21 @@ const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
 
 export class Live extends EventTarget {
+  #role;
   #socket = null;
   #wait = FIRST_WAIT_MS;
   #decoder = new TextDecoder();
-  #role;
 
+  /** @param {"surgeon"|"operator"|"researcher"} role */
   constructor(role) {
     super();
     this.#role = role;
     document.addEventListener("visibilitychange", () => this.#tellVisibility());
+    // A network that came back, or a page brought back from the browser's cache, need not wait for its turn.
     window.addEventListener("online", () => this.#connect());
-    this.#connect();
+    window.addEventListener("pageshow", () => this.#connect());
+    // Listeners are added after construction; they are to miss nothing.
+    queueMicrotask(() => this.#connect());
   }
 
   #connect() {
@@ -33,21 +37,27 @@ export class Live extends EventTarget {
       this.#tellVisibility();
       this.#emit("connection", { open: true });
     };
-    socket.onmessage = ({ data }) => (typeof data === "string" ? this.#hear(JSON.parse(data)) : this.#show(socket, data));
-    socket.onclose = () => {
-      this.#emit("connection", { open: false });
-      // Some randomness, so that all the pages of a restarted server do not come at the same moment.
-      setTimeout(() => this.#connect(), this.#wait * (0.75 + Math.random() / 2));
-      this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
+    socket.onmessage = ({ data }) => {
+      if (typeof data === "string") this.#hear(JSON.parse(data));
+      else this.#show(socket, data);
     };
+    socket.onclose = () => this.#lost(socket);
     this.#socket = socket;
   }
 
-  #hear(message) {
-    const { type, ...rest } = message;
+  #lost(socket) {
+    if (socket !== this.#socket) return;
+    this.#emit("connection", { open: false });
+    // Some randomness, so that the pages of a restarted server do not all come at one moment.
+    setTimeout(() => this.#connect(), this.#wait * (0.75 + Math.random() / 2));
+    this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
+  }
+
+  #hear({ type, ...rest }) {
     this.#emit(type, type === "session" ? rest.view : rest);
   }
 
+  /** A frame's message: length of the header (u16, little-endian), header (JSON), JPEG. */
   async #show(socket, data) {
     const receivedAt = performance.now();
     const length = new DataView(data).getUint16(0, true);
@@ -56,10 +66,11 @@ export class Live extends EventTarget {
       const bitmap = await createImageBitmap(new Blob([new Uint8Array(data, 2 + length)], { type: "image/jpeg" }));
       this.#emit("frame", { header, bitmap, receivedAt });
       bitmap.close();
-    } finally {
-      // Also after a picture that cannot be decoded: the next one may be.
-      this.#send(socket, { type: "drawn", frame: header.frame });
+    } catch (error) {
+      console.warn("a picture could not be decoded", error);
     }
+    // Only now is the next one wanted; also after a picture that was no good, for the next may be.
+    this.#send(socket, { type: "drawn", frame: header.frame });
   }
 
   #tellVisibility() {

@@ -1,0 +1,63 @@
+//! What `serve` says when it is ready: where each role finds its page, a code for the tablet to scan, and, loudly, what
+//! is simulated.
+
+use std::fmt::Write;
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+
+use qrcode::QrCode;
+use qrcode::render::unicode::Dense1x2;
+
+use crate::control::ControlStatus;
+use crate::http::error::role_name;
+use crate::http::keys::{Keys, ROLES};
+use crate::trial::view::Role;
+
+/// The announcement for people at the terminal.
+pub fn announcement(listening: SocketAddr, keys: &Keys, status: &ControlStatus) -> String {
+    let host = SocketAddr::new(reachable(listening.ip()), listening.port());
+    let link = |role| format!("http://{host}/enter?key={}", keys.of(role));
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ =
+        writeln!(text, "parfocal {} with {} and {}", env!("CARGO_PKG_VERSION"), status.camera.name, status.lens.name);
+    if let Some(warning) = simulated(status) {
+        let _ = writeln!(text, "\n*** {warning} ***");
+    }
+    text.push('\n');
+    for role in ROLES {
+        let _ = writeln!(text, "{:>10}  {}", role_name(role), link(role));
+    }
+    if let Ok(code) = QrCode::new(link(Role::Surgeon)) {
+        let _ = writeln!(text, "\nThe surgeon's tablet can scan this:\n{}", code.render::<Dense1x2>().build());
+    }
+    let advice = if listening.ip().is_loopback() {
+        "Only this machine can reach it. For a tablet, start with --bind 0.0.0.0:8080 on a network you trust."
+    } else {
+        "Whoever has a link has its role: give each to its person only. The connection is not encrypted."
+    };
+    let _ = writeln!(text, "{advice}\nCtrl-C ends it.");
+    text
+}
+
+fn simulated(status: &ControlStatus) -> Option<String> {
+    let what = match (status.camera.simulated, status.lens.simulated) {
+        (true, true) => "CAMERA AND LENS ARE",
+        (true, false) => "THE CAMERA IS",
+        (false, true) => "THE LENS IS",
+        (false, false) => return None,
+    };
+    Some(format!("{what} SIMULATED: this is no real instrument"))
+}
+
+/// An address that others can open: for "every address", the one that this machine would talk to the world from.
+fn reachable(address: IpAddr) -> IpAddr {
+    if address.is_unspecified() { outward().unwrap_or(address) } else { address }
+}
+
+/// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The address
+/// asked for is one set aside for documentation (RFC 5737).
+fn outward() -> Option<IpAddr> {
+    let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
+    socket.connect("192.0.2.1:9").ok()?;
+    socket.local_addr().ok().map(|address| address.ip())
+}

@@ -1,0 +1,220 @@
+//! The live stream: paced by its viewers, silent for hidden pages, and for surgeons without a trace of the policy.
+
+use futures_util::{SinkExt, StreamExt};
+use serde_json::{Value, json};
+use tokio::net::TcpStream;
+use tokio_tungstenite::tungstenite::client::IntoClientRequest;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
+use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async, tungstenite};
+use tungstenite::Message;
+
+use crate::support::Server;
+
+/// A page's end of the stream.
+struct Page {
+    socket: WebSocketStream<MaybeTlsStream<TcpStream>>,
+    /// State messages so far.
+    told: Vec<Value>,
+}
+
+/// A frame as a page gets it.
+struct Frame {
+    header: Value,
+    jpeg: Vec<u8>,
+}
+
+impl Frame {
+    fn number(&self) -> u64 {
+        self.header["frame"].as_u64().unwrap()
+    }
+
+    fn fields(&self) -> Vec<&str> {
+        let mut fields: Vec<_> = self.header.as_object().unwrap().keys().map(String::as_str).collect();
+        fields.sort_unstable();
+        fields
+    }
+}
+
+impl Page {
+    async fn open(server: &Server, role: &str) -> Self {
+        let address = format!("ws://{}/live?role={role}", server.address);
+        let mut request = address.into_client_request().unwrap();
+        let bearer = format!("Bearer {}", server.key(role)).parse().unwrap();
+        request.headers_mut().insert("authorization", bearer);
+        Self { socket: connect_async(request).await.unwrap().0, told: Vec::new() }
+    }
+
+    async fn say(&mut self, message: Value) {
+        self.socket.send(Message::text(message.to_string())).await.unwrap();
+    }
+
+    /// The next frame, waiting for it.
+    async fn frame(&mut self) -> Frame {
+        loop {
+            match self.socket.next().await.unwrap().unwrap() {
+                Message::Binary(message) => return unpack(&message),
+                Message::Text(text) => self.told.push(serde_json::from_str(&text).unwrap()),
+                _ => {}
+            }
+        }
+    }
+
+    async fn drawn(&mut self, frame: &Frame) {
+        self.say(json!({"type": "drawn", "frame": frame.number()})).await;
+    }
+
+    /// Frames that the server has sent by the time that it answers this.
+    async fn sent_so_far(&mut self) -> usize {
+        self.socket.send(Message::Ping("so far".into())).await.unwrap();
+        let mut frames = 0;
+        loop {
+            match self.socket.next().await.unwrap().unwrap() {
+                Message::Binary(_) => frames += 1,
+                Message::Text(text) => self.told.push(serde_json::from_str(&text).unwrap()),
+                Message::Pong(payload) if payload == "so far" => return frames,
+                _ => {}
+            }
+        }
+    }
+
+    /// Draws `count` frames.
+    async fn watch(&mut self, count: usize) {
+        for _ in 0..count {
+            let frame = self.frame().await;
+            self.drawn(&frame).await;
+        }
+    }
+}
+
+/// Header length (u16, little-endian), header, JPEG.
+fn unpack(message: &[u8]) -> Frame {
+    let length = usize::from(u16::from_le_bytes([message[0], message[1]]));
+    let header = serde_json::from_slice(&message[2..2 + length]).unwrap();
+    Frame { header, jpeg: message[2 + length..].to_vec() }
+}
+
+#[tokio::test]
+async fn frames_are_whole_pictures_with_their_metadata() {
+    let server = Server::start();
+    let mut page = Page::open(&server, "surgeon").await;
+    let frame = page.frame().await;
+    let picture = image::load_from_memory_with_format(&frame.jpeg, image::ImageFormat::Jpeg).unwrap();
+    assert_eq!(json!(picture.width()), frame.header["width"]);
+    assert_eq!(json!(picture.height()), frame.header["height"]);
+    assert_eq!(frame.header["patch"]["width"], 32);
+    assert!(frame.header["age"].as_f64().unwrap() >= 0.0);
+}
+
+#[tokio::test]
+async fn who_does_not_answer_gets_no_second_frame_and_then_the_latest() {
+    let server = Server::start();
+    let mut slow = Page::open(&server, "operator").await;
+    let mut quick = Page::open(&server, "operator").await;
+    let first = slow.frame().await;
+    quick.watch(8).await;
+    assert_eq!(slow.sent_so_far().await, 0);
+    slow.say(json!({"type": "drawn", "frame": first.number() + 1})).await;
+    quick.watch(2).await;
+    assert_eq!(slow.sent_so_far().await, 0, "another frame's number is no answer");
+    slow.drawn(&first).await;
+    let second = slow.frame().await;
+    assert!(second.number() >= first.number() + 8, "the latest, not the next");
+    quick.watch(4).await;
+    assert_eq!(slow.sent_so_far().await, 0);
+}
+
+#[tokio::test]
+async fn a_hidden_page_gets_nothing_until_it_is_seen_again() {
+    let server = Server::start();
+    let mut hidden = Page::open(&server, "surgeon").await;
+    let mut other = Page::open(&server, "surgeon").await;
+    let frame = hidden.frame().await;
+    hidden.say(json!({"type": "visible", "visible": false})).await;
+    hidden.drawn(&frame).await;
+    assert_eq!(hidden.sent_so_far().await, 0);
+    other.watch(5).await;
+    assert_eq!(hidden.sent_so_far().await, 0);
+    hidden.say(json!({"type": "visible", "visible": true})).await;
+    assert!(hidden.frame().await.number() > frame.number());
+}
+
+#[tokio::test]
+async fn surgeons_get_no_field_that_could_tell_a_policy() {
+    let server = Server::start();
+    let mut surgeon = Page::open(&server, "surgeon").await;
+    let frame = surgeon.frame().await;
+    assert_eq!(frame.fields(), ["age", "area", "estimated", "frame", "height", "patch", "width"]);
+    surgeon.sent_so_far().await;
+    let status = surgeon.told.iter().find(|told| told["type"] == "status").expect("a status");
+    let mut fields: Vec<_> = status.as_object().unwrap().keys().collect();
+    fields.sort_unstable();
+    assert_eq!(fields, ["camera_simulated", "lens_simulated", "notice", "type"]);
+    assert!(surgeon.told.contains(&json!({"type": "session", "view": null})));
+
+    let mut operator = Page::open(&server, "operator").await;
+    let frame = operator.frame().await;
+    for field in ["asked", "measured", "metric", "held", "belief"] {
+        assert!(frame.fields().contains(&field), "{field}");
+    }
+}
+
+#[tokio::test]
+async fn a_role_that_is_not_held_is_not_served() {
+    let server = Server::with(&["--bind", "0.0.0.0:0"]);
+    let mut request = format!("ws://{}/live?role=operator", server.address).into_client_request().unwrap();
+    let bearer = format!("Bearer {}", server.key("surgeon")).parse().unwrap();
+    request.headers_mut().insert("authorization", bearer);
+    let error = connect_async(request).await.expect_err("a surgeon is no operator");
+    assert!(matches!(error, tungstenite::Error::Http(response) if response.status() == 403));
+}
+
+#[tokio::test]
+async fn nonsense_closes_the_connection_with_a_reason() {
+    let server = Server::start();
+    let mut page = Page::open(&server, "operator").await;
+    page.socket.send(Message::text("{\"type\":\"drawn\"}")).await.unwrap();
+    let code = loop {
+        match page.socket.next().await.unwrap().unwrap() {
+            Message::Close(Some(frame)) => break frame.code,
+            Message::Close(None) => panic!("no reason"),
+            _ => {}
+        }
+    };
+    assert_eq!(code, CloseCode::Policy);
+}
+
+#[tokio::test]
+async fn pages_are_told_when_the_server_ends() {
+    let mut server = Server::start();
+    let mut page = Page::open(&server, "surgeon").await;
+    page.frame().await;
+    assert!(server.end(rustix::process::Signal::TERM));
+    let code = loop {
+        match page.socket.next().await.unwrap() {
+            Ok(Message::Close(Some(frame))) => break frame.code,
+            Ok(_) => {}
+            Err(error) => panic!("cut off: {error}"),
+        }
+    };
+    assert_eq!(code, CloseCode::Away);
+}
+
+#[tokio::test]
+async fn motion_jpeg_sends_the_next_parts_headers_at_once() {
+    const PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
+    let server = Server::start();
+    let mut response = server.get("/stream.mjpeg").send().await.unwrap();
+    assert_eq!(response.headers()["content-type"], "multipart/x-mixed-replace; boundary=parfocal-frame");
+    let mut stream = Vec::new();
+    let mut complete = 0;
+    while complete < 3 {
+        stream.extend_from_slice(&response.chunk().await.unwrap().expect("no end"));
+        // The headers of a part not yet begun are here: the part before is complete without a byte of the next.
+        complete += usize::from(stream.ends_with(PART) && stream.len() > PART.len());
+    }
+    assert!(stream.starts_with(PART));
+    let end = stream.windows(PART.len()).skip(1).position(|window| window == PART).unwrap() + 1;
+    let first = &stream[PART.len()..end - 2];
+    assert_eq!(&stream[end - 2..end], b"\r\n");
+    image::load_from_memory_with_format(first, image::ImageFormat::Jpeg).unwrap();
+}

@@ -1,0 +1,173 @@
+//! Roles: each opens its own and no other, links turn into cookies, other sites get nothing.
+
+use reqwest::header::{COOKIE, HOST, LOCATION, ORIGIN, SET_COOKIE};
+use reqwest::{Method, Response, StatusCode};
+use serde_json::Value;
+
+use crate::support::{Server, client};
+
+const ROLES: [&str; 3] = ["surgeon", "operator", "researcher"];
+
+/// What anyone may ask for.
+const OPEN: [&str; 3] = ["/healthz", "/enter", "/static/{version}/{name}"];
+
+/// A server that others can reach, so that nobody is let in without a key.
+fn open_server() -> Server {
+    Server::with(&["--bind", "0.0.0.0:0"])
+}
+
+async fn enter(server: &Server, key: &str) -> Response {
+    server.get(&format!("/enter?key={key}")).send().await.unwrap()
+}
+
+/// The cookie of `role`, as a browser sends it back.
+async fn cookie(server: &Server, role: &str) -> String {
+    let response = enter(server, server.key(role)).await;
+    let cookie = response.headers()[SET_COOKIE].to_str().unwrap();
+    cookie.split(';').next().unwrap().to_owned()
+}
+
+/// Every endpoint: path, method, first tag.
+async fn endpoints(server: &Server) -> Vec<(String, Method, String)> {
+    let request = server.get("/api/openapi.json").bearer_auth(server.key("operator"));
+    let document: Value = request.send().await.unwrap().json().await.unwrap();
+    let mut found = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            let method = method.to_uppercase().parse().unwrap();
+            found.push((path.clone(), method, operation["tags"][0].as_str().unwrap_or_default().to_owned()));
+        }
+    }
+    found
+}
+
+async fn ask(server: &Server, path: &str, method: Method, cookie: &str) -> StatusCode {
+    // Any name will do: who may not ask is told so before it is looked for.
+    let path = path.split('/').map(|part| if part.starts_with('{') { "nothing" } else { part }).collect::<Vec<_>>();
+    let request = client().request(method, server.url(&path.join("/"))).header(COOKIE, cookie);
+    request.send().await.unwrap().status()
+}
+
+#[tokio::test]
+async fn nothing_but_the_door_is_open_without_a_key() {
+    let server = open_server();
+    let endpoints = endpoints(&server).await;
+    assert!(endpoints.len() > 8, "{endpoints:?}");
+    for (path, method, _) in endpoints.iter().filter(|(path, ..)| !OPEN.contains(&path.as_str())) {
+        assert_eq!(ask(&server, path, method.clone(), "").await, StatusCode::FORBIDDEN, "{method} {path}");
+        let forged = "parfocal-surgeon=0; parfocal-operator=; parfocal-researcher=x";
+        assert_eq!(ask(&server, path, method.clone(), forged).await, StatusCode::FORBIDDEN, "{method} {path}");
+    }
+    for path in ["/healthz"] {
+        assert_eq!(ask(&server, path, Method::GET, "").await, StatusCode::OK);
+    }
+}
+
+#[tokio::test]
+async fn each_role_opens_its_own_endpoints_and_no_others() {
+    let server = open_server();
+    let endpoints = endpoints(&server).await;
+    for role in ROLES {
+        let cookie = cookie(&server, role).await;
+        for (path, method, tag) in endpoints.iter().filter(|(.., tag)| ROLES.contains(&tag.as_str())) {
+            let status = ask(&server, path, method.clone(), &cookie).await;
+            assert_eq!(status != StatusCode::FORBIDDEN, tag == role, "{role}: {method} {path} gave {status}");
+        }
+        let metrics = ask(&server, "/metrics", Method::GET, &cookie).await;
+        assert_eq!(metrics == StatusCode::OK, role != "surgeon");
+    }
+}
+
+#[tokio::test]
+async fn a_cookie_is_no_key_and_a_key_no_cookie() {
+    let server = open_server();
+    let cookie = cookie(&server, "operator").await;
+    let token = cookie.split('=').nth(1).unwrap();
+    assert_eq!(enter(&server, token).await.status(), StatusCode::FORBIDDEN);
+    let forged = format!("parfocal-operator={}", server.key("operator"));
+    assert_eq!(ask(&server, "/operator", Method::GET, &forged).await, StatusCode::FORBIDDEN);
+    let renamed = cookie.replace("operator", "researcher");
+    assert_eq!(ask(&server, "/researcher", Method::GET, &renamed).await, StatusCode::FORBIDDEN);
+}
+
+#[tokio::test]
+async fn a_link_becomes_a_strict_cookie_and_leaves_the_address() {
+    let server = open_server();
+    for role in ROLES {
+        let response = enter(&server, server.key(role)).await;
+        assert_eq!(response.status(), StatusCode::SEE_OTHER);
+        assert_eq!(response.headers()[LOCATION], format!("/{role}"));
+        let cookie = response.headers()[SET_COOKIE].to_str().unwrap();
+        assert!(cookie.contains("; HttpOnly") && cookie.contains("; SameSite=Strict"), "{cookie}");
+        assert!(!cookie.contains(server.key(role)));
+        let home = server.get("/").header(COOKIE, cookie.split(';').next().unwrap()).send().await.unwrap();
+        assert_eq!(home.headers()[LOCATION], format!("/{role}"));
+    }
+    let wrong = server.get("/enter?key=0123456789abcdef0123456789abcdef").header("accept", "text/html");
+    let response = wrong.send().await.unwrap();
+    assert_eq!(response.status(), StatusCode::FORBIDDEN);
+    assert!(response.headers().get(SET_COOKIE).is_none());
+    assert!(response.text().await.unwrap().contains("Ask for the link"));
+}
+
+#[tokio::test]
+async fn a_cookie_outlives_a_restart() {
+    let mut server = open_server();
+    let cookie = cookie(&server, "surgeon").await;
+    assert!(server.end(rustix::process::Signal::TERM));
+    let again = Server::on(server.data.clone(), &["--bind", "0.0.0.0:0"]);
+    assert_eq!(ask(&again, "/surgeon", Method::GET, &cookie).await, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn the_operator_needs_no_key_at_the_machine_itself() {
+    let server = Server::start();
+    let status = async |headers: &[(&str, &str)]| {
+        let mut request = server.get("/operator");
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        request.send().await.unwrap().status()
+    };
+    assert_eq!(status(&[]).await, StatusCode::OK);
+    assert_eq!(status(&[("host", "localhost:1")]).await, StatusCode::OK);
+    assert_eq!(status(&[("host", "evil.example")]).await, StatusCode::MISDIRECTED_REQUEST);
+    assert_eq!(status(&[("x-forwarded-for", "203.0.113.7")]).await, StatusCode::FORBIDDEN);
+    for page in ["/surgeon", "/researcher"] {
+        assert_eq!(server.get(page).send().await.unwrap().status(), StatusCode::FORBIDDEN);
+    }
+    let elsewhere = server.get("/healthz").header(HOST, "rebound.example:8080");
+    assert_eq!(elsewhere.send().await.unwrap().status(), StatusCode::MISDIRECTED_REQUEST);
+}
+
+#[tokio::test]
+async fn other_sites_change_nothing_and_hear_nothing() {
+    let server = Server::start();
+    let post = |name: &'static str, value: String| {
+        let request = client().post(server.url("/healthz")).header(name, value);
+        async { request.send().await.unwrap().status() }
+    };
+    let ours = format!("http://{}", server.address);
+    assert_eq!(post("origin", "http://evil.example".into()).await, StatusCode::FORBIDDEN);
+    assert_eq!(post("origin", "null".into()).await, StatusCode::FORBIDDEN);
+    assert_eq!(post("sec-fetch-site", "cross-site".into()).await, StatusCode::FORBIDDEN);
+    // Let through to the route, which takes no POST.
+    assert_eq!(post("origin", ours.clone()).await, StatusCode::METHOD_NOT_ALLOWED);
+    assert_eq!(post("sec-fetch-site", "same-origin".into()).await, StatusCode::METHOD_NOT_ALLOWED);
+
+    let upgrade = server.get("/live").header("connection", "upgrade").header("upgrade", "websocket");
+    let upgrade = upgrade.header("sec-websocket-version", "13").header("sec-websocket-key", "dGhlIHNhbXBsZSBub25jZQ==");
+    let evil = upgrade.try_clone().unwrap().header(ORIGIN, "http://evil.example");
+    assert_eq!(evil.send().await.unwrap().status(), StatusCode::FORBIDDEN);
+    assert_eq!(upgrade.header(ORIGIN, ours).send().await.unwrap().status(), StatusCode::SWITCHING_PROTOCOLS);
+}
+
+#[tokio::test]
+async fn a_page_opened_from_another_site_is_asked_for_once_more() {
+    let server = open_server();
+    let page = server.get("/surgeon").header("accept", "text/html");
+    let direct = page.try_clone().unwrap().send().await.unwrap().text().await.unwrap();
+    assert!(!direct.contains("http-equiv=\"refresh\""));
+    let linked = page.header("sec-fetch-site", "cross-site").send().await.unwrap().text().await.unwrap();
+    assert!(linked.contains("http-equiv=\"refresh\""));
+}

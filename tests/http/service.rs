@@ -1,0 +1,154 @@
+//! The service: how it starts and ends, what every response carries, files, errors, the description of the interface.
+
+use std::net::TcpListener;
+
+use reqwest::StatusCode;
+use reqwest::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::support::{Server, client, refused};
+
+#[tokio::test]
+async fn it_says_where_it_is_and_what_is_simulated() {
+    let server = Server::start();
+    assert!(server.said.contains("SIMULATED"), "{}", server.said);
+    assert!(server.said.contains("--bind 0.0.0.0:8080"));
+    assert!(server.said.contains('█') && server.said.contains('▄'), "a code to scan");
+    let health: Value = server.get("/healthz").send().await.unwrap().json().await.unwrap();
+    assert_eq!(health["status"], "ok");
+    assert_eq!(health["simulated"], true);
+}
+
+#[tokio::test]
+async fn it_ends_well_when_asked_to() {
+    for signal in [Signal::TERM, Signal::INT] {
+        let mut server = Server::start();
+        let mut stream = server.get("/stream.mjpeg").send().await.unwrap();
+        assert!(stream.chunk().await.unwrap().is_some());
+        assert!(server.end(signal), "exit code 0");
+        while let Ok(Some(_)) = stream.chunk().await {}
+    }
+}
+
+#[test]
+fn what_cannot_be_served_is_refused_in_a_sentence() {
+    let data = tempfile::tempdir().unwrap();
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let (code, said) = refused(data.path(), &["--bind", &address]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains(&address) && said.contains("in use") && said.contains("--bind"), "{said}");
+
+    let (code, said) = refused(data.path(), &["--bind", "192.0.2.1:8080"]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("no address of this machine"), "{said}");
+
+    let (code, _) = refused(data.path(), &["--bind", "nonsense"]);
+    assert_eq!(code, Some(2));
+
+    let file = data.path().join("file");
+    std::fs::write(&file, "in the way").unwrap();
+    let (code, said) = refused(&file, &["--bind", "127.0.0.1:0"]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("data folder"), "{said}");
+
+    std::fs::write(data.path().join("keys.toml"), "surgeon = 1").unwrap();
+    let (code, said) = refused(data.path(), &["--bind", "127.0.0.1:0"]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("keys.toml") && said.lines().count() == 1, "{said}");
+}
+
+#[tokio::test]
+async fn every_page_has_a_nonce_of_its_own_and_strict_headers() {
+    let server = Server::start();
+    let mut nonces = Vec::new();
+    for _ in 0..2 {
+        let response = server.get("/operator").send().await.unwrap();
+        let headers = response.headers().clone();
+        let policy = headers["content-security-policy"].to_str().unwrap();
+        assert!(policy.starts_with("default-src 'none'") && policy.contains("frame-ancestors 'none'"), "{policy}");
+        assert!(!policy.contains("unsafe"), "{policy}");
+        assert_eq!(headers["x-content-type-options"], "nosniff");
+        assert_eq!(headers["referrer-policy"], "no-referrer");
+        assert_eq!(headers[CACHE_CONTROL], "no-store");
+        let nonce = policy.split("'nonce-").nth(1).unwrap().split('\'').next().unwrap().to_owned();
+        assert_eq!(nonce.len(), 32);
+        let page = response.text().await.unwrap();
+        let scripts = page.matches("<script").count();
+        assert!(scripts > 0);
+        assert_eq!(page.matches(&format!("nonce=\"{nonce}\"")).count(), scripts);
+        nonces.push(nonce);
+    }
+    assert_ne!(nonces[0], nonces[1]);
+}
+
+#[tokio::test]
+async fn failures_are_pages_for_browsers_and_json_for_programs() {
+    let server = Server::start();
+    let page = server.get("/nowhere").header("accept", "text/html,*/*").send().await.unwrap();
+    assert_eq!(page.status(), StatusCode::NOT_FOUND);
+    let text = page.text().await.unwrap();
+    assert!(text.contains("<h1>") && text.contains("href=\"/\""), "a way on: {text}");
+
+    let json: Value = server.get("/nowhere").send().await.unwrap().json().await.unwrap();
+    assert_eq!(json["error"], "There is nothing at this address.");
+
+    let method = client().post(server.url("/healthz")).send().await.unwrap();
+    assert_eq!(method.status(), StatusCode::METHOD_NOT_ALLOWED);
+    assert_eq!(method.headers()["allow"], "GET,HEAD");
+    assert!(method.json::<Value>().await.unwrap()["error"].is_string());
+
+    let query: Value = server.get("/enter").send().await.unwrap().json().await.unwrap();
+    assert!(query["error"].as_str().unwrap().contains("key"), "{query}");
+}
+
+#[tokio::test]
+async fn static_files_are_kept_for_ever_by_their_hash() {
+    let server = Server::start();
+    let page = server.get("/operator").send().await.unwrap().text().await.unwrap();
+    let address = page.split('"').find(|part| part.starts_with("/static/") && part.ends_with("style.css")).unwrap();
+    let file = server.get(address).send().await.unwrap();
+    assert_eq!(file.headers()[CONTENT_TYPE], "text/css; charset=utf-8");
+    assert!(file.headers()[CACHE_CONTROL].to_str().unwrap().contains("immutable"));
+    let known = server.get(address).header(IF_NONE_MATCH, &file.headers()[ETAG]).send().await.unwrap();
+    assert_eq!(known.status(), StatusCode::NOT_MODIFIED);
+
+    let old = server.get("/static/0123456789abcdef/viewer.js").send().await.unwrap();
+    assert_eq!(old.status(), StatusCode::OK);
+    assert_eq!(old.headers()[CACHE_CONTROL], "no-cache");
+    assert_eq!(old.headers()[CONTENT_TYPE], "text/javascript; charset=utf-8");
+
+    for missing in ["/static/0/none.js", "/static/0/..%2f..%2fCargo.toml", "/static/viewer.js"] {
+        assert_eq!(server.get(missing).send().await.unwrap().status(), StatusCode::NOT_FOUND, "{missing}");
+    }
+}
+
+#[tokio::test]
+async fn every_endpoint_is_described() {
+    let server = Server::start();
+    let document: Value = server.get("/api/openapi.json").send().await.unwrap().json().await.unwrap();
+    let paths = document["paths"].as_object().unwrap();
+    for path in
+        ["/", "/enter", "/surgeon", "/operator", "/researcher", "/live", "/stream.mjpeg", "/healthz", "/metrics"]
+    {
+        let operation = &paths[path]["get"];
+        assert!(operation["summary"].as_str().is_some_and(|text| !text.is_empty()), "{path}");
+        assert!(operation["responses"].as_object().is_some_and(|all| !all.is_empty()), "{path}");
+    }
+}
+
+#[tokio::test]
+async fn counters_are_told_to_prometheus_without_naming_a_policy() {
+    let server = Server::start();
+    let response = server.get("/metrics").send().await.unwrap();
+    assert!(response.headers()[CONTENT_TYPE].to_str().unwrap().starts_with("application/openmetrics-text"));
+    let text = response.text().await.unwrap();
+    assert!(text.ends_with("# EOF\n"));
+    for name in
+        ["parfocal_steps_total", "parfocal_viewers", "parfocal_frames_encoded_total", "parfocal_jpeg_bytes_total"]
+    {
+        assert!(text.lines().any(|line| line.starts_with(name)), "{name} in {text}");
+    }
+    assert!(!text.contains("policy") && !text.contains("climber"));
+}

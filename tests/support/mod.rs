@@ -1,0 +1,106 @@
+//! Starts the real server as its users do, on a port of its own and in a folder of its own.
+
+use std::io::{BufRead, BufReader, Read};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+
+use reqwest::{Client, RequestBuilder, redirect};
+use tempfile::TempDir;
+
+/// A running server; killed when dropped.
+pub struct Server {
+    process: Child,
+    /// Where it is reached.
+    pub address: SocketAddr,
+    /// Everything that it said when it was ready.
+    pub said: String,
+    keys: Vec<(String, String)>,
+    /// Its data folder.
+    pub data: Arc<TempDir>,
+}
+
+impl Server {
+    /// A server that listens on this machine alone.
+    pub fn start() -> Self {
+        Self::with(&["--bind", "127.0.0.1:0"])
+    }
+
+    /// A server with these arguments beside its data folder.
+    pub fn with(arguments: &[&str]) -> Self {
+        Self::on(Arc::new(tempfile::tempdir().unwrap()), arguments)
+    }
+
+    /// A server on a data folder that another may have used before.
+    pub fn on(data: Arc<TempDir>, arguments: &[&str]) -> Self {
+        let mut process = command(data.path(), arguments).stdout(Stdio::piped()).spawn().unwrap();
+        let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
+        let mut said = String::new();
+        for line in &mut lines {
+            let line = line.unwrap();
+            said.push_str(&line);
+            said.push('\n');
+            if line.starts_with("Ctrl-C") {
+                break;
+            }
+        }
+        let keys: Vec<_> = said.lines().filter_map(link).collect();
+        assert_eq!(keys.len(), 3, "the server did not start:\n{said}");
+        let port = said.split("/enter").next().unwrap().rsplit(':').next().unwrap().parse().unwrap();
+        Self { process, address: SocketAddr::from(([127, 0, 0, 1], port)), said, keys, data }
+    }
+
+    /// Key of `role`.
+    pub fn key(&self, role: &str) -> &str {
+        &self.keys.iter().find(|(name, _)| name == role).expect("a role").1
+    }
+
+    /// Address of `path`.
+    pub fn url(&self, path: &str) -> String {
+        format!("http://{}{path}", self.address)
+    }
+
+    /// A GET without any credential.
+    pub fn get(&self, path: &str) -> RequestBuilder {
+        client().get(self.url(path))
+    }
+
+    /// Ends the server as Ctrl-C or a service manager would, and waits: whether it ended well.
+    pub fn end(&mut self, signal: rustix::process::Signal) -> bool {
+        let id = rustix::process::Pid::from_child(&self.process);
+        rustix::process::kill_process(id, signal).unwrap();
+        self.process.wait().unwrap().success()
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// `parfocal serve` with `arguments`.
+pub fn command(data: &std::path::Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    command.arg("serve").args(arguments).arg("--data-dir").arg(data).stdin(Stdio::null()).env("RUST_LOG", "warn");
+    command
+}
+
+/// Runs `parfocal serve` where it is expected to fail: exit code, standard error.
+pub fn refused(data: &std::path::Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let mut process = command(data, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    let mut said = String::new();
+    process.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    (process.wait().unwrap().code(), said)
+}
+
+/// A client that follows no redirect and keeps no cookie by itself.
+pub fn client() -> Client {
+    Client::builder().no_proxy().redirect(redirect::Policy::none()).build().unwrap()
+}
+
+fn link(line: &str) -> Option<(String, String)> {
+    let (role, address) = line.trim().split_once("  ")?;
+    Some((role.to_owned(), address.split_once("/enter?key=")?.1.to_owned()))
+}
