@@ -3,6 +3,7 @@
 mod announce;
 mod devices;
 mod export;
+mod inspect;
 mod lens;
 mod policies;
 mod serve;
@@ -24,6 +25,8 @@ struct Arguments {
 enum Command {
     /// Write a session's data as a folder of CSV and JSON.
     Export(export::Arguments),
+    /// Show what is made of pictures and mosaics: content area, patch, focus metrics.
+    Inspect(inspect::Arguments),
     /// Look at a lens, move it by hand, sweep it, or start one that is not there.
     Lens(lens::Arguments),
     /// List the autofocus policies and whether each can run.
@@ -53,6 +56,7 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> Result<(), Failure> {
     match command {
         Command::Export(arguments) => export::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Lens(arguments) => lens::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),

@@ -10,7 +10,7 @@ pub fn rgb_to_gray(rgb: &RgbImage, gray: &mut GrayImage) {
     gray.height = rgb.height;
     gray.data.clear();
     let (pixels, _) = rgb.data.as_chunks::<3>();
-    gray.data.extend(pixels.iter().map(|&pixel| luma(pixel)));
+    gray.data.extend(pixels.iter().map(|pixel| luma(pixel.map(f32::from))));
     gray.data.resize(rgb.width * rgb.height, 0.0);
 }
 
@@ -21,12 +21,12 @@ pub fn rgb_patch(rgb: &RgbImage, area: PatchArea) -> Patch {
     Patch(std::array::from_fn(|i| {
         let (x, y) = (area.x + i % PATCH_SIDE, area.y + i / PATCH_SIDE);
         let pixel = if x < rgb.width { pixels.get(y * rgb.width + x) } else { None };
-        pixel.map_or(0.0, |&pixel| luma(pixel))
+        pixel.map_or(0.0, |pixel| luma(pixel.map(f32::from)))
     }))
 }
 
-fn luma([red, green, blue]: [u8; 3]) -> f32 {
-    0.2126 * f32::from(red) + 0.7152 * f32::from(green) + 0.0722 * f32::from(blue)
+pub(super) fn luma([red, green, blue]: [f32; 3]) -> f32 {
+    0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
 
 #[cfg(test)]

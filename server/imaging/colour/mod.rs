@@ -15,8 +15,8 @@ use cie::Spectrum;
 pub(super) use srgb::Encoder;
 
 /// Standard deviation of a band's noise that the fit reckons with, as a share of white. It keeps the matrix from telling
-/// neighbouring bands apart by their noise: with less, noise in the shown red grows (5 times a band's at 0.006, 2.5 times
-/// at 0.02); with more, colours of tissue go further from what the eye sees.
+/// neighbouring bands apart by their noise: with less, noise in the shown red grows (3.2 times a band's at 0.012, 2.3
+/// times at 0.02); with more, colours of tissue go further from what the eye sees.
 const BAND_NOISE: f64 = 0.02;
 
 type BandMatrix = SMatrix<f64, BANDS, BANDS>;
@@ -109,7 +109,7 @@ mod tests {
         for (blood, saturation) in [(0.015, 0.7), (0.08, 0.9), (0.3, 0.5)] {
             let (sensed, eye) = both_ways(&reflectances::tissue(blood, saturation, 15.0));
             for (sensed, eye) in sensed.iter().zip(eye) {
-                assert!((sensed - eye).abs() < 0.06, "{sensed} {eye}");
+                assert!((sensed - eye).abs() < 0.09, "{sensed} {eye}");
             }
             assert!(sensed[0] > sensed[1] && sensed[0] > sensed[2], "perfused tissue is reddish");
         }
@@ -120,7 +120,7 @@ mod tests {
         // Independent noise of a band reaches a component times the row's length; a component made of one band has 1.
         for row in linear_srgb_from_bands(&Calibration::default().bands) {
             let gain = row.iter().map(|weight| weight * weight).sum::<f32>().sqrt();
-            assert!(gain < 2.6, "{gain}");
+            assert!(gain < 2.4, "{gain}");
         }
     }
 }

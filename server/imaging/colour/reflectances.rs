@@ -26,7 +26,7 @@ pub(super) fn reflectances() -> Vec<Spectrum> {
             set.push(edge(centre, width));
             set.push(edge(centre, -width));
         }
-        for width in [25.0, 50.0] {
+        for width in [12.0, 25.0, 50.0, 100.0] {
             set.push(Spectrum::from_fn(|nm| 0.1 + 0.8 * hill(nm, centre, width)));
             set.push(Spectrum::from_fn(|nm| 0.9 - 0.8 * hill(nm, centre, width)));
         }

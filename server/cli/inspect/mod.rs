@@ -1,0 +1,176 @@
+//! `parfocal inspect`: what imaging and the focus metrics make of pictures and mosaics in files.
+
+mod overlay;
+mod report;
+
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::Failure;
+use crate::autofocus::{mgm, mlr};
+use crate::imaging::{
+    Calibration, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode,
+    decode_raw,
+};
+use report::{Kind, Report};
+
+/// Arguments of `parfocal inspect`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// PNG, JPEG or TIFF pictures of 8 or 16 bit, or mosaics: 16-bit gray pictures of 2048x1088, or files named .raw or
+    /// .bin that hold 2048x1088 little-endian 16-bit samples
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Print one JSON object a line instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Write each picture with its content area, patch and metrics drawn in to this folder, as PNG
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Take 16-bit gray pictures of any size as mosaics
+    #[arg(long)]
+    mosaic: bool,
+    /// Calibration of the sensor that took the mosaics (TOML); without it, that of a typical unit
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+}
+
+/// Inspects every file; one that cannot be inspected is named on standard error and does not keep the others from it.
+///
+/// # Errors
+/// When a file could not be inspected, the calibration not read, or a result not written.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut inspector = Inspector::new(arguments)?;
+    let mut reports = Vec::new();
+    let mut failed = 0;
+    for path in &arguments.paths {
+        match inspector.inspect(path) {
+            Ok(report) if arguments.json => writeln!(std::io::stdout(), "{}", serde_json::to_string(&report)?)?,
+            Ok(report) => reports.push(report),
+            Err(failure) if arguments.paths.len() == 1 => return Err(failure),
+            Err(failure) => {
+                eprintln!("parfocal: {failure}");
+                failed += 1;
+            }
+        }
+    }
+    std::io::stdout().write_all(report::table(&reports).as_bytes())?;
+    if failed > 0 {
+        return Err(format!("{failed} of {} files could not be inspected", arguments.paths.len()).into());
+    }
+    Ok(())
+}
+
+/// What is kept from file to file.
+struct Inspector<'a> {
+    mosaic: bool,
+    out: Option<&'a Path>,
+    reconstructor: Reconstructor,
+    /// Largest count of a sample.
+    full_scale: f32,
+    /// Names already given to overlays.
+    taken: HashSet<OsString>,
+}
+
+/// A picture as it is looked at.
+struct Seen {
+    kind: Kind,
+    rgb: RgbImage,
+    gray: GrayImage,
+}
+
+impl<'a> Inspector<'a> {
+    fn new(arguments: &'a Arguments) -> Result<Self, Failure> {
+        let calibration =
+            arguments.calibration.as_deref().map_or_else(|| Ok(Calibration::default()), read_calibration)?;
+        if let Some(out) = &arguments.out {
+            fs::create_dir_all(out).map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
+        }
+        Ok(Self {
+            mosaic: arguments.mosaic,
+            out: arguments.out.as_deref(),
+            reconstructor: Reconstructor::new(&calibration),
+            full_scale: calibration.full_scale(),
+            taken: HashSet::new(),
+        })
+    }
+
+    fn inspect(&mut self, path: &Path) -> Result<Report, Failure> {
+        let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
+        let seen = self.see(path)?;
+        let content_area = content_area::detect(&seen.gray);
+        let (width, height) = (seen.gray.width, seen.gray.height);
+        let area = PatchArea::central(width, height, content_area.as_ref()).map_err(|error| named(&error))?;
+        let cut_out = cut(&seen.gray, area);
+        let report = Report {
+            path: path.display().to_string(),
+            width,
+            height,
+            kind: seen.kind,
+            content_area,
+            patch: area,
+            mgm: mgm(&cut_out),
+            mlr: mlr(&cut_out),
+        };
+        if let Some(out) = self.out {
+            let target = out.join(self.overlay_name(path));
+            overlay::draw(seen.rgb, &report)
+                .save_with_format(&target, image::ImageFormat::Png)
+                .map_err(|error| named(&format_args!("cannot write {}: {error}", target.display())))?;
+        }
+        Ok(report)
+    }
+
+    fn see(&mut self, path: &Path) -> Result<Seen, Failure> {
+        let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
+        let bytes = fs::read(path).map_err(|error| named(&format_args!("cannot be read: {error}")))?;
+        let raw =
+            path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"));
+        let picture = if raw { decode_raw(&bytes).map(Picture::Mosaic) } else { decode(&bytes, self.mosaic) };
+        Ok(match picture.map_err(|error| named(&error))? {
+            Picture::Rgb(rgb, gray) => Seen { kind: Kind::Rgb, rgb, gray },
+            Picture::Gray(gray) => Seen { kind: Kind::Gray, rgb: overlay::from_gray(&gray), gray },
+            Picture::Mosaic(frame) => {
+                let most = frame.samples().iter().copied().max().unwrap_or(0);
+                if f32::from(most) > self.full_scale {
+                    let limit = self.full_scale;
+                    eprintln!(
+                        "parfocal: {}",
+                        named(&format_args!(
+                            "warning: counts reach {most}, above the {limit} of the calibration's bit depth, and are cut"
+                        ))
+                    );
+                }
+                let mut seen = Seen { kind: Kind::Mosaic, rgb: RgbImage::default(), gray: GrayImage::default() };
+                self.reconstructor.reconstruct(&frame, &mut seen.rgb, &mut seen.gray);
+                seen
+            }
+        })
+    }
+
+    /// A file name for the overlay of `path` that no other overlay of this run has.
+    fn overlay_name(&mut self, path: &Path) -> OsString {
+        let stem = path.file_name().unwrap_or(path.as_os_str());
+        let numbered = |number: u32| {
+            let mut name = stem.to_owned();
+            name.push(if number == 1 { ".overlay.png".to_owned() } else { format!(".overlay-{number}.png") });
+            name
+        };
+        let mut names = (1..).map(numbered);
+        names.find(|name| self.taken.insert(name.clone())).unwrap_or_default()
+    }
+}
+
+fn read_calibration(path: &Path) -> Result<Calibration, Failure> {
+    let text =
+        fs::read_to_string(path).map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
+    Ok(Calibration::from_toml(&text).map_err(|error| format!("calibration {}, {error}", path.display()))?)
+}
+
+/// The patch of `gray` at `area`, which lies inside it.
+fn cut(gray: &GrayImage, area: PatchArea) -> Patch {
+    Patch(std::array::from_fn(|i| gray.data[(area.y + i / PATCH_SIDE) * gray.width + area.x + i % PATCH_SIDE]))
+}

@@ -1,0 +1,213 @@
+//! `parfocal inspect` as people and scripts use it.
+
+#![allow(missing_docs, reason = "tests")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn inspect(arguments: &[&str], paths: &[&Path]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("inspect").args(arguments).args(paths).output().unwrap()
+}
+
+/// The objects that `--json` printed.
+fn objects(output: &Output) -> Vec<Value> {
+    let text = std::str::from_utf8(&output.stdout).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn complaint(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn write(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// A disc on black, 400x300, centre (210, 140), radius 120; a step of 100 gray levels along its column 210.
+fn disc() -> image::GrayImage {
+    image::GrayImage::from_fn(400, 300, |x, y| {
+        let inside = (f64::from(x) - 210.0).hypot(f64::from(y) - 140.0) < 120.0;
+        image::Luma([if !inside {
+            0
+        } else if x < 210 {
+            90
+        } else {
+            190
+        }])
+    })
+}
+
+#[test]
+fn a_gray_picture_has_the_values_worked_out_by_hand() {
+    let folder = TempDir::new().unwrap();
+    for name in ["disc.png", "disc.tif"] {
+        let path = folder.path().join(name);
+        disc().save(&path).unwrap();
+        let output = inspect(&["--json"], &[&path]);
+        assert!(output.status.success(), "{}", complaint(&output));
+        let object = &objects(&output)[0];
+        assert_eq!(object["path"], path.to_str().unwrap());
+        assert_eq!((&object["width"], &object["height"]), (&400.into(), &300.into()));
+        assert_eq!(object["kind"], "gray");
+        let area = &object["content_area"];
+        for (key, expected) in [("x", 210.0), ("y", 140.0), ("radius", 120.0)] {
+            assert!((area[key].as_f64().unwrap() - expected).abs() < 2.0, "{area}");
+        }
+        assert_eq!((&object["patch"]["width"], &object["patch"]["height"]), (&32.into(), &32.into()));
+        let x = object["patch"]["x"].as_u64().unwrap();
+        assert!(x.abs_diff(194) <= 2 && object["patch"]["y"].as_u64().unwrap().abs_diff(124) <= 2);
+        // A vertical step of 100: |Ix| = 400 in the two columns beside it, 0 elsewhere: 2 * 400 / 32.
+        assert!((object["mgm"].as_f64().unwrap() - 25.0).abs() < 1e-3, "{object}");
+        assert!((1.0..1.3).contains(&object["mlr"].as_f64().unwrap()));
+    }
+}
+
+#[test]
+fn without_a_content_area_the_patch_stands_in_the_middle() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("flat.jpg");
+    image::RgbImage::from_pixel(101, 64, image::Rgb([90, 90, 90])).save(&path).unwrap();
+    let object = &objects(&inspect(&["--json"], &[&path]))[0];
+    assert_eq!(object["kind"], "rgb");
+    assert!(object["content_area"].is_null());
+    assert_eq!((&object["patch"]["x"], &object["patch"]["y"]), (&34.into(), &16.into()));
+    assert!(object["mgm"].as_f64().unwrap().abs() < 1e-6 && (object["mlr"].as_f64().unwrap() - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn mosaics_are_measured_in_pixels_of_a_band() {
+    let folder = TempDir::new().unwrap();
+    let samples = vec![512_u16; 2048 * 1088];
+    let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+    let raw = write(&folder, "frame.RAW", &bytes);
+    let png = folder.path().join("frame.png");
+    image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2048, 1088, samples).unwrap().save(&png).unwrap();
+    let small = folder.path().join("small.tif");
+    image::ImageBuffer::from_pixel(256, 128, image::Luma([512_u16])).save(&small).unwrap();
+    let output = inspect(&["--json", "--mosaic"], &[&raw, &png, &small]);
+    assert!(output.status.success(), "{}", complaint(&output));
+    let found: Vec<_> =
+        objects(&output).iter().map(|o| (o["kind"].clone(), o["width"].clone(), o["height"].clone())).collect();
+    let expected = |width: u32, height: u32| ("mosaic".into(), width.into(), height.into());
+    assert_eq!(found, [expected(512, 272), expected(512, 272), expected(64, 32)]);
+}
+
+#[test]
+fn a_calibration_sets_the_scale_of_a_mosaic() {
+    let folder = TempDir::new().unwrap();
+    // Left half at a quarter of full scale, right half at a half.
+    let mosaic = image::ImageBuffer::from_fn(256, 128, |x, _| image::Luma([if x < 128 { 256_u16 } else { 512 }]));
+    let path = folder.path().join("mosaic.png");
+    mosaic.save(&path).unwrap();
+    let calibration = write(&folder, "unit.toml", b"white = 512\n");
+    let mgm = |more: &[&str]| {
+        let output = inspect(&[&["--json", "--mosaic"], more].concat(), &[&path]);
+        assert!(output.status.success(), "{}", complaint(&output));
+        objects(&output)[0]["mgm"].as_f64().unwrap()
+    };
+    // A step of s gray levels has an MGM of 8 s / 32.
+    assert!((mgm(&[]) - 255.0 * 256.0 / 1023.0 / 4.0).abs() < 1e-3);
+    assert!((mgm(&["--calibration", calibration.to_str().unwrap()]) - 255.0 / 2.0 / 4.0).abs() < 1e-3);
+}
+
+#[test]
+fn overlays_are_pictures_of_the_same_size_and_none_overwrites_another() {
+    let folder = TempDir::new().unwrap();
+    let (one, other) = (folder.path().join("disc.png"), folder.path().join("sub/disc.png"));
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    disc().save(&one).unwrap();
+    disc().save(&other).unwrap();
+    let out = folder.path().join("new/overlays");
+    let output = inspect(&["--out", out.to_str().unwrap()], &[&one, &other]);
+    assert!(output.status.success(), "{}", complaint(&output));
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(table.lines().count(), 3, "a heading and a line a file");
+    for name in ["disc.png.overlay.png", "disc.png.overlay-2.png"] {
+        let overlay = image::open(out.join(name)).unwrap().to_rgb8();
+        assert_eq!(overlay.dimensions(), (400, 300));
+        let coloured = overlay.pixels().filter(|pixel| pixel[0] != pixel[2]).count();
+        assert!(coloured > 500, "circle, square and values are drawn: {coloured}");
+        assert_eq!(overlay.get_pixel(200, 140), &image::Rgb([90, 90, 90]), "the patch itself is left as it is");
+    }
+}
+
+#[test]
+fn bad_files_are_named_and_the_others_still_inspected() {
+    let folder = TempDir::new().unwrap();
+    let good = folder.path().join("disc.png");
+    disc().save(&good).unwrap();
+    let whole = fs::read(&good).unwrap();
+    let bad = [
+        (write(&folder, "cut.png", &whole[..whole.len() / 2]), "damaged or cut short"),
+        (write(&folder, "text.png", b"hello"), "not a PNG, JPEG or TIFF picture"),
+        (write(&folder, "short.raw", &[0; 1000]), "a raw mosaic is 2048x1088 samples"),
+        (write(&folder, "empty.jpg", b""), "the file is empty"),
+        (folder.path().join("absent.png"), "cannot be read"),
+        (folder.path().to_owned(), "cannot be read"),
+    ];
+    let tiny = folder.path().join("tiny.png");
+    image::GrayImage::new(20, 40).save(&tiny).unwrap();
+    let mut paths: Vec<&Path> = bad.iter().map(|(path, _)| path.as_path()).collect();
+    paths.extend([tiny.as_path(), good.as_path()]);
+    let output = inspect(&["--json"], &paths);
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(objects(&output).len(), 1, "the good one");
+    let complaint = complaint(&output);
+    assert_eq!(complaint.lines().count(), 8, "a sentence a bad file, and a sum: {complaint}");
+    for (path, words) in bad.iter().map(|(path, words)| (path, *words)).chain([(&tiny, "smaller than the 32x32 patch")])
+    {
+        let start = format!("parfocal: {}: ", path.display());
+        assert!(complaint.lines().any(|line| line.starts_with(&start) && line.contains(words)), "{words}: {complaint}");
+    }
+}
+
+#[test]
+fn a_bad_calibration_is_named_with_its_line_and_key() {
+    let folder = TempDir::new().unwrap();
+    let good = folder.path().join("disc.png");
+    disc().save(&good).unwrap();
+    let calibration = write(&folder, "unit.toml", b"name = 'a'\nfwhm_nm = 3\n");
+    let output = inspect(&["--calibration", calibration.to_str().unwrap()], &[&good]);
+    assert_eq!(output.status.code(), Some(1));
+    let complaint = complaint(&output);
+    assert!(complaint.contains("unit.toml, line 2, key 'fwhm_nm'"), "{complaint}");
+    assert_eq!(inspect(&[], &[]).status.code(), Some(2), "no path is wrong usage");
+}
+
+#[test]
+fn the_content_area_of_real_footage_is_where_others_find_it() {
+    let footage = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/endo.mp4");
+    if !footage.exists() {
+        println!("skipped: {} is absent", footage.display());
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    let select = r"select=eq(n\,0)+eq(n\,80)+eq(n\,160)+eq(n\,240)";
+    let status = Command::new("ffmpeg")
+        .args(["-v", "error", "-i"])
+        .arg(&footage)
+        .args(["-vf", select, "-fps_mode", "passthrough"])
+        .arg(folder.path().join("%d.png"))
+        .status();
+    if !status.is_ok_and(|status| status.success()) {
+        println!("skipped: ffmpeg is absent or cannot read the footage");
+        return;
+    }
+    let paths: Vec<_> = (1..=4).map(|number| folder.path().join(format!("{number}.png"))).collect();
+    let output = inspect(&["--json"], &paths.iter().map(PathBuf::as_path).collect::<Vec<_>>());
+    assert!(output.status.success(), "{}", complaint(&output));
+    // By torch-content-area's classical method.
+    let expected = [[627.6, 399.2, 567.6], [615.2, 386.0, 567.4], [615.6, 395.5, 567.2], [614.5, 399.5, 567.2]];
+    for (object, expected) in objects(&output).iter().zip(expected) {
+        let area = &object["content_area"];
+        for (key, expected) in ["x", "y", "radius"].into_iter().zip(expected) {
+            assert!((area[key].as_f64().unwrap() - expected).abs() < 10.0, "{key} {expected}: {area}");
+        }
+    }
+}
