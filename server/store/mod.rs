@@ -184,7 +184,12 @@ impl Store {
 
 async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
     // One connection, kept for good: its settings and prepared statements with it.
-    let pool = SqlitePoolOptions::new().max_connections(1).min_connections(1).idle_timeout(None).max_lifetime(None);
+    let pool = SqlitePoolOptions::new()
+        .max_connections(1)
+        .min_connections(1)
+        .idle_timeout(None)
+        .max_lifetime(None)
+        .test_before_acquire(false);
     Ok(pool.connect_with(options).await?)
 }
 

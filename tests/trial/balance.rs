@@ -1,0 +1,93 @@
+//! Balanced studies: the sets of sessions that share a seed.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use parfocal::ids::SessionId;
+use parfocal::store::NewSession;
+use parfocal::trial::view::{Action, Role};
+
+use crate::bench::Bench;
+
+/// A folder with the paper's trial in balanced order.
+fn balanced(folder: &Path) {
+    let paper = include_str!("../../trial-protocols/paper.toml");
+    let text = paper.replace("name = \"paper\"", "name = \"balanced\"").replace("\"shuffled\"", "\"balanced\"");
+    std::fs::write(folder.join("balanced.toml"), text).unwrap();
+}
+
+async fn made(bench: &Bench, session: SessionId) -> NewSession {
+    bench.store.reader().session(session).await.unwrap().unwrap().made
+}
+
+async fn session_that_is_left(bench: &Bench) -> NewSession {
+    let session = bench.begin("balanced").await;
+    let made = made(bench, session).await;
+    let abort = Action::Abort { reason: "to make room".to_owned() };
+    bench.conductor.act(Role::Operator, session, abort).await.unwrap();
+    made
+}
+
+#[tokio::test]
+async fn six_sessions_are_a_balanced_set_and_the_seventh_begins_another() {
+    let folder = tempfile::tempdir().unwrap();
+    balanced(folder.path());
+    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
+    let mut sessions = Vec::new();
+    for _ in 0..7 {
+        let session = bench.whole_session("balanced").await;
+        sessions.push(made(&bench, session).await);
+    }
+    let (set, next) = sessions.split_at(6);
+    assert!(set.iter().all(|session| session.seed == set[0].seed));
+    assert_eq!(set.iter().map(|session| session.set_index).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5]);
+    assert!(next[0].seed != set[0].seed && next[0].set_index == 0);
+    for position in 0..6 {
+        let policies: Vec<&str> = set.iter().map(|session| session.segments[position].1.as_str()).collect();
+        for policy in ["fixed", "mgm-hill-climber", "mlr-hill-climber"] {
+            assert_eq!(policies.iter().filter(|name| **name == policy).count(), 2, "position {position}");
+        }
+    }
+    let segments: BTreeSet<_> = sessions.iter().flat_map(|session| &session.segments).map(|(id, _)| *id).collect();
+    assert_eq!(segments.len(), 7 * 6);
+}
+
+#[tokio::test]
+async fn an_aborted_session_gives_its_place_back() {
+    let folder = tempfile::tempdir().unwrap();
+    balanced(folder.path());
+    let bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
+    let first = session_that_is_left(&bench).await;
+    let second = session_that_is_left(&bench).await;
+    assert!(second.seed == first.seed && second.set_index == 0);
+    assert_ne!(first.commitment, second.commitment);
+}
+
+#[tokio::test]
+async fn unblinding_closes_the_set_and_its_seed_is_told_when_all_of_it_are_unblinded() {
+    let folder = tempfile::tempdir().unwrap();
+    balanced(folder.path());
+    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
+    let first = bench.whole_session("balanced").await;
+    let second = bench.whole_session("balanced").await;
+    bench.unblind(first).await;
+    let seed = made(&bench, first).await.seed;
+    assert!(!bench.store.reader().set_unblinded(seed).await.unwrap());
+    let third = bench.whole_session("balanced").await;
+    assert!(made(&bench, third).await.seed != seed, "the order of the first tells those of its set apart");
+    bench.unblind(second).await;
+    assert!(bench.store.reader().set_unblinded(seed).await.unwrap());
+}
+
+#[tokio::test]
+async fn a_fixed_seed_makes_other_ids_and_seeds_after_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = Bench::start(folder.path()).await;
+    let first = bench.begin("paper").await;
+    bench.conductor.act(Role::Operator, first, Action::Abort { reason: "restart".to_owned() }).await.unwrap();
+    drop(bench);
+    let bench = Bench::start(folder.path()).await;
+    let second = bench.begin("paper").await;
+    assert_ne!(first, second);
+    assert!(made(&bench, first).await.seed != made(&bench, second).await.seed);
+}

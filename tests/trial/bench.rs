@@ -1,0 +1,207 @@
+//! A conductor on a folder of its own, with clocks that stand still until told to move and a control loop that only
+//! listens.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use parfocal::autofocus::{PolicyName, Registry};
+use parfocal::camera::CameraHealth;
+use parfocal::clock::{Clock, ManualClock};
+use parfocal::conductor::{ConductError, Conductor, Library, Parts};
+use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot};
+use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal::lens::{FocalPower, LensHealth};
+use parfocal::store::{Run, Store};
+use parfocal::trial::view::{
+    Action, AnswerValue, NewAnswer, NewComment, OperatorView, Phase, QuestionKind, Role, Said, SurgeonView,
+};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+use tokio::sync::{mpsc, watch};
+use uuid::Uuid;
+
+pub const PARTICIPANT: &str = "S-01";
+
+/// A bench.
+pub struct Bench {
+    pub store: Store,
+    pub conductor: Conductor,
+    pub clock: Arc<ManualClock>,
+    pub commands: mpsc::UnboundedReceiver<Command>,
+    keys: ChaCha12Rng,
+}
+
+pub fn a_run(clock: &ManualClock) -> Run {
+    Run { wall: clock.wall(), at: clock.now(), camera: "phantom".into(), lens: "simulated".into(), seed: None }
+}
+
+pub fn a_clock() -> ManualClock {
+    let clock = ManualClock::new("2026-03-01T09:00:00Z".parse().unwrap());
+    clock.advance(Duration::from_secs(1000));
+    clock
+}
+
+pub fn known() -> Vec<PolicyName> {
+    Registry::standard().entries().into_iter().map(|entry| entry.name).collect()
+}
+
+impl Bench {
+    /// A server on `folder`, just started.
+    pub async fn start(folder: &Path) -> Self {
+        Self::start_with(folder, None, 7).await
+    }
+
+    /// The same with a folder of protocols and a seed.
+    pub async fn start_with(folder: &Path, protocols: Option<&Path>, seed: u64) -> Self {
+        let clock = Arc::new(a_clock());
+        let store = Store::open(folder, &a_run(&clock)).await.unwrap();
+        let (control, commands) = listener();
+        let conductor = Conductor::open(Parts {
+            store: store.clone(),
+            control,
+            library: Library::load(protocols, &known()).unwrap(),
+            registry: Registry::standard(),
+            clock: clock.clone(),
+            random: ChaCha12Rng::seed_from_u64(seed),
+        })
+        .await
+        .unwrap();
+        conductor.add_participant(Role::Operator, PARTICIPANT).await.unwrap();
+        let keys = ChaCha12Rng::seed_from_u64(seed + u64::try_from(store.run()).unwrap() * 1000);
+        Self { store, conductor, clock, commands, keys }
+    }
+
+    pub fn key(&mut self) -> IdempotencyKey {
+        IdempotencyKey(Uuid::from_u64_pair(self.keys.next_u64(), self.keys.next_u64()))
+    }
+
+    pub fn view(&self) -> SurgeonView {
+        self.conductor.surgeon_view().borrow().as_deref().unwrap().clone()
+    }
+
+    pub fn operator_view(&self) -> OperatorView {
+        self.conductor.operator_view().borrow().as_deref().unwrap().clone()
+    }
+
+    /// A session by `protocol`, started.
+    pub async fn begin(&self, protocol: &str) -> SessionId {
+        let session = self.conductor.create(Role::Operator, PARTICIPANT, protocol).await.unwrap();
+        self.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
+        session
+    }
+
+    pub async fn surgeon(&self, action: Action) {
+        self.conductor.act(Role::Surgeon, self.view().session, action).await.unwrap();
+    }
+
+    pub async fn wait(&self, time: Duration) {
+        self.clock.advance(time);
+        self.conductor.tick().await;
+    }
+
+    /// A comment as the page would send it now.
+    pub fn comment(&mut self, text: &str) -> NewComment {
+        let view = self.view();
+        NewComment {
+            key: self.key(),
+            session: view.session,
+            segment: view.segment,
+            frame: Some(1234),
+            client_millis: Some(1_772_355_600_000),
+            said: Said::Text(text.to_owned()),
+        }
+    }
+
+    pub async fn say(&mut self, text: &str) {
+        let comment = self.comment(text);
+        self.conductor.comment(comment).await.unwrap();
+    }
+
+    /// Answers every question asked now.
+    pub async fn answer_all(&mut self) {
+        let view = self.view();
+        for question in &view.questions {
+            let settings = u8::try_from(view.settings).unwrap();
+            let value = match &question.kind {
+                QuestionKind::Text => AnswerValue::Text("fine 👍".to_owned()),
+                QuestionKind::Likert { points, .. } => AnswerValue::Point(*points),
+                QuestionKind::Ranking => AnswerValue::Points((1..=settings).rev().collect()),
+                QuestionKind::Sus => AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]),
+            };
+            self.answer(&question.id, value).await.unwrap();
+        }
+    }
+
+    pub async fn answer(&mut self, question: &str, value: AnswerValue) -> Result<(), ConductError> {
+        let view = self.view();
+        let (key, question) = (self.key(), question.to_owned());
+        let answer = NewAnswer { key, session: view.session, segment: view.segment, question, value };
+        self.conductor.answer(answer).await
+    }
+
+    /// One setting from its notice to the end of its questions; its segment.
+    pub async fn whole_setting(&mut self) -> SegmentId {
+        let segment = self.view().segment.unwrap();
+        self.surgeon(Action::Acknowledge { segment }).await;
+        self.wait(Duration::from_secs(20)).await;
+        self.say(&format!("setting {} 🔬 \"quoted\", and\na second line", self.view().setting)).await;
+        self.surgeon(Action::FinishSegment { segment }).await;
+        self.answer_all().await;
+        if self.view().phase == Phase::Questions {
+            self.surgeon(Action::FinishQuestions { segment: Some(segment) }).await;
+        }
+        segment
+    }
+
+    /// A session by `protocol` from beginning to end.
+    pub async fn whole_session(&mut self, protocol: &str) -> SessionId {
+        let session = self.begin(protocol).await;
+        while self.view().phase == Phase::Notice {
+            self.whole_setting().await;
+        }
+        if self.view().phase == Phase::Closing {
+            self.answer_all().await;
+            self.surgeon(Action::FinishQuestions { segment: None }).await;
+        }
+        assert_eq!(self.view().phase, Phase::Completed);
+        session
+    }
+
+    pub async fn unblind(&self, session: SessionId) {
+        let action = Action::Unblind { reason: "the study is over; CNN won".to_owned() };
+        self.conductor.act(Role::Researcher, session, action).await.unwrap();
+    }
+
+    /// The commands that the control loop got since the last look.
+    pub fn commanded(&mut self) -> Vec<Command> {
+        std::iter::from_fn(|| self.commands.try_recv().ok()).collect()
+    }
+}
+
+/// A control loop that only listens.
+fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
+    let status = ControlStatus {
+        camera: CameraHealth {
+            name: "none".into(),
+            simulated: true,
+            working: true,
+            message: "none".into(),
+            fps: 50.0,
+            lost: 0,
+        },
+        lens: LensHealth { name: "none".into(), simulated: true, working: true, message: "none".into() },
+        policy: None,
+        focal_power: FocalPower::MIDDLE,
+        held: None,
+        message: None,
+        steps_per_second: 50.0,
+        steps: 0,
+        telemetry_dropped: 0,
+        latency_p50_micros: 0,
+        latency_p99_micros: 0,
+    };
+    let (commands, received) = mpsc::unbounded_channel();
+    let status = watch::channel(Arc::new(status)).1;
+    (ControlHandle { commands, status, frames: Arc::new(LatestSlot::default()) }, received)
+}

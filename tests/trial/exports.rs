@@ -1,0 +1,239 @@
+//! Exports, read back by other means than those that wrote them, and their verification.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read;
+use std::path::Path;
+
+use parfocal::ids::SessionId;
+use parfocal::store::export::verify::{Check, Verdict, verify};
+use parfocal::store::export::{ExportError, export};
+use parfocal::store::{Reader, telemetry};
+use parfocal::trial::view::{Action, Role};
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use crate::bench::Bench;
+use crate::storage::step;
+
+/// A server with one whole session with telemetry.
+async fn with_session(folder: &Path) -> (Bench, SessionId) {
+    let mut bench = Bench::start(folder).await;
+    let session = bench.begin("paper").await;
+    let (sender, receiver) = tokio::sync::mpsc::channel(1024);
+    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    for setting in 0..6 {
+        let segment = bench.whole_setting().await;
+        for frame in 1..=10 {
+            sender.send(step(setting * 10 + frame, Some(segment))).await.unwrap();
+        }
+    }
+    drop(sender);
+    writer.await.unwrap();
+    bench.answer_all().await;
+    bench.surgeon(Action::FinishQuestions { segment: None }).await;
+    (bench, session)
+}
+
+fn rows(folder: &Path, table: &str) -> Vec<BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_path(folder.join(format!("{table}.csv"))).unwrap();
+    reader.deserialize().map(Result::unwrap).collect()
+}
+
+fn json(folder: &Path, file: &str) -> Value {
+    serde_json::from_slice(&std::fs::read(folder.join(file)).unwrap()).unwrap()
+}
+
+fn files(folder: &Path) -> BTreeSet<String> {
+    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+fn failed(checks: &[Check]) -> Vec<&str> {
+    checks.iter().filter(|check| matches!(check.verdict, Verdict::Failed(_))).map(|check| check.name).collect()
+}
+
+#[tokio::test]
+async fn a_blinded_export_holds_everything_but_the_policies() {
+    let data = tempfile::tempdir().unwrap();
+    let (bench, session) = with_session(data.path()).await;
+    let out = data.path().join("export");
+    let summary = export(bench.store.reader(), session, &out, false).await.unwrap();
+    assert_eq!(files(&out), summary.files.iter().cloned().collect());
+
+    let comments = rows(&out, "comments");
+    assert_eq!(comments.len(), 6);
+    assert_eq!(comments[1]["text"], "setting 2 🔬 \"quoted\", and\na second line");
+    assert_eq!((comments[1]["setting"].as_str(), comments[1]["frame"].as_str()), ("2", "1234"));
+    let answers = rows(&out, "answers");
+    assert_eq!(answers.len(), 27);
+    let sus = answers.iter().find(|answer| answer["kind"] == "sus").unwrap();
+    assert_eq!((sus["value"].as_str(), sus["sus_score"].as_str()), ("[4,2,3,1,4,3,2,2,4,2]", "67.5"));
+    let telemetry = rows(&out, "telemetry");
+    assert_eq!(telemetry.len(), 60);
+    assert_eq!((telemetry[15]["asked"].as_str(), telemetry[15]["setting"].as_str()), ("0.35", "2"));
+    assert_eq!(rows(&out, "segments")[5]["inspected_seconds"], "20.0");
+    let kinds: Vec<String> = rows(&out, "events").into_iter().map(|event| event["kind"].clone()).collect();
+    // created, started, three for each of six settings, closing questions done, completed.
+    assert_eq!(kinds.len(), 2 + 6 * 3 + 2);
+    assert_eq!(json(&out, "session.json")["comments"][1]["text"], comments[1]["text"].as_str());
+
+    // The protocol names the policies compared, as it must; nothing else names any.
+    for file in files(&out).iter().filter(|file| *file != "protocol.toml") {
+        let text = std::fs::read_to_string(out.join(file)).unwrap();
+        for tell in ["mgm", "mlr", "fixed", "12.5"] {
+            assert!(!text.contains(tell), "{file} has '{tell}'");
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_file_has_its_checksum_and_every_column_its_description() {
+    let data = tempfile::tempdir().unwrap();
+    let (bench, session) = with_session(data.path()).await;
+    bench.unblind(session).await;
+    let out = data.path().join("export");
+    export(bench.store.reader(), session, &out, true).await.unwrap();
+
+    let sums = std::fs::read_to_string(out.join("SHA256SUMS")).unwrap();
+    let listed: BTreeMap<&str, &str> =
+        sums.lines().map(|line| line.split_once("  ").unwrap()).map(|(s, f)| (f, s)).collect();
+    assert_eq!(listed.len() + 1, files(&out).len());
+    for (file, sum) in &listed {
+        assert_eq!(&hex::encode(Sha256::digest(std::fs::read(out.join(file)).unwrap())), sum, "{file}");
+    }
+
+    let package = json(&out, "datapackage.json");
+    let mut described = BTreeSet::new();
+    for resource in package["resources"].as_array().unwrap() {
+        let path = resource["path"].as_str().unwrap();
+        assert_eq!(resource["hash"], format!("sha256:{}", listed[path]));
+        let fields = resource["schema"]["fields"].as_array().unwrap();
+        let mut reader = csv::Reader::from_path(out.join(path)).unwrap();
+        let names: Vec<&str> = fields.iter().map(|field| field["name"].as_str().unwrap()).collect();
+        assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>(), names, "{path}");
+        assert!(fields.iter().all(|field| field["description"].as_str().is_some_and(|text| text.len() > 3)), "{path}");
+        described.insert(path.to_owned());
+    }
+    let csvs: BTreeSet<String> = files(&out).into_iter().filter(|file| file.ends_with(".csv")).collect();
+    assert_eq!(described, csvs);
+}
+
+#[tokio::test]
+async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
+    let data = tempfile::tempdir().unwrap();
+    let (bench, session) = with_session(data.path()).await;
+    let refused = export(bench.store.reader(), session, &data.path().join("early"), true).await.unwrap_err();
+    assert!(matches!(refused, ExportError::StillBlinded(_)), "{refused}");
+    assert!(!data.path().join("early").exists());
+
+    bench.unblind(session).await;
+    let (blinded, unblinded) = (data.path().join("blinded"), data.path().join("unblinded"));
+    export(bench.store.reader(), session, &blinded, false).await.unwrap();
+    export(bench.store.reader(), session, &unblinded, true).await.unwrap();
+    let more: Vec<String> = files(&unblinded).difference(&files(&blinded)).cloned().collect();
+    assert_eq!(more, ["allocation.csv", "allocation.json", "policy_steps.csv"]);
+    for file in files(&blinded).iter().filter(|file| !matches!(file.as_str(), "SHA256SUMS" | "datapackage.json")) {
+        let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
+        assert!(read(&blinded) == read(&unblinded), "{file}");
+        // The reason for unblinding names a policy, and is the unblinded export's alone.
+        assert!(!String::from_utf8(read(&blinded)).unwrap().contains("CNN"), "{file}");
+    }
+    let steps = rows(&unblinded, "policy_steps");
+    assert_eq!((steps.len(), steps[0]["metric"].as_str(), steps[0]["policy_micros"].as_str()), (60, "12.5", "17"));
+    assert_eq!(json(&unblinded, "allocation.json")["unblinding_reason"], "the study is over; CNN won");
+    assert_eq!(rows(&unblinded, "sessions")[0]["unblinded"], "after-end");
+}
+
+#[tokio::test]
+async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
+    let data = tempfile::tempdir().unwrap();
+    let (bench, session) = with_session(data.path()).await;
+    bench.unblind(session).await;
+    let out = data.path().join("export");
+    export(bench.store.reader(), session, &out, true).await.unwrap();
+    let checks = verify(&out);
+    assert!(checks.iter().all(|check| matches!(check.verdict, Verdict::Passed(_))), "{checks:#?}");
+
+    let change = |file: &str, from: &str, to: &str| {
+        let path = out.join(file);
+        let before = std::fs::read_to_string(&path).unwrap();
+        assert!(before.contains(from), "{file}");
+        std::fs::write(&path, before.replacen(from, to, 1)).unwrap();
+        let failures: Vec<String> = failed(&verify(&out)).into_iter().map(str::to_owned).collect();
+        std::fs::write(&path, before).unwrap();
+        failures
+    };
+    assert_eq!(change("comments.csv", "🔬", "!"), ["checksums"]);
+    assert_eq!(change("telemetry.csv", "0.35", "abc"), ["checksums", "columns"]);
+    assert_eq!(change("protocol.toml", "120", "121"), ["checksums", "protocol", "commitment"]);
+    let schedule = json(&out, "allocation.json")["schedule"].clone();
+    let (first, other) = (schedule[0].as_str().unwrap(), schedule.as_array().unwrap());
+    let other = other.iter().map(|name| name.as_str().unwrap()).find(|name| *name != first).unwrap();
+    assert_eq!(change("allocation.csv", first, other), ["checksums", "commitment", "schedule"]);
+    let seed = json(&out, "allocation.json")["seed"].as_str().unwrap().to_owned();
+    assert_eq!(change("allocation.json", &seed, &"0".repeat(64)), ["checksums", "commitment", "schedule"]);
+    let third = std::fs::read_to_string(out.join("events.csv")).unwrap().lines().nth(3).unwrap().to_owned() + "\n";
+    assert_eq!(change("events.csv", &third, ""), ["checksums", "events"]);
+    std::fs::write(out.join("more.txt"), "").unwrap();
+    assert_eq!(failed(&verify(&out)), ["checksums"]);
+}
+
+#[tokio::test]
+async fn a_blinded_export_is_verified_as_far_as_it_can_be() {
+    let data = tempfile::tempdir().unwrap();
+    let (bench, session) = with_session(data.path()).await;
+    let out = data.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+    let checks = verify(&out);
+    assert_eq!(failed(&checks), [""; 0]);
+    let open: Vec<_> = checks.iter().filter(|check| matches!(check.verdict, Verdict::NotChecked(_))).collect();
+    assert_eq!(open.iter().map(|check| check.name).collect::<Vec<_>>(), ["commitment", "schedule"]);
+}
+
+#[tokio::test]
+async fn an_export_never_overwrites_and_a_session_that_is_not_there_is_named() {
+    let data = tempfile::tempdir().unwrap();
+    let (bench, session) = with_session(data.path()).await;
+    // As the command does it while the server runs.
+    let reader = Reader::open(data.path()).await.unwrap();
+    let out = data.path().join("a/new/export");
+    export(&reader, session, &out, false).await.unwrap();
+    let again = export(&reader, session, &out, false).await.unwrap_err();
+    assert!(matches!(again, ExportError::Exists(_)), "{again}");
+    assert_eq!(files(&data.path().join("a/new")).len(), 1, "nothing half-written is left beside it");
+    let nobody = "00000000-0000-4000-8000-000000000000".parse().unwrap();
+    let unknown = export(&reader, nobody, &data.path().join("x"), false).await.unwrap_err().to_string();
+    assert!(unknown.contains(&session.to_string()), "{unknown}");
+    drop(bench);
+}
+
+#[tokio::test]
+async fn the_pages_zip_is_the_commands_folder() {
+    let data = tempfile::tempdir().unwrap();
+    let (bench, session) = with_session(data.path()).await;
+    let out = data.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+    let (name, archive) = bench.conductor.export(session, false).await.unwrap();
+    assert_eq!(name, format!("parfocal-{session}.zip"));
+    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(archive)).unwrap();
+    assert_eq!(archive.len(), files(&out).len());
+    for file in files(&out) {
+        let mut content = Vec::new();
+        archive.by_name(&format!("parfocal-{session}/{file}")).unwrap().read_to_end(&mut content).unwrap();
+        assert!(content == std::fs::read(out.join(&file)).unwrap(), "{file}");
+    }
+}
+
+#[tokio::test]
+async fn an_emergency_unblinding_is_flagged_in_the_export() {
+    let data = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(data.path()).await;
+    let session = bench.begin("paper").await;
+    bench.whole_setting().await;
+    bench.unblind(session).await;
+    bench.conductor.act(Role::Operator, session, Action::Abort { reason: "adverse event".to_owned() }).await.unwrap();
+    let out = data.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+    let row = &rows(&out, "sessions")[0];
+    assert_eq!((row["unblinded"].as_str(), row["status"].as_str()), ("while-under-way", "aborted"));
+    assert_eq!(json(&out, "datapackage.json")["parfocal"]["unblinded"], "while-under-way");
+}

@@ -1,0 +1,7 @@
+//! Trials from outside: conductor, store and export together, on a real database file.
+
+mod balance;
+mod bench;
+mod exports;
+mod sessions;
+mod storage;

@@ -1,0 +1,187 @@
+//! The store on a real file: migrations, locks, full disks, rows that cannot be changed, telemetry.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use parfocal::autofocus::PolicyName;
+use parfocal::clock::Moment;
+use parfocal::conductor::ConductError;
+use parfocal::control::{Hold, StepRecord};
+use parfocal::ids::SegmentId;
+use parfocal::lens::FocalPower;
+use parfocal::store::{MIGRATOR, Reader, Store, StoreError, telemetry};
+use parfocal::trial::view::Action;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+
+use crate::bench::{Bench, a_clock, a_run};
+
+async fn raw(folder: &std::path::Path) -> SqlitePool {
+    let options = SqliteConnectOptions::new().filename(folder.join("parfocal.db")).create_if_missing(true);
+    SqlitePool::connect_with(options).await.unwrap()
+}
+
+async fn schema(pool: &SqlitePool) -> BTreeSet<String> {
+    let sql =
+        "SELECT type || ' ' || name FROM sqlite_schema WHERE name NOT LIKE 'sqlite_%' AND name <> '_sqlx_migrations'";
+    sqlx::query_scalar::<_, String>(sql).fetch_all(pool).await.unwrap().into_iter().collect()
+}
+
+/// A step as the control loop reports it.
+pub fn step(frame: u64, segment: Option<SegmentId>) -> StepRecord {
+    StepRecord {
+        frame,
+        exposed_at: Moment::from_nanos(frame * 20_000_000),
+        segment,
+        policy: segment.map(|_| PolicyName::new("mgm-hill-climber")),
+        asked: FocalPower::nearest(0.35),
+        measured: Some(FocalPower::nearest(0.3)),
+        metric: Some(12.5),
+        policy_micros: 17,
+        latency_micros: 640,
+        held: None,
+        optimal: Some(FocalPower::nearest(0.4)),
+    }
+}
+
+#[tokio::test]
+async fn migrations_go_up_and_down_and_up_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let pool = raw(folder.path()).await;
+    MIGRATOR.run(&pool).await.unwrap();
+    let up = schema(&pool).await;
+    assert!(up.contains("table events") && up.contains("trigger comments_no_delete"), "{up:?}");
+    MIGRATOR.undo(&pool, 0).await.unwrap();
+    assert_eq!(schema(&pool).await, BTreeSet::new());
+    MIGRATOR.run(&pool).await.unwrap();
+    assert_eq!(schema(&pool).await, up);
+}
+
+#[tokio::test]
+async fn a_second_server_on_the_folder_is_refused_and_reading_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = Bench::start(folder.path()).await;
+    let refused = Store::open(folder.path(), &a_run(&a_clock())).await.unwrap_err();
+    assert!(matches!(&refused, StoreError::InUse { process, .. } if *process == std::process::id().to_string()));
+    let reader = Reader::open(folder.path()).await.unwrap();
+    assert_eq!(reader.participants().await.unwrap().len(), 1);
+    drop(bench);
+    Store::open(folder.path(), &a_run(&a_clock())).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_database_from_a_newer_version_is_refused_and_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    drop(Bench::start(folder.path()).await);
+    let pool = raw(folder.path()).await;
+    let newer = "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+                 VALUES (9999, 'of the future', 1, x'00', 0)";
+    sqlx::query(newer).execute(&pool).await.unwrap();
+    let refused = Store::open(folder.path(), &a_run(&a_clock())).await.unwrap_err();
+    assert!(matches!(refused, StoreError::Newer { version: 9999 }), "{refused}");
+    assert!(matches!(Reader::open(folder.path()).await, Err(StoreError::Newer { version: 9999 })));
+    let runs: i64 = sqlx::query_scalar("SELECT count(*) FROM runs").fetch_one(&pool).await.unwrap();
+    assert_eq!(runs, 1);
+}
+
+#[tokio::test]
+async fn a_folder_that_cannot_be_used_is_named_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "no folder").unwrap();
+    let refused = Store::open(&file, &a_run(&a_clock())).await.unwrap_err().to_string();
+    assert!(refused.contains("file") && refused.contains("--data-dir"), "{refused}");
+    std::fs::write(folder.path().join("parfocal.db"), "this is no database, whatever its name says".repeat(100))
+        .unwrap();
+    let refused = Store::open(folder.path(), &a_run(&a_clock())).await.unwrap_err();
+    assert!(matches!(refused, StoreError::Damaged(_)), "{refused}");
+    let missing = Reader::open(&folder.path().join("elsewhere")).await.unwrap_err();
+    assert!(matches!(missing, StoreError::Missing(_)), "{missing}");
+}
+
+#[tokio::test]
+async fn on_a_full_disk_nothing_is_acknowledged_and_nothing_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let session = bench.begin("paper").await;
+    bench.say("there was room").await;
+    bench.store.limit_pages(1).await.unwrap();
+    let comment = bench.comment(&"no room ".repeat(1000));
+    let refused = bench.conductor.comment(comment.clone()).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Storage(text) if text.contains("disk is full")), "{refused}");
+    assert_eq!(bench.view().comments, 1);
+    bench.store.limit_pages(u32::MAX - 1).await.unwrap();
+    bench.conductor.comment(comment).await.unwrap();
+    assert_eq!(bench.store.reader().comments(session).await.unwrap().len(), 2);
+}
+
+#[tokio::test]
+async fn what_was_recorded_cannot_be_changed_or_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    bench.whole_session("practice").await;
+    let pool = raw(folder.path()).await;
+    for table in ["sessions", "segments", "events", "comments", "answers"] {
+        for sql in [format!("DELETE FROM {table}"), format!("UPDATE {table} SET session = session")] {
+            let refused = sqlx::query(sqlx::AssertSqlSafe(sql.clone())).execute(&pool).await;
+            assert!(refused.is_err_and(|error| error.to_string().contains("append-only")), "{sql}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn telemetry_is_written_with_its_segment_and_nothing_else_waits_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let session = bench.begin("paper").await;
+    let segment = bench.view().segment.unwrap();
+    bench.surgeon(Action::Acknowledge { segment }).await;
+    let (sender, receiver) = tokio::sync::mpsc::channel(4096);
+    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    for frame in 1..=1000 {
+        let mut record = step(frame, Some(segment).filter(|_| frame > 500));
+        record.metric = if frame == 501 { Some(f64::NAN) } else { record.metric };
+        record.held = (frame == 502).then_some(Hold::Paused);
+        sender.send(record).await.unwrap();
+    }
+    bench.say("meanwhile").await;
+    drop(sender);
+    writer.await.unwrap();
+    assert_eq!(bench.store.telemetry_counts().written.load(Ordering::Relaxed), 1000);
+    let pool = raw(folder.path()).await;
+    let rows: i64 = sqlx::query_scalar("SELECT count(*) FROM telemetry").fetch_one(&pool).await.unwrap();
+    assert_eq!(rows, 1000);
+    let odd: (Option<f64>, String) = sqlx::query_as(
+        "SELECT (SELECT metric FROM telemetry WHERE frame = 501), (SELECT held FROM telemetry WHERE frame = 502)",
+    )
+    .fetch_one(&pool)
+    .await
+    .unwrap();
+    assert_eq!(odd, (None, "paused".to_owned()));
+    let path = bench.store.reader().focal_path(session, 100).await.unwrap();
+    assert_eq!(path.len(), 100, "of the 500 steps in the segment every fifth");
+    assert_eq!((path[0].frame, path[1].frame, path[0].setting), (501, 506, 1));
+}
+
+#[tokio::test]
+async fn telemetry_that_a_failing_disk_refused_is_tried_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = Bench::start(folder.path()).await;
+    let pool = raw(folder.path()).await;
+    let trigger = "CREATE TRIGGER broken BEFORE INSERT ON telemetry BEGIN SELECT RAISE(ABORT, 'broken'); END";
+    sqlx::query(trigger).execute(&pool).await.unwrap();
+    let (sender, receiver) = tokio::sync::mpsc::channel(64);
+    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    sender.send(step(1, None)).await.unwrap();
+    let counts = bench.store.telemetry_counts();
+    while counts.failed_batches.load(Ordering::Relaxed) == 0 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    sqlx::query("DROP TRIGGER broken").execute(&pool).await.unwrap();
+    sender.send(step(2, None)).await.unwrap();
+    drop(sender);
+    writer.await.unwrap();
+    let frames: Vec<i64> = sqlx::query_scalar("SELECT frame FROM telemetry").fetch_all(&pool).await.unwrap();
+    assert_eq!(frames, [1, 2]);
+    assert_eq!(counts.lost.load(Ordering::Relaxed), 0);
+}
