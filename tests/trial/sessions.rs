@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::task::{Context, Waker};
 use std::time::Duration;
 
+use parfocal::autofocus::PolicyName;
 use parfocal::conductor::ConductError;
 use parfocal::control::{Command, Drive};
 use parfocal::lens::FocalPower;
@@ -72,7 +73,7 @@ async fn the_researcher_learns_the_policies_at_unblinding_and_not_before() {
     bench.unblind(session).await;
     let told = bench.conductor.session_detail(session).await.unwrap().unblinding.unwrap();
     assert!(!told.emergency);
-    let mut policies: Vec<&str> = told.policies.iter().map(|policy| policy.as_str()).collect();
+    let mut policies: Vec<&str> = told.policies.iter().map(PolicyName::as_str).collect();
     policies.sort_unstable();
     let twice = |name| [name, name];
     assert_eq!(policies, [twice("fixed"), twice("mgm-hill-climber"), twice("mlr-hill-climber")].concat());
@@ -144,12 +145,11 @@ async fn a_restarted_server_goes_on_at_the_same_place_and_forgets_at_most_a_seco
     bench.wait(Duration::from_secs(90)).await;
     assert_eq!(bench.view().phase, Phase::Questions);
     while bench.view().phase != Phase::Completed {
-        match bench.view().phase {
-            Phase::Notice => drop(bench.whole_setting().await),
-            _ => {
-                bench.answer_all().await;
-                bench.surgeon(Action::FinishQuestions { segment: bench.view().segment }).await;
-            }
+        if bench.view().phase == Phase::Notice {
+            bench.whole_setting().await;
+        } else {
+            bench.answer_all().await;
+            bench.surgeon(Action::FinishQuestions { segment: bench.view().segment }).await;
         }
     }
     let detail = bench.conductor.session_detail(session).await.unwrap();
