@@ -1,9 +1,13 @@
 //! Autofocus: focus metrics and the policies that decide which way to turn the lens. Knows no camera, lens or database.
 
+pub mod belief;
 mod fixed;
 mod hill_climber;
 mod metrics;
+pub mod networks;
 mod registry;
+pub mod spectrum;
+pub mod weights;
 
 pub use fixed::Fixed;
 pub use hill_climber::HillClimber;

@@ -1,1 +1,10 @@
 //! Training: focal-time scans, replay memory, DQN, evaluation. Knows no web.
+
+pub mod belief;
+pub mod defocus;
+pub mod optimiser;
+pub mod pictures;
+pub mod rollout;
+pub mod scan;
+pub mod session;
+pub mod texture;

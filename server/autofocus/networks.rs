@@ -1,0 +1,147 @@
+//! The learned policies' networks: the paper's two (Budd et al., MICCAI 2023), and the belief tracker's.
+
+use tch::nn::{self, Module, ModuleT, RNN};
+use tch::{Device, Kind, Tensor};
+
+use super::spectrum::FEATURES;
+use crate::imaging::PATCH_SIDE;
+
+/// Latest frames that the paper's networks see.
+pub const HISTORY: usize = 8;
+/// Actions of the paper's networks: a step down, none, a step up.
+pub const ACTIONS: usize = 3;
+/// Logits that the paper's encoder makes of a patch.
+pub const ENCODING: usize = 8;
+/// Slices of 0..=1 in the belief tracker's posterior.
+pub const BINS: usize = 41;
+/// Units of the belief tracker's memory.
+pub const MEMORY: usize = 96;
+/// What the belief tracker sees of a frame: features, their change, where the lens stood (softly, one in [`BINS`]), and
+/// three numbers on how it moved.
+pub const BELIEF_INPUT: usize = 2 * FEATURES + BINS + 3;
+
+const HIDDEN: i64 = 256;
+const SIDE: i64 = PATCH_SIDE as i64;
+
+/// Three dense layers, `input` -> 256 -> 256 -> 3, ReLU between: the action values.
+#[derive(Debug)]
+pub struct ValueHead {
+    layers: [nn::Linear; 3],
+}
+
+impl ValueHead {
+    /// A fresh head whose weights live under `path`.
+    #[must_use]
+    pub fn new(path: &nn::Path<'_>, input: usize) -> Self {
+        let input = i64::try_from(input).unwrap_or(i64::MAX);
+        let dense = |name, from, to| nn::linear(path / name, from, to, nn::LinearConfig::default());
+        let layers = [dense("0", input, HIDDEN), dense("2", HIDDEN, HIDDEN), dense("4", HIDDEN, ACTIONS as i64)];
+        Self { layers }
+    }
+
+    /// Action values `[N, 3]` of states `[N, input]`.
+    #[must_use]
+    pub fn forward(&self, state: &Tensor) -> Tensor {
+        let hidden = self.layers[0].forward(state).relu();
+        self.layers[2].forward(&self.layers[1].forward(&hidden).relu())
+    }
+}
+
+/// Four convolutions of 8 filters, kernel 3, stride 2, no padding, ReLU between: 32x32 -> 8 logits.
+#[derive(Debug)]
+pub struct Encoder {
+    convolutions: [nn::Conv2D; 4],
+}
+
+impl Encoder {
+    /// A fresh encoder whose weights live under `path`.
+    #[must_use]
+    pub fn new(path: &nn::Path<'_>) -> Self {
+        let config = nn::ConvConfig { stride: 2, ..Default::default() };
+        let layer = |name, from| nn::conv2d(path / name, from, ENCODING as i64, 3, config);
+        Self { convolutions: [layer("0", 1), layer("2", 8), layer("4", 8), layer("6", 8)] }
+    }
+
+    /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale.
+    #[must_use]
+    pub fn forward(&self, patches: &Tensor) -> Tensor {
+        let mut x = patches.view([-1, 1, SIDE, SIDE]) / 255.0 - 0.5;
+        for (index, convolution) in self.convolutions.iter().enumerate() {
+            x = convolution.forward_t(&x, false);
+            if index < 3 {
+                x = x.relu();
+            }
+        }
+        x.view([-1, ENCODING as i64])
+    }
+}
+
+/// The belief tracker: a GRU over frames and a head that gives a posterior over the next frame's optimum.
+#[derive(Debug)]
+pub struct BeliefNetwork {
+    memory: nn::GRU,
+    head: [nn::Linear; 2],
+}
+
+impl BeliefNetwork {
+    /// A fresh network whose weights live under `path`.
+    #[must_use]
+    pub fn new(path: &nn::Path<'_>) -> Self {
+        let units = MEMORY as i64;
+        let dense = |name, from, to| nn::linear(path / name, from, to, nn::LinearConfig::default());
+        Self {
+            memory: nn::gru(path / "memory", BELIEF_INPUT as i64, units, nn::RNNConfig::default()),
+            head: [dense("head_0", units, units), dense("head_2", units, BINS as i64)],
+        }
+    }
+
+    /// The memory before anything was seen, for `count` scans: `[1, count, MEMORY]`.
+    #[must_use]
+    pub fn blank(&self, count: usize, device: Device) -> Tensor {
+        Tensor::zeros([1, i64::try_from(count).unwrap_or(i64::MAX), MEMORY as i64], (Kind::Float, device))
+    }
+
+    /// Logits `[N, T, BINS]` of inputs `[N, T, BELIEF_INPUT]` from memory `[1, N, MEMORY]`, and the memory after them.
+    #[must_use]
+    pub fn forward(&self, inputs: &Tensor, memory: &Tensor) -> (Tensor, Tensor) {
+        let (units, state) = self.memory.seq_init(inputs, &nn::GRUState(memory.shallow_clone()));
+        let hidden = self.head[0].forward(&units).relu();
+        (self.head[1].forward(&hidden), state.value())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameters(store: &nn::VarStore) -> usize {
+        store.trainable_variables().iter().map(Tensor::numel).sum()
+    }
+
+    #[test]
+    fn the_papers_networks_have_its_shapes_and_sizes() {
+        let (encoder_store, head_store) = (nn::VarStore::new(Device::Cpu), nn::VarStore::new(Device::Cpu));
+        let encoder = Encoder::new(&encoder_store.root());
+        let head = ValueHead::new(&head_store.root(), HISTORY * (ENCODING + 1));
+        assert_eq!(parameters(&encoder_store), 1_832);
+        assert_eq!(parameters(&head_store), 85_251);
+        let encodings = encoder.forward(&Tensor::zeros([5, 1024], (Kind::Float, Device::Cpu)));
+        assert_eq!(encodings.size(), [5, 8]);
+        assert_eq!(head.forward(&Tensor::zeros([5, 72], (Kind::Float, Device::Cpu))).size(), [5, 3]);
+    }
+
+    #[test]
+    fn the_belief_tracker_goes_frame_by_frame_as_over_a_whole_scan() {
+        tch::manual_seed(1);
+        let store = nn::VarStore::new(Device::Cpu);
+        let network = BeliefNetwork::new(&store.root());
+        let inputs = Tensor::randn([2, 6, BELIEF_INPUT as i64], (Kind::Float, Device::Cpu));
+        let (whole, _) = network.forward(&inputs, &network.blank(2, Device::Cpu));
+        let mut memory = network.blank(2, Device::Cpu);
+        let mut last = Tensor::new();
+        for t in 0..6 {
+            (last, memory) = network.forward(&inputs.narrow(1, t, 1), &memory);
+        }
+        assert!(last.allclose(&whole.narrow(1, 5, 1), 1e-4, 1e-5, false));
+    }
+}

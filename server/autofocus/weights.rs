@@ -1,0 +1,96 @@
+//! Weights of networks as safetensors, read and written without trust: a damaged file is an error, never a crash.
+
+use std::collections::{BTreeMap, HashMap};
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use tch::{Kind, Tensor, nn};
+
+/// Why weights could not be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WeightsError {
+    /// Not safetensors, or cut short.
+    #[error("the weights are damaged: {0}")]
+    Damaged(String),
+    /// A tensor of the network is not there or does not fit.
+    #[error("the weights are of another network: {0}")]
+    Mismatch(String),
+}
+
+/// Fills every variable of `store` from safetensors `bytes`.
+///
+/// # Errors
+/// When the bytes are damaged, or hold a different set of tensors than the network has.
+pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
+    let file = SafeTensors::deserialize(bytes).map_err(|error| WeightsError::Damaged(error.to_string()))?;
+    let variables = store.variables();
+    if let Some(name) = file.names().into_iter().find(|name| !variables.contains_key(*name)) {
+        return Err(WeightsError::Mismatch(format!("the network has no tensor '{name}'")));
+    }
+    for (name, mut variable) in variables {
+        let view =
+            file.tensor(&name).map_err(|_| WeightsError::Mismatch(format!("tensor '{name}' is missing")))?;
+        let shape: Vec<i64> = view.shape().iter().map(|&side| i64::try_from(side).unwrap_or(i64::MAX)).collect();
+        if view.dtype() != Dtype::F32 || shape != variable.size() {
+            return Err(WeightsError::Mismatch(format!("tensor '{name}' has shape {shape:?}, not {:?}", variable.size())));
+        }
+        let tensor = Tensor::f_from_data_size(view.data(), &shape, Kind::Float)
+            .map_err(|error| WeightsError::Damaged(error.to_string()))?;
+        if !bool::try_from(tensor.isfinite().all()).unwrap_or(false) {
+            return Err(WeightsError::Damaged(format!("tensor '{name}' holds values that are no numbers")));
+        }
+        tch::no_grad(|| variable.copy_(&tensor));
+    }
+    Ok(())
+}
+
+/// The variables of `store` as safetensors, with `notes` in the file's metadata.
+///
+/// # Errors
+/// When the tensors cannot be laid out, which no network of this program gives cause for.
+pub fn save(store: &nn::VarStore, notes: &BTreeMap<String, String>) -> Result<Vec<u8>, WeightsError> {
+    let data: BTreeMap<String, (Vec<usize>, Vec<u8>)> =
+        store.variables().into_iter().map(|(name, tensor)| (name, raw(&tensor))).collect();
+    let mut views = Vec::with_capacity(data.len());
+    for (name, (shape, bytes)) in &data {
+        let view = TensorView::new(Dtype::F32, shape.clone(), bytes)
+            .map_err(|error| WeightsError::Damaged(error.to_string()))?;
+        views.push((name.as_str(), view));
+    }
+    let notes: HashMap<String, String> = notes.clone().into_iter().collect();
+    safetensors::serialize(views, Some(notes)).map_err(|error| WeightsError::Damaged(error.to_string()))
+}
+
+/// Shape and little-endian bytes of a float tensor.
+fn raw(tensor: &Tensor) -> (Vec<usize>, Vec<u8>) {
+    let shape = tensor.size().iter().map(|&side| usize::try_from(side).unwrap_or(0)).collect();
+    let mut values = vec![0.0f32; tensor.numel()];
+    tensor.to_device(tch::Device::Cpu).contiguous().view([-1]).copy_data(&mut values, tensor.numel());
+    (shape, values.iter().flat_map(|value| value.to_le_bytes()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tch::Device;
+
+    fn store(width: i64) -> nn::VarStore {
+        let store = nn::VarStore::new(Device::Cpu);
+        let _ = nn::linear(store.root() / "layer", width, 2, nn::LinearConfig::default());
+        store
+    }
+
+    #[test]
+    fn weights_survive_the_way_out_and_in() {
+        let (from, to) = (store(3), store(3));
+        load(&to, &save(&from, &BTreeMap::new()).unwrap()).unwrap();
+        assert_eq!(from.variables()["layer.weight"], to.variables()["layer.weight"]);
+    }
+
+    #[test]
+    fn damaged_and_foreign_weights_are_refused() {
+        let bytes = save(&store(3), &BTreeMap::new()).unwrap();
+        assert!(matches!(load(&store(3), &bytes[..bytes.len() - 1]), Err(WeightsError::Damaged(_))));
+        assert!(matches!(load(&store(3), b"not weights"), Err(WeightsError::Damaged(_))));
+        assert!(matches!(load(&store(4), &bytes), Err(WeightsError::Mismatch(_))));
+    }
+}

@@ -1,0 +1,164 @@
+//! Trains the belief tracker: in simulation the optimum is known at every frame, so the posterior is learned directly,
+//! by cross-entropy, on scans that the tracker itself steers.
+#![allow(
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    reason = "small counts as tensor sizes and shares"
+)]
+
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use tch::{Device, Kind, Tensor, nn};
+
+use super::optimiser::{Optimiser, Rule};
+use super::scan::{Clip, Variety};
+use super::session::{Session, lead_astray};
+use crate::autofocus::belief::{Trace, median, spread_over_bins, target};
+use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
+use crate::autofocus::spectrum::features;
+
+/// How a belief tracker is trained.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeliefRecipe {
+    /// Scans side by side.
+    pub scans: usize,
+    /// Frames that a gradient goes back.
+    pub window: usize,
+    /// Windows until a scan is replaced by another.
+    pub windows_a_scan: usize,
+    /// Updates in all.
+    pub updates: u64,
+    /// Optimiser.
+    pub optimiser: Rule,
+    /// Largest norm of a gradient.
+    pub clip: f64,
+    /// Share of the learning rate that is left at the end; the way there is a half cosine.
+    pub final_rate: f64,
+    /// Share of scans that differ from the reference in speed, spot, noise, exposure, lens.
+    pub variety: f64,
+    /// Share of scans on which the tracker is led astray.
+    pub wandering: f64,
+}
+
+/// A training in progress.
+pub struct BeliefTrainer {
+    recipe: BeliefRecipe,
+    clips: Vec<Arc<Clip>>,
+    /// The variables of the network.
+    pub store: nn::VarStore,
+    network: BeliefNetwork,
+    optimiser: Optimiser,
+    seats: Vec<Seat>,
+    memory: Tensor,
+    rng: ChaCha8Rng,
+    updates: u64,
+}
+
+struct Seat {
+    session: Session,
+    trace: Trace,
+    windows_left: usize,
+}
+
+/// Frames and what should have been believed: inputs `[N, T, BELIEF_INPUT]`, beliefs `[N, T, BINS]`.
+struct Batch {
+    inputs: Tensor,
+    beliefs: Tensor,
+}
+
+impl BeliefTrainer {
+    /// A training from nothing on `clips`.
+    #[must_use]
+    pub fn new(recipe: BeliefRecipe, clips: Vec<Arc<Clip>>, seed: u64) -> Self {
+        tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let store = nn::VarStore::new(Device::Cpu);
+        let network = BeliefNetwork::new(&store.root());
+        let optimiser = Optimiser::new(recipe.optimiser, &store);
+        let seats = (0..recipe.scans)
+            .map(|index| Seat {
+                session: Session::draw(&clips, Variety { share: recipe.variety }, recipe.wandering, &mut rng),
+                trace: Trace::default(),
+                windows_left: 1 + index % recipe.windows_a_scan,
+            })
+            .collect();
+        let memory = network.blank(recipe.scans, Device::Cpu);
+        Self { recipe, clips, store, network, optimiser, seats, memory, rng, updates: 0 }
+    }
+
+    /// Updates done.
+    #[must_use]
+    pub const fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// Steers all scans through one window, learns from it, and returns the mean cross-entropy.
+    pub fn update(&mut self) -> f64 {
+        let before = self.memory.shallow_clone();
+        let batch = self.collect();
+        let (logits, _) = self.network.forward(&batch.inputs, &before);
+        let loss = -(logits.log_softmax(-1, Kind::Float) * batch.beliefs).sum_dim_intlist(-1, false, Kind::Float);
+        let loss = loss.mean(Kind::Float);
+        let done = self.updates as f64 / self.recipe.updates as f64;
+        let floor = self.recipe.final_rate;
+        let warm = (self.updates as f64 / 200.0).min(1.0);
+        let rate = floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos());
+        self.optimiser.minimise(&loss, self.recipe.clip, warm * rate);
+        self.updates += 1;
+        self.replace_finished();
+        loss.double_value(&[])
+    }
+
+    fn collect(&mut self) -> Batch {
+        let (count, window) = (self.seats.len(), self.recipe.window);
+        let mut inputs = vec![0.0f32; count * window * BELIEF_INPUT];
+        let mut beliefs = vec![0.0f32; count * window * BINS];
+        let mut now = vec![0.0f32; count * BELIEF_INPUT];
+        let mut believed = vec![0.0f32; count * BINS];
+        for t in 0..window {
+            for (index, seat) in self.seats.iter_mut().enumerate() {
+                let seen = features(&seat.session.observe());
+                let input = seat.trace.input(&seen, seat.session.focal_power().get());
+                now[index * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
+                inputs[(index * window + t) * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
+            }
+            let tensor = Tensor::from_slice(&now).view([count as i64, 1, BELIEF_INPUT as i64]);
+            let (logits, memory) = tch::no_grad(|| self.network.forward(&tensor, &self.memory));
+            self.memory = memory;
+            logits.view([-1, BINS as i64]).softmax(-1, Kind::Float).copy_data(&mut believed, count * BINS);
+            for (index, seat) in self.seats.iter_mut().enumerate() {
+                let stands = seat.session.focal_power().get();
+                let mut aim = target(stands, median(&believed[index * BINS..][..BINS]));
+                if seat.session.wanders {
+                    aim = lead_astray(aim, &mut self.rng);
+                }
+                seat.trace.ask(aim.clamp(0.0, 1.0));
+                seat.session.advance(aim);
+                let place = seat.session.optimum().get();
+                spread_over_bins(place, &mut beliefs[(index * window + t) * BINS..][..BINS]);
+            }
+        }
+        let (count, window) = (count as i64, window as i64);
+        Batch {
+            inputs: Tensor::from_slice(&inputs).view([count, window, BELIEF_INPUT as i64]),
+            beliefs: Tensor::from_slice(&beliefs).view([count, window, BINS as i64]),
+        }
+    }
+
+    fn replace_finished(&mut self) {
+        for (index, seat) in self.seats.iter_mut().enumerate() {
+            seat.windows_left -= 1;
+            if seat.windows_left == 0 {
+                let variety = Variety { share: self.recipe.variety };
+                seat.session = Session::draw(&self.clips, variety, self.recipe.wandering, &mut self.rng);
+                seat.trace = Trace::default();
+                seat.windows_left = self.recipe.windows_a_scan;
+                let _ = self.memory.select(1, index as i64).fill_(0.0);
+            }
+        }
+    }
+}

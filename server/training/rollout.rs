@@ -1,0 +1,104 @@
+//! One policy on one focal-time scan: where it went, and how well that was.
+#![allow(clippy::cast_precision_loss, reason = "counts of frames are small")]
+
+use super::scan::Scan;
+use crate::autofocus::{Observation, Policy, STEP};
+use crate::lens::FocalPower;
+
+/// Errors below this are in focus, as in the paper.
+pub const IN_FOCUS: f64 = 0.1;
+/// Frames a second of simulated scans: the paper's clips hold 250 frames in 10 s.
+pub const FRAMES_A_SECOND: f64 = 25.0;
+
+/// Where the lens and the optimum stood, frame by frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Path {
+    /// Focal power of each frame.
+    pub focal_power: Vec<f64>,
+    /// Optimal focal power of each frame.
+    pub optimum: Vec<f64>,
+}
+
+/// How good a [`Path`] is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathFigures {
+    /// Mean absolute focal power error.
+    pub mae: f64,
+    /// Share of frames with an error below [`IN_FOCUS`].
+    pub in_focus: f64,
+    /// Mean absolute change of focal power a frame.
+    pub travel: f64,
+    /// Changes of direction a second.
+    pub reversals: f64,
+}
+
+impl Path {
+    /// Absolute error of each frame.
+    pub fn errors(&self) -> impl Iterator<Item = f64> + '_ {
+        self.focal_power.iter().zip(&self.optimum).map(|(f, best)| (f - best).abs())
+    }
+
+    /// Figures of this path; all zero for an empty one.
+    #[must_use]
+    pub fn figures(&self) -> PathFigures {
+        let frames = self.focal_power.len().max(1) as f64;
+        let moves: Vec<f64> =
+            self.focal_power.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| step.abs() > 1e-9).collect();
+        let turns = moves.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+        PathFigures {
+            mae: self.errors().sum::<f64>() / frames,
+            in_focus: self.errors().filter(|&error| error < IN_FOCUS).count() as f64 / frames,
+            travel: moves.iter().map(|step| step.abs()).sum::<f64>() / (frames - 1.0).max(1.0),
+            reversals: turns as f64 / (frames / FRAMES_A_SECOND),
+        }
+    }
+}
+
+/// Runs `policy` over `frames` frames of `scan`, starting in the middle of the lens's range. What the policy asks for is
+/// what the next frame is seen at.
+pub fn roll_out(policy: &mut dyn Policy, scan: &mut Scan, frames: usize) -> Path {
+    let mut focal_power = FocalPower::MIDDLE;
+    let mut path = Path::default();
+    for _ in 0..frames {
+        let patch = scan.observe(focal_power);
+        path.focal_power.push(focal_power.get());
+        path.optimum.push(scan.optimum().get());
+        focal_power = FocalPower::nearest(policy.step(&Observation { patch: &patch, focal_power }).target);
+        scan.advance();
+    }
+    path
+}
+
+/// What a policy with the paper's steps could do at best, if it knew the next frame's optimum.
+pub fn roll_out_oracle(scan: &mut Scan, frames: usize) -> Path {
+    let mut focal_power = FocalPower::MIDDLE;
+    let mut path = Path::default();
+    for _ in 0..frames {
+        path.focal_power.push(focal_power.get());
+        path.optimum.push(scan.optimum().get());
+        scan.advance();
+        let best = scan.optimum();
+        focal_power = [0.0, -STEP, STEP]
+            .map(|step| focal_power.moved(step))
+            .into_iter()
+            .min_by(|a, b| a.distance(best).total_cmp(&b.distance(best)))
+            .unwrap_or(focal_power);
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_of_a_hand_worked_path() {
+        let path = Path { focal_power: vec![0.5, 0.55, 0.55, 0.5, 0.55], optimum: vec![0.5, 0.5, 0.7, 0.5, 0.5] };
+        let figures = path.figures();
+        assert!((figures.mae - 0.05).abs() < 1e-12);
+        assert!((figures.in_focus - 0.8).abs() < 1e-12);
+        assert!((figures.travel - 0.0375).abs() < 1e-12);
+        // Up, down, up: two turns in a fifth of a second.
+        assert!((figures.reversals - 10.0).abs() < 1e-12);
+    }
+}

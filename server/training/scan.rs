@@ -1,0 +1,279 @@
+//! Simulated focal-time scans: a crop walks over sharp pictures, the optimal focal power walks too, and what is seen at
+//! another focal power is blurred in proportion to the distance (Budd et al., MICCAI 2023).
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    reason = "pixel arithmetic on small numbers"
+)]
+
+use std::sync::Arc;
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::defocus::{Defocus, Spot};
+use crate::camera::walk::{Motion, Walk, standard_normal};
+use crate::imaging::{GrayImage, PATCH_SIDE, Patch};
+use crate::lens::FocalPower;
+
+/// Sharp pictures in order of time, one for a still, and where patches may lie on them.
+#[derive(Debug, Clone)]
+pub struct Clip {
+    frames: Vec<Arc<GrayImage>>,
+    area: Area,
+}
+
+/// A rectangle of pixels: `left <= x < right`, `top <= y < bottom`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Area {
+    /// First column.
+    pub left: usize,
+    /// First row.
+    pub top: usize,
+    /// Column after the last.
+    pub right: usize,
+    /// Row after the last.
+    pub bottom: usize,
+}
+
+/// Pictures that no scan can be made of.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ClipError {
+    /// There is no picture at all.
+    #[error("there are no pictures to scan")]
+    Empty,
+    /// A patch and its surroundings do not fit.
+    #[error("pictures must show at least 64x64 pixels to scan; these show {width}x{height}")]
+    TooSmall {
+        /// Usable width in pixels.
+        width: usize,
+        /// Usable height in pixels.
+        height: usize,
+    },
+    /// The pictures differ in size.
+    #[error("picture {index} is not of the first one's size")]
+    SizesDiffer {
+        /// Position, from 0.
+        index: usize,
+    },
+}
+
+impl Clip {
+    /// A clip of `frames`; patches stay within `area`, or anywhere where it is `None`.
+    ///
+    /// # Errors
+    /// When there is no frame, sizes differ, or less than 64x64 pixels can be used.
+    pub fn new(frames: Vec<Arc<GrayImage>>, area: Option<Area>) -> Result<Self, ClipError> {
+        let first = frames.first().ok_or(ClipError::Empty)?;
+        let size = (first.width, first.height);
+        if let Some(index) = frames.iter().position(|frame| (frame.width, frame.height) != size) {
+            return Err(ClipError::SizesDiffer { index });
+        }
+        let area = area.unwrap_or(Area { left: 0, top: 0, right: size.0, bottom: size.1 });
+        let area = Area { right: area.right.min(size.0), bottom: area.bottom.min(size.1), ..area };
+        let (width, height) = (area.right.saturating_sub(area.left), area.bottom.saturating_sub(area.top));
+        if width < 64 || height < 64 {
+            return Err(ClipError::TooSmall { width, height });
+        }
+        Ok(Self { frames, area })
+    }
+
+    /// A clip of one picture.
+    ///
+    /// # Errors
+    /// When it is smaller than 64x64 pixels.
+    pub fn still(picture: GrayImage) -> Result<Self, ClipError> {
+        Self::new(vec![Arc::new(picture)], None)
+    }
+
+    /// The picture at time `t`; after the end the clip runs backwards, and so on.
+    fn at(&self, t: usize) -> &GrayImage {
+        let last = self.frames.len() - 1;
+        if last == 0 {
+            return &self.frames[0];
+        }
+        let phase = t % (2 * last);
+        &self.frames[phase.min(2 * last - phase)]
+    }
+}
+
+/// How a scan moves, blurs and is exposed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanSettings {
+    /// How the optimal focal power moves, in focal power a frame.
+    pub focus: Motion,
+    /// How the crop moves, in pixels a frame.
+    pub crop: Motion,
+    /// Blur in pixels of standard deviation a unit of focal power, drawn per scan from this range.
+    pub blur: (f64, f64),
+    /// Shape of the blur.
+    pub spot: Spot,
+    /// Standard deviation of the noise, in gray levels.
+    pub noise: f64,
+    /// Contrast and brightness: gray becomes `gain * gray + offset`.
+    pub exposure: (f64, f64),
+}
+
+impl Default for ScanSettings {
+    /// The reference benchmark's scans; `docs/results.md` tells how they were calibrated.
+    fn default() -> Self {
+        Self {
+            focus: Motion { speed: 0.012, memory: 60.0 },
+            crop: Motion { speed: 1.0, memory: 30.0 },
+            blur: (2.0, 8.0),
+            spot: Spot::Gaussian,
+            noise: 0.0,
+            exposure: (1.0, 0.0),
+        }
+    }
+}
+
+/// One focal-time scan, frame by frame. Its course depends on its seed alone, never on what is looked at.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    clip: Arc<Clip>,
+    settings: ScanSettings,
+    sigma0: f64,
+    time: usize,
+    focus: Walk,
+    crop: [Walk; 2],
+    course: ChaCha8Rng,
+    noise: ChaCha8Rng,
+    defocus: Defocus,
+}
+
+impl Scan {
+    /// A scan over `clip` whose course is drawn from `seed`.
+    #[must_use]
+    pub fn new(clip: Arc<Clip>, settings: ScanSettings, seed: u64) -> Self {
+        let mut course = ChaCha8Rng::seed_from_u64(seed);
+        let sigma0 = course.random_range(settings.blur.0..=settings.blur.1);
+        let focus = Walk::new((0.0, 1.0), settings.focus, &mut course);
+        let Area { left, top, right, bottom } = clip.area;
+        let crop = [(left, right), (top, bottom)]
+            .map(|(low, high)| Walk::new((low as f64, (high - PATCH_SIDE) as f64), settings.crop, &mut course));
+        let time = if clip.frames.len() > 1 { course.random_range(0..2 * clip.frames.len()) } else { 0 };
+        let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
+        Self { clip, settings, sigma0, time, focus, crop, course, noise, defocus: Defocus::default() }
+    }
+
+    /// The optimal focal power at this frame.
+    #[must_use]
+    pub fn optimum(&self) -> FocalPower {
+        FocalPower::nearest(self.focus.position())
+    }
+
+    /// Pixels of blur (standard deviation) a unit of focal power.
+    #[must_use]
+    pub const fn blur(&self) -> f64 {
+        self.sigma0
+    }
+
+    /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.
+    pub fn observe(&mut self, focal_power: FocalPower) -> Patch {
+        let sigma = self.sigma0 * focal_power.distance(self.optimum());
+        let corner = (self.crop[0].position() as isize, self.crop[1].position() as isize);
+        let mut patch = self.defocus.patch(self.clip.at(self.time), corner, sigma, self.settings.spot);
+        let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
+        for value in &mut patch.0 {
+            let mut gray = gain * *value + offset;
+            if self.settings.noise > 0.0 {
+                gray += self.settings.noise as f32 * cheap_normal(&mut self.noise);
+            }
+            *value = gray.clamp(0.0, 255.0).round();
+        }
+        patch
+    }
+
+    /// Goes on to the next frame.
+    pub fn advance(&mut self) {
+        self.time += 1;
+        self.focus.advance(&mut self.course);
+        self.crop.iter_mut().for_each(|walk| walk.advance(&mut self.course));
+    }
+}
+
+/// Nearly normal, mean 0 and variance 1: the sum of four uniform bytes, good enough for camera noise and ten times as
+/// fast as an exact draw.
+fn cheap_normal(rng: &mut impl Rng) -> f32 {
+    let sum: i32 = rng.random::<u32>().to_le_bytes().iter().map(|&byte| i32::from(byte)).sum();
+    (sum - 510) as f32 * (1.0 / 147.8)
+}
+
+/// How scans for training differ from one another, so that a policy does not learn one rig by heart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variety {
+    /// How much of the variety to apply: 0 gives reference scans, 1 all of it.
+    pub share: f64,
+}
+
+impl Variety {
+    /// Settings for one scan: with probability `share` varied in speed, spot, noise and exposure.
+    pub fn draw(&self, rng: &mut impl Rng) -> ScanSettings {
+        let mut settings = ScanSettings::default();
+        if !rng.random_bool(self.share) {
+            return settings;
+        }
+        let factor = |rng: &mut _, spread: f64| (spread * standard_normal(rng)).exp();
+        settings.focus.speed *= factor(rng, 0.3);
+        settings.focus.memory *= factor(rng, 0.4);
+        settings.crop.speed *= factor(rng, 0.5);
+        settings.crop.memory *= factor(rng, 0.4);
+        settings.spot = if rng.random_bool(0.5) { Spot::Disc } else { Spot::Gaussian };
+        settings.noise = if rng.random_bool(0.7) { rng.random_range(0.0..4.0) } else { 0.0 };
+        let gain: f64 = rng.random_range(0.3..1.3);
+        settings.exposure = (gain, rng.random_range(-0.5..1.0) * 120.0 * (1.0 - gain));
+        settings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::texture::texture;
+
+    fn scan(seed: u64) -> Scan {
+        Scan::new(Arc::new(Clip::still(texture(1, 256)).unwrap()), ScanSettings::default(), seed)
+    }
+
+    #[test]
+    fn looking_changes_nothing_of_the_course() {
+        let (mut looked_at, mut left_alone) = (scan(5), scan(5));
+        for _ in 0..50 {
+            looked_at.observe(FocalPower::MIN);
+            looked_at.advance();
+            left_alone.advance();
+        }
+        assert_eq!(looked_at.optimum(), left_alone.optimum());
+        assert_eq!(looked_at.observe(FocalPower::MIDDLE), left_alone.observe(FocalPower::MIDDLE));
+    }
+
+    #[test]
+    fn the_patch_is_sharpest_at_the_optimum() {
+        let mut scan = scan(6);
+        let sharp = crate::autofocus::mgm(&scan.observe(scan.optimum()));
+        for step in [-0.4, -0.2, 0.2, 0.4] {
+            let elsewhere = scan.optimum().moved(step);
+            if elsewhere.distance(scan.optimum()) > 0.1 {
+                assert!(crate::autofocus::mgm(&scan.observe(elsewhere)) < sharp);
+            }
+        }
+    }
+
+    #[test]
+    fn unusable_pictures_are_refused() {
+        assert_eq!(Clip::new(Vec::new(), None).unwrap_err(), ClipError::Empty);
+        let small = GrayImage::new(70, 20, vec![0.0; 1400]).unwrap();
+        assert_eq!(Clip::still(small).unwrap_err(), ClipError::TooSmall { width: 70, height: 20 });
+    }
+
+    #[test]
+    fn cheap_noise_has_unit_variance() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let draws: Vec<f32> = (0..100_000).map(|_| cheap_normal(&mut rng)).collect();
+        let mean = draws.iter().sum::<f32>() / 1e5;
+        let variance = draws.iter().map(|v| v * v).sum::<f32>() / 1e5;
+        assert!(mean.abs() < 0.02 && (variance - 1.0).abs() < 0.02, "{mean} {variance}");
+    }
+}
