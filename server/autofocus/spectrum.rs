@@ -9,7 +9,7 @@
     reason = "indices and weights of a 32x32 transform"
 )]
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use multiversion::multiversion;
@@ -27,13 +27,12 @@ const HALF: usize = PATCH_SIDE / 2;
 
 type Matrix = [[f32; COLUMNS]; PATCH_SIDE];
 
+/// Waves for the transform, times the Hann window along their axis.
 struct Tables {
-    /// Hann window along one axis.
-    window: [f32; PATCH_SIDE],
-    /// cos and sin of 2 pi row column / 32 for the first [`COLUMNS`] frequencies, windowed.
+    /// cos and sin of 2 pi row column / 32 for the first [`COLUMNS`] frequencies.
     cos: Matrix,
     sin: Matrix,
-    /// cos and sin for all 32 frequencies of the second axis, windowed.
+    /// cos and sin for all 32 frequencies of the second axis.
     full_cos: [[f32; PATCH_SIDE]; PATCH_SIDE],
     full_sin: [[f32; PATCH_SIDE]; PATCH_SIDE],
     /// Band of each (row frequency, column frequency), `BANDS` for none.
@@ -51,7 +50,6 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
         std::array::from_fn(|k| std::array::from_fn(|row| window[row] * f(wave(row, k)) as f32))
     };
     Tables {
-        window,
         cos: table(f64::cos),
         sin: table(f64::sin),
         full_cos: full(f64::cos),
@@ -130,7 +128,7 @@ mod tests {
 
     fn wave(frequency: f64) -> Patch {
         Patch(std::array::from_fn(|i| {
-            (128.0 + 50.0 * (TAU * frequency * (i % PATCH_SIDE) as f64 / PATCH_SIDE as f64 + PI / 5.0).cos()) as f32
+            (128.0 + 50.0 * (TAU * frequency * (i % PATCH_SIDE) as f64 / PATCH_SIDE as f64 + 0.6).cos()) as f32
         }))
     }
 
@@ -145,10 +143,12 @@ mod tests {
 
     #[test]
     fn the_transform_is_the_textbook_one() {
-        // A pure wave of amplitude 50 under a Hann window: |X|² = (50/2 · Σw · Σw)² at its peak, Σw = 16.
-        let tables = &*TABLES;
-        let (energy, _) = band_energies(&wave(5.0).0, 128.0, tables);
-        let peak = (25.0f32 * 16.0 * 16.0).powi(2);
-        assert!(energy.iter().sum::<f32>() > peak && tables.window.iter().sum::<f32>() - 16.0 < 1e-4);
+        // A wave of amplitude A at frequency (5, 0) under a Hann window (weights 1/4, 1/2, 1/4 on neighbouring
+        // frequencies along each axis) has |X|² = (A/2 · 512² · ...)²: summed over the half plane, with both signs of
+        // the row frequency, (A/2 · 32 · 32)² · (3/8)² by Parseval.
+        let (energy, _) = band_energies(&wave(5.0).0, 128.0, &TABLES);
+        let expected = (25.0f32 * 1024.0 * 0.375).powi(2);
+        let found = energy.iter().sum::<f32>();
+        assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
     }
 }

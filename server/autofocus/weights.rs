@@ -27,11 +27,13 @@ pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
         return Err(WeightsError::Mismatch(format!("the network has no tensor '{name}'")));
     }
     for (name, mut variable) in variables {
-        let view =
-            file.tensor(&name).map_err(|_| WeightsError::Mismatch(format!("tensor '{name}' is missing")))?;
+        let view = file.tensor(&name).map_err(|_| WeightsError::Mismatch(format!("tensor '{name}' is missing")))?;
         let shape: Vec<i64> = view.shape().iter().map(|&side| i64::try_from(side).unwrap_or(i64::MAX)).collect();
         if view.dtype() != Dtype::F32 || shape != variable.size() {
-            return Err(WeightsError::Mismatch(format!("tensor '{name}' has shape {shape:?}, not {:?}", variable.size())));
+            return Err(WeightsError::Mismatch(format!(
+                "tensor '{name}' has shape {shape:?}, not {:?}",
+                variable.size()
+            )));
         }
         let tensor = Tensor::f_from_data_size(view.data(), &shape, Kind::Float)
             .map_err(|error| WeightsError::Damaged(error.to_string()))?;

@@ -4,6 +4,7 @@ mod announce;
 mod devices;
 mod export;
 mod inspect;
+mod evaluate;
 mod lens;
 mod policies;
 mod serve;
@@ -29,6 +30,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Look at a lens, move it by hand, sweep it, or start one that is not there.
     Lens(lens::Arguments),
+    /// Run policies on focal-time scans and print their figures.
+    Evaluate(evaluate::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
     /// Start the server: the live view, the control loop and the trial.
@@ -58,6 +61,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Export(arguments) => export::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Lens(arguments) => lens::run(&arguments),
+        Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

@@ -2,9 +2,13 @@
 
 pub mod belief;
 pub mod defocus;
+pub mod evaluate;
+pub mod footage;
 pub mod optimiser;
 pub mod pictures;
+pub mod report;
 pub mod rollout;
 pub mod scan;
 pub mod session;
+pub mod statistics;
 pub mod texture;

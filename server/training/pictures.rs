@@ -29,6 +29,14 @@ impl Split {
     }
 }
 
+/// The pictures of the reference benchmark's `split`, `0..count`.
+///
+/// # Errors
+/// None in practice: the pictures are large enough.
+pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
+    drawn(split, count)
+}
+
 /// Drawn pictures `0..count` of `split`.
 ///
 /// # Errors

@@ -48,7 +48,7 @@ impl Path {
         PathFigures {
             mae: self.errors().sum::<f64>() / frames,
             in_focus: self.errors().filter(|&error| error < IN_FOCUS).count() as f64 / frames,
-            travel: moves.iter().map(|step| step.abs()).sum::<f64>() / (frames - 1.0).max(1.0),
+            travel: moves.iter().fold(0.0, |sum, step| sum + step.abs()) / (frames - 1.0).max(1.0),
             reversals: turns as f64 / (frames / FRAMES_A_SECOND),
         }
     }

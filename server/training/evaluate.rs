@@ -1,0 +1,155 @@
+//! Evaluation: every policy on the same focal-time scans, figures over all of them, and tests between any two.
+#![allow(clippy::cast_precision_loss, reason = "counts of scans and frames are small")]
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::rollout::{Path, PathFigures, roll_out, roll_out_oracle};
+use super::scan::{Clip, Scan, ScanSettings};
+use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
+use crate::autofocus::{PolicyError, PolicyName, Registry};
+
+/// Name of the row that knows the next optimum.
+pub const ORACLE: &str = "oracle";
+/// Frames of a scan: the paper's 10 s at 25 a second.
+pub const FRAMES: usize = 250;
+/// Scans of the reference benchmark.
+pub const COUNT: usize = 200;
+/// Seed of the reference benchmark.
+pub const SEED: u64 = 2023;
+
+/// A set of scans to evaluate on: scan `i` goes over clip `i` modulo their number.
+#[derive(Debug, Clone)]
+pub struct Benchmark {
+    /// What is scanned.
+    pub clips: Vec<Arc<Clip>>,
+    /// How.
+    pub settings: ScanSettings,
+    /// Seed that all scans' courses are drawn from.
+    pub seed: u64,
+    /// Number of scans.
+    pub count: usize,
+    /// Frames of each.
+    pub frames: usize,
+}
+
+impl Benchmark {
+    /// Scan `index`, at its beginning.
+    #[must_use]
+    pub fn scan(&self, index: usize) -> Scan {
+        let clip = Arc::clone(&self.clips[index % self.clips.len()]);
+        // Distinct streams for neighbouring seeds: the golden-ratio increment of SplitMix64.
+        let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64);
+        Scan::new(clip, self.settings, seed)
+    }
+}
+
+/// One policy's paths over the scans of a benchmark.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The policy, or [`ORACLE`].
+    pub policy: String,
+    /// Its path over each scan.
+    pub paths: Vec<Path>,
+}
+
+/// A policy's figures over all scans.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// The policy, or [`ORACLE`].
+    pub policy: String,
+    /// Frames in all.
+    pub frames: usize,
+    /// Mean absolute focal power error over all frames.
+    pub mae: f64,
+    /// Standard deviation of the absolute error over all frames.
+    pub sd: f64,
+    /// Share of frames in focus, 0..1.
+    pub in_focus: f64,
+    /// Mean absolute change of focal power a frame.
+    pub travel: f64,
+    /// Changes of direction a second.
+    pub reversals: f64,
+    /// 95 % bootstrap interval of `mae` over scans.
+    pub mae_interval: (f64, f64),
+    /// 95 % bootstrap interval of `in_focus` over scans.
+    pub in_focus_interval: (f64, f64),
+    /// Each scan's mean absolute error.
+    pub scan_mae: Vec<f64>,
+}
+
+/// A paired test between two policies, over scans.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// One policy.
+    pub a: String,
+    /// The other.
+    pub b: String,
+    /// The test's name.
+    pub test: &'static str,
+    /// Its two-sided p.
+    pub p: f64,
+}
+
+/// Runs the named policies, and the oracle first, over `benchmark`. `progress` is told after each policy's scan.
+///
+/// # Errors
+/// When a policy is unknown or cannot run.
+pub fn evaluate(
+    registry: &Registry,
+    policies: &[PolicyName],
+    benchmark: &Benchmark,
+    progress: &dyn Fn(&str),
+) -> Result<Vec<Outcome>, PolicyError> {
+    let scans = || (0..benchmark.count).map(|index| benchmark.scan(index));
+    let paths = scans().map(|mut scan| roll_out_oracle(&mut scan, benchmark.frames)).collect();
+    let mut outcomes = vec![Outcome { policy: ORACLE.to_owned(), paths }];
+    for name in policies {
+        let mut paths = Vec::with_capacity(benchmark.count);
+        for mut scan in scans() {
+            let mut policy = registry.build(name)?;
+            paths.push(roll_out(policy.as_mut(), &mut scan, benchmark.frames));
+            progress(name.as_str());
+        }
+        outcomes.push(Outcome { policy: name.to_string(), paths });
+    }
+    Ok(outcomes)
+}
+
+impl Outcome {
+    /// The figures over all paths.
+    #[must_use]
+    pub fn row(&self) -> Row {
+        let figures: Vec<PathFigures> = self.paths.iter().map(Path::figures).collect();
+        let column = |value: fn(&PathFigures) -> f64| figures.iter().map(value).collect::<Vec<_>>();
+        let errors: Vec<f64> = self.paths.iter().flat_map(Path::errors).collect();
+        let (scan_mae, in_focus) = (column(|f| f.mae), column(|f| f.in_focus));
+        Row {
+            policy: self.policy.clone(),
+            frames: errors.len(),
+            mae: mean(&errors),
+            sd: deviation(&errors),
+            in_focus: mean(&in_focus),
+            travel: mean(&column(|f| f.travel)),
+            reversals: mean(&column(|f| f.reversals)),
+            mae_interval: bootstrap_interval(&scan_mae, 1),
+            in_focus_interval: bootstrap_interval(&in_focus, 2),
+            scan_mae,
+        }
+    }
+}
+
+/// Tests each pair of rows, the oracle left out.
+#[must_use]
+pub fn compare(rows: &[Row]) -> Vec<Comparison> {
+    let rows: Vec<&Row> = rows.iter().filter(|row| row.policy != ORACLE).collect();
+    let mut comparisons = Vec::new();
+    for (index, a) in rows.iter().enumerate() {
+        for b in &rows[index + 1..] {
+            let p = wilcoxon(&a.scan_mae, &b.scan_mae);
+            comparisons.push(Comparison { a: a.policy.clone(), b: b.policy.clone(), test: "wilcoxon-signed-rank", p });
+        }
+    }
+    comparisons
+}

@@ -1,0 +1,174 @@
+//! Footage to scan: a video (decoded by ffmpeg), an image, or a folder of images, as gray pictures 480 lines high at
+//! most.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+
+use super::scan::{Area, Clip, ClipError};
+use crate::imaging::GrayImage;
+
+/// Most lines of a picture: the height the paper's walks are meant for.
+const LINES: u32 = 480;
+/// Most frames taken of one video: a minute at 25 a second.
+const FRAMES: u32 = 1500;
+const IMAGES: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
+
+/// Why footage cannot be scanned.
+#[derive(Debug, thiserror::Error)]
+pub enum FootageError {
+    /// It cannot be read.
+    #[error("cannot read {}: {reason}", path.display())]
+    Unreadable {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// Its pictures are of no use.
+    #[error("cannot scan {}: {source}", path.display())]
+    Unusable {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: ClipError,
+    },
+}
+
+/// The clips in `path`: one of a video or an image; one of each image of a folder.
+///
+/// # Errors
+/// When it cannot be read, holds no picture, or its pictures are too small.
+pub fn clips(path: &Path) -> Result<Vec<Arc<Clip>>, FootageError> {
+    let unusable = |path: &Path| {
+        let path = path.to_owned();
+        move |source| FootageError::Unusable { path, source }
+    };
+    if path.is_dir() {
+        let files = images_in(path)?;
+        if files.is_empty() {
+            return Err(unusable(path)(ClipError::Empty));
+        }
+        return files
+            .iter()
+            .map(|file| clip(vec![Arc::new(image(file)?)]).map(Arc::new).map_err(unusable(file)))
+            .collect();
+    }
+    let frames = if is_image(path) { vec![Arc::new(image(path)?)] } else { video(path)? };
+    Ok(vec![Arc::new(clip(frames).map_err(unusable(path))?)])
+}
+
+fn is_image(path: &Path) -> bool {
+    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
+    IMAGES.contains(&extension.as_str())
+}
+
+fn images_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
+    let unreadable = |error: std::io::Error| unreadable(folder, &error.to_string());
+    let entries = std::fs::read_dir(folder).map_err(unreadable)?;
+    let mut files = Vec::new();
+    for entry in entries {
+        let file = entry.map_err(|error| self::unreadable(folder, &error.to_string()))?.path();
+        if is_image(&file) {
+            files.push(file);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn unreadable(path: &Path, reason: &str) -> FootageError {
+    FootageError::Unreadable { path: path.to_owned(), reason: reason.to_owned() }
+}
+
+fn image(path: &Path) -> Result<GrayImage, FootageError> {
+    let picture = image::open(path).map_err(|error| unreadable(path, &error.to_string()))?;
+    let picture = if picture.height() > LINES {
+        picture.resize(u32::MAX, LINES, image::imageops::FilterType::Triangle)
+    } else {
+        picture
+    };
+    let gray = picture.to_luma8();
+    let (width, height) = (gray.width() as usize, gray.height() as usize);
+    Ok(GrayImage { width, height, data: gray.into_raw().into_iter().map(f32::from).collect() })
+}
+
+fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
+    if !path.is_file() {
+        return Err(unreadable(path, "there is no such file"));
+    }
+    let output = Command::new("ffmpeg")
+        .args(["-v", "error", "-nostdin", "-i"])
+        .arg(path)
+        .args(["-frames:v", &FRAMES.to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
+        .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
+        .output()
+        .map_err(|error| unreadable(path, &format!("ffmpeg, which decodes videos, cannot be started: {error}")))?;
+    if !output.status.success() {
+        let told = String::from_utf8_lossy(&output.stderr);
+        return Err(unreadable(path, &format!("ffmpeg: {}", told.lines().last().unwrap_or("failed"))));
+    }
+    let frames: Vec<Arc<GrayImage>> = pictures(&output.stdout).map(Arc::new).collect();
+    if frames.is_empty() { Err(unreadable(path, "it holds no frames")) } else { Ok(frames) }
+}
+
+/// The binary PGM pictures that follow one another in `bytes`, up to the first that is not whole.
+fn pictures(mut bytes: &[u8]) -> impl Iterator<Item = GrayImage> + '_ {
+    std::iter::from_fn(move || {
+        let (picture, rest) = picture(bytes)?;
+        bytes = rest;
+        Some(picture)
+    })
+}
+
+/// One PGM: `P5 WIDTH HEIGHT 255`, one white space, then a byte a pixel.
+fn picture(bytes: &[u8]) -> Option<(GrayImage, &[u8])> {
+    let mut rest = bytes.strip_prefix(b"P5")?;
+    let mut header = [0usize; 3];
+    for number in &mut header {
+        rest = rest.trim_ascii_start();
+        let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
+        *number = std::str::from_utf8(&rest[..digits]).ok()?.parse().ok()?;
+        rest = &rest[digits..];
+    }
+    let [width, height, _] = header;
+    let pixels = rest.get(1..1 + width.checked_mul(height)?)?;
+    let data = pixels.iter().map(|&byte| f32::from(byte)).collect();
+    Some((GrayImage { width, height, data }, &rest[1 + width * height..]))
+}
+
+/// A clip of these pictures, within what is surely inside the bright circle of an endoscope.
+fn clip(frames: Vec<Arc<GrayImage>>) -> Result<Clip, ClipError> {
+    let area = frames.first().filter(|frame| frame.height >= 200).map(|frame| middle(frame.width, frame.height));
+    Clip::new(frames, area)
+}
+
+/// The middle 60 % by 70 %.
+const fn middle(width: usize, height: usize) -> Area {
+    Area { left: width / 5, top: height * 3 / 20, right: width - width / 5, bottom: height - height * 3 / 20 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_follow_one_another_and_a_cut_one_ends_them() {
+        let stream = b"P5\n2 1\n255\n\x01\x02P5 1 2 255 \x03\x04P5\n2 2\n255\n\x00";
+        let found: Vec<GrayImage> = pictures(stream).collect();
+        assert_eq!(found.len(), 2);
+        assert_eq!((found[0].width, found[0].height, &found[0].data[..]), (2, 1, &[1.0, 2.0][..]));
+        assert_eq!((found[1].width, found[1].height, &found[1].data[..]), (1, 2, &[3.0, 4.0][..]));
+    }
+
+    #[test]
+    fn missing_and_empty_footage_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(clips(&folder.path().join("no.mp4")).unwrap_err().to_string().contains("there is no such file"));
+        assert!(clips(folder.path()).unwrap_err().to_string().contains("there are no pictures"));
+        let small = folder.path().join("small.png");
+        image::GrayImage::new(40, 40).save(&small).unwrap();
+        assert!(clips(&small).unwrap_err().to_string().contains("at least 64x64"));
+    }
+}
