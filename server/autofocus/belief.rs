@@ -1,6 +1,7 @@
 //! The policy `parfocal`: tracks a belief about where the optimum is, and goes to that belief's median.
 #![allow(
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
     reason = "indices of 41 bins"

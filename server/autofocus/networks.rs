@@ -1,4 +1,5 @@
 //! The learned policies' networks: the paper's two (Budd et al., MICCAI 2023), and the belief tracker's.
+#![allow(clippy::cast_possible_wrap, reason = "tensor sizes are small")]
 
 use tch::nn::{self, Module, ModuleT, RNN};
 use tch::{Device, Kind, Tensor};
@@ -23,7 +24,7 @@ pub const BELIEF_INPUT: usize = 2 * FEATURES + BINS + 3;
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;
 
-/// Three dense layers, `input` -> 256 -> 256 -> 3, ReLU between: the action values.
+/// Three dense layers, `input` -> 256 -> 256 -> 3, `ReLU` between: the action values.
 #[derive(Debug)]
 pub struct ValueHead {
     layers: [nn::Linear; 3],
@@ -40,14 +41,13 @@ impl ValueHead {
     }
 
     /// Action values `[N, 3]` of states `[N, input]`.
-    #[must_use]
     pub fn forward(&self, state: &Tensor) -> Tensor {
         let hidden = self.layers[0].forward(state).relu();
         self.layers[2].forward(&self.layers[1].forward(&hidden).relu())
     }
 }
 
-/// Four convolutions of 8 filters, kernel 3, stride 2, no padding, ReLU between: 32x32 -> 8 logits.
+/// Four convolutions of 8 filters, kernel 3, stride 2, no padding, `ReLU` between: 32x32 -> 8 logits.
 #[derive(Debug)]
 pub struct Encoder {
     convolutions: [nn::Conv2D; 4],
@@ -63,7 +63,6 @@ impl Encoder {
     }
 
     /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale.
-    #[must_use]
     pub fn forward(&self, patches: &Tensor) -> Tensor {
         let mut x = patches.view([-1, 1, SIDE, SIDE]) / 255.0 - 0.5;
         for (index, convolution) in self.convolutions.iter().enumerate() {
@@ -96,13 +95,11 @@ impl BeliefNetwork {
     }
 
     /// The memory before anything was seen, for `count` scans: `[1, count, MEMORY]`.
-    #[must_use]
     pub fn blank(&self, count: usize, device: Device) -> Tensor {
         Tensor::zeros([1, i64::try_from(count).unwrap_or(i64::MAX), MEMORY as i64], (Kind::Float, device))
     }
 
     /// Logits `[N, T, BINS]` of inputs `[N, T, BELIEF_INPUT]` from memory `[1, N, MEMORY]`, and the memory after them.
-    #[must_use]
     pub fn forward(&self, inputs: &Tensor, memory: &Tensor) -> (Tensor, Tensor) {
         let (units, state) = self.memory.seq_init(inputs, &nn::GRUState(memory.shallow_clone()));
         let hidden = self.head[0].forward(&units).relu();

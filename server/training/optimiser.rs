@@ -6,7 +6,7 @@ use tch::{Kind, Tensor, nn};
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "name", deny_unknown_fields)]
 pub enum Rule {
-    /// RMSProp with momentum, PyTorch's form: smoothing 0.99, epsilon 1e-8.
+    /// `RMSProp` with momentum, `PyTorch`'s form: smoothing 0.99, epsilon 1e-8.
     RmsProp {
         /// Step size.
         learning_rate: f64,

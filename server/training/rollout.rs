@@ -41,15 +41,15 @@ impl Path {
     /// Figures of this path; all zero for an empty one.
     #[must_use]
     pub fn figures(&self) -> PathFigures {
-        let frames = self.focal_power.len().max(1) as f64;
-        let moves: Vec<f64> =
+        let count = self.focal_power.len().max(1) as f64;
+        let steps: Vec<f64> =
             self.focal_power.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| step.abs() > 1e-9).collect();
-        let turns = moves.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+        let turns = steps.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
         PathFigures {
-            mae: self.errors().sum::<f64>() / frames,
-            in_focus: self.errors().filter(|&error| error < IN_FOCUS).count() as f64 / frames,
-            travel: moves.iter().fold(0.0, |sum, step| sum + step.abs()) / (frames - 1.0).max(1.0),
-            reversals: turns as f64 / (frames / FRAMES_A_SECOND),
+            mae: self.errors().sum::<f64>() / count,
+            in_focus: self.errors().filter(|&error| error < IN_FOCUS).count() as f64 / count,
+            travel: steps.iter().fold(0.0, |sum, step| sum + step.abs()) / (count - 1.0).max(1.0),
+            reversals: turns as f64 / (count / FRAMES_A_SECOND),
         }
     }
 }

@@ -85,7 +85,7 @@ impl Canvas {
             // Density falling with the third power of the radius: all scales weigh the same.
             let u: f32 = rng.random();
             let radius = 1.0 / (1.0 / (least * least) * (1.0 - u) + u / (most * most)).sqrt();
-            covered += 3.14 * radius * radius;
+            covered += std::f32::consts::PI * radius * radius;
             let centre = (self.place(rng), self.place(rng));
             let (shade, stretch) = (rng.random_range(-1.0f32..1.0), rng.random_range(0.5f32..2.0));
             self.add_leaf(centre, radius, stretch, shade);
@@ -118,7 +118,7 @@ impl Canvas {
     fn add_vessels(&mut self, rng: &mut impl Rng) {
         for _ in 0..rng.random_range(4..20) {
             let (mut x, mut y) = (self.place(rng), self.place(rng));
-            let mut heading = rng.random_range(0.0f32..6.28);
+            let mut heading = rng.random_range(0.0..std::f32::consts::TAU);
             let mut radius = rng.random_range(0.8f32..4.0);
             let shade = rng.random_range(-1.5f32..-0.2);
             for _ in 0..rng.random_range(60..300) {
