@@ -3,9 +3,11 @@
 pub mod belief;
 mod fixed;
 mod hill_climber;
+pub mod learned;
 mod metrics;
 pub mod networks;
 mod registry;
+pub mod shipped;
 pub mod spectrum;
 pub mod weights;
 

@@ -62,9 +62,12 @@ impl Encoder {
         Self { convolutions: [layer("0", 1), layer("2", 8), layer("4", 8), layer("6", 8)] }
     }
 
-    /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale.
+    /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale. Each patch's mean is taken off first: brightness
+    /// tells nothing of focus.
     pub fn forward(&self, patches: &Tensor) -> Tensor {
-        let mut x = patches.view([-1, 1, SIDE, SIDE]) / 255.0 - 0.5;
+        let patches = patches.view([-1, SIDE * SIDE]);
+        let contrast = (&patches - patches.mean_dim(1, true, Kind::Float)) / 64.0;
+        let mut x = contrast.view([-1, 1, SIDE, SIDE]);
         for (index, convolution) in self.convolutions.iter().enumerate() {
             x = convolution.forward_t(&x, false);
             if index < 3 {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
-use crate::autofocus::{PolicyName, Registry};
+use crate::autofocus::{PolicyName, Registry, shipped};
 use crate::training::evaluate::{Benchmark, COUNT, FRAMES, Outcome, SEED, compare, evaluate};
 use crate::training::footage;
 use crate::training::pictures::{Split, reference};
@@ -24,6 +24,9 @@ pub struct Arguments {
     /// Policies by name, separated by commas, or `all` that can run.
     #[arg(long, default_value = "all")]
     policies: String,
+    /// Folder with weights (`NAME.safetensors`) to take in the place of those that ship.
+    #[arg(long, value_name = "DIR")]
+    weights: Option<PathBuf>,
     /// Seed of the scans' courses.
     #[arg(long, default_value_t = SEED)]
     seed: u64,
@@ -44,7 +47,10 @@ pub struct Arguments {
 /// When scans, footage or policies cannot be had, or results cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     tch::set_num_threads(1);
-    let registry = Registry::standard();
+    let mut registry = Registry::standard();
+    if let Some(folder) = &arguments.weights {
+        registry = shipped::with_folder(registry, folder);
+    }
     let policies = policies(&arguments.policies, &registry);
     let benchmark = benchmark(arguments)?;
     let bar = progress(policies.len() * benchmark.count);
@@ -86,11 +92,13 @@ fn benchmark(arguments: &Arguments) -> Result<Benchmark, Failure> {
     if arguments.scans != "simulated" {
         return Err(format!("there are no scans '{}'; use --scans simulated", arguments.scans).into());
     }
+    let mut settings = ScanSettings::default();
     if clips.is_empty() {
         clips = reference(Split::Test, arguments.count.min(COUNT) as u64)?;
+        settings = ScanSettings::reference();
     }
     let (seed, count) = (arguments.seed, arguments.count);
-    Ok(Benchmark { clips, settings: ScanSettings::default(), seed, count, frames: FRAMES })
+    Ok(Benchmark { clips, settings, seed, count, frames: FRAMES })
 }
 
 fn report(arguments: &Arguments, outcomes: &[Outcome]) -> Report {

@@ -2,10 +2,12 @@
 
 pub mod belief;
 pub mod defocus;
+pub mod dqn;
 pub mod evaluate;
 pub mod footage;
 pub mod optimiser;
 pub mod pictures;
+pub mod replay;
 pub mod report;
 pub mod rollout;
 pub mod scan;

@@ -1,9 +1,13 @@
 //! Which sharp pictures training, validation and the reference benchmark are made of: never the same ones.
 
+#![allow(clippy::cast_precision_loss, reason = "a few strengths of contrast")]
+
 use std::sync::Arc;
 
 use super::scan::{Clip, ClipError};
-use super::texture::texture;
+use super::texture::{texture, vary_contrast};
+use crate::camera::phantom::Scene;
+use crate::imaging::GrayImage;
 
 /// Side in pixels of drawn pictures: the height of the paper's clips.
 const SIDE: usize = 480;
@@ -34,13 +38,28 @@ impl Split {
 /// # Errors
 /// None in practice: the pictures are large enough.
 pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
-    drawn(split, count)
+    (0..count).map(|index| Clip::still(phantom(split.first_seed() + index)).map(Arc::new)).collect()
 }
 
-/// Drawn pictures `0..count` of `split`.
+/// The middle of the brain phantom of `seed`, sharp.
+fn phantom(seed: u64) -> GrayImage {
+    Scene::new(seed).sharp_gray(SIDE, SIDE)
+}
+
+/// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds, half of all with a
+/// contrast that varies from place to place.
 ///
 /// # Errors
-/// None in practice: drawn pictures are large enough.
-pub fn drawn(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
-    (0..count).map(|index| Clip::still(texture(split.first_seed() + index, SIDE)).map(Arc::new)).collect()
+/// None in practice: the pictures are large enough.
+pub fn varied(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
+    (0..count)
+        .map(|index| {
+            let seed = split.first_seed() + index;
+            let mut picture = if index % 3 == 0 { phantom(seed) } else { texture(seed, SIDE) };
+            if index % 2 == 0 {
+                vary_contrast(&mut picture, 0.2 + 0.2 * (index / 2 % 5) as f32, seed);
+            }
+            Clip::still(picture).map(Arc::new)
+        })
+        .collect()
 }

@@ -111,12 +111,23 @@ pub struct ScanSettings {
     pub spot: Spot,
     /// Standard deviation of the noise, in gray levels.
     pub noise: f64,
+    /// Hand tremor: each frame is blurred further, by this many pixels (standard deviation) times a normal draw.
+    pub tremor: f64,
     /// Contrast and brightness: gray becomes `gain * gray + offset`.
     pub exposure: (f64, f64),
 }
 
+impl ScanSettings {
+    /// The reference benchmark's scans: over still pictures, which bring no tremor of their own. `docs/results.md` tells
+    /// how they were calibrated.
+    #[must_use]
+    pub fn reference() -> Self {
+        Self { tremor: 0.57, ..Self::default() }
+    }
+}
+
 impl Default for ScanSettings {
-    /// The reference benchmark's scans; `docs/results.md` tells how they were calibrated.
+    /// Scans over footage, which brings its own tremor.
     fn default() -> Self {
         Self {
             focus: Motion { speed: 0.012, memory: 60.0 },
@@ -124,6 +135,7 @@ impl Default for ScanSettings {
             blur: (2.0, 8.0),
             spot: Spot::Gaussian,
             noise: 0.0,
+            tremor: 0.0,
             exposure: (1.0, 0.0),
         }
     }
@@ -135,6 +147,7 @@ pub struct Scan {
     clip: Arc<Clip>,
     settings: ScanSettings,
     sigma0: f64,
+    tremor: f64,
     time: usize,
     focus: Walk,
     crop: [Walk; 2],
@@ -155,7 +168,8 @@ impl Scan {
             .map(|(low, high)| Walk::new((low as f64, (high - PATCH_SIDE) as f64), settings.crop, &mut course));
         let time = if clip.frames.len() > 1 { course.random_range(0..2 * clip.frames.len()) } else { 0 };
         let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
-        Self { clip, settings, sigma0, time, focus, crop, course, noise, defocus: Defocus::default() }
+        let tremor = settings.tremor * standard_normal(&mut course);
+        Self { clip, settings, sigma0, tremor, time, focus, crop, course, noise, defocus: Defocus::default() }
     }
 
     /// The optimal focal power at this frame.
@@ -172,7 +186,7 @@ impl Scan {
 
     /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.
     pub fn observe(&mut self, focal_power: FocalPower) -> Patch {
-        let sigma = self.sigma0 * focal_power.distance(self.optimum());
+        let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
         let corner = (self.crop[0].position() as isize, self.crop[1].position() as isize);
         let mut patch = self.defocus.patch(self.clip.at(self.time), corner, sigma, self.settings.spot);
         let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
@@ -191,6 +205,7 @@ impl Scan {
         self.time += 1;
         self.focus.advance(&mut self.course);
         self.crop.iter_mut().for_each(|walk| walk.advance(&mut self.course));
+        self.tremor = self.settings.tremor * standard_normal(&mut self.course);
     }
 }
 
@@ -211,7 +226,7 @@ pub struct Variety {
 impl Variety {
     /// Settings for one scan: with probability `share` varied in speed, spot, noise and exposure.
     pub fn draw(&self, rng: &mut impl Rng) -> ScanSettings {
-        let mut settings = ScanSettings::default();
+        let mut settings = ScanSettings::reference();
         if !rng.random_bool(self.share) {
             return settings;
         }
@@ -221,6 +236,7 @@ impl Variety {
         settings.crop.speed *= factor(rng, 0.5);
         settings.crop.memory *= factor(rng, 0.4);
         settings.spot = if rng.random_bool(0.5) { Spot::Disc } else { Spot::Gaussian };
+        settings.tremor = rng.random_range(0.0..1.2);
         settings.noise = if rng.random_bool(0.7) { rng.random_range(0.0..4.0) } else { 0.0 };
         let gain: f64 = rng.random_range(0.3..1.3);
         settings.exposure = (gain, rng.random_range(-0.5..1.0) * 120.0 * (1.0 - gain));

@@ -10,7 +10,7 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::imaging::GrayImage;
+use crate::imaging::{GrayImage, gaussian_blur};
 
 /// A sharp picture of `side` x `side` pixels; the same seed gives the same picture.
 #[must_use]
@@ -35,6 +35,23 @@ pub fn texture(seed: u64, side: usize) -> GrayImage {
     }
     canvas.soften(rng.random_range(0.0..0.6));
     GrayImage { width: side, height: side, data: canvas.data }
+}
+
+/// Makes the contrast of `picture` vary from place to place, as tissue, smoke and wetness do: what differs from the mean
+/// around it is scaled by the exponential of smooth noise of standard deviation about `strength`.
+pub fn vary_contrast(picture: &mut GrayImage, strength: f32, seed: u64) {
+    const AROUND: f64 = 12.0;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let side = picture.width.max(picture.height);
+    let mut field = Canvas { side, data: vec![0.0; side * side] };
+    field.add_octave(&mut rng, 70.0, 1.6);
+    field.add_octave(&mut rng, 30.0, 1.6);
+    let around = gaussian_blur(picture, AROUND);
+    for (index, (value, mean)) in picture.data.iter_mut().zip(&around.data).enumerate() {
+        let (x, y) = (index % picture.width, index / picture.width);
+        let scale = (strength * field.data[y * side + x]).exp();
+        *value = (mean + scale * (*value - mean)).clamp(0.0, 255.0);
+    }
 }
 
 struct Canvas {

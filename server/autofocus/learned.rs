@@ -1,0 +1,166 @@
+//! The paper's learned policies: action values from the latest eight frames, the best action taken.
+#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "small numbers in single precision")]
+
+use std::collections::VecDeque;
+
+use tch::{Device, Tensor, nn};
+
+use super::networks::{ACTIONS, ENCODING, Encoder, HISTORY, ValueHead};
+use super::weights::{self, WeightsError};
+use super::{Decision, Observation, Policy, STEP, mgm, mlr};
+use crate::imaging::Patch;
+
+/// What a learned policy knows of each frame besides the focal power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sight {
+    /// The mean gradient magnitude.
+    Mgm,
+    /// The mean local ratio.
+    Mlr,
+    /// The patch, through the encoder.
+    Patch,
+}
+
+impl Sight {
+    /// Numbers a frame that the head gets, without the focal power.
+    #[must_use]
+    pub const fn width(self) -> usize {
+        match self {
+            Self::Mgm | Self::Mlr => 1,
+            Self::Patch => ENCODING,
+        }
+    }
+
+    /// The focus metric, if this sight is one.
+    #[must_use]
+    pub fn metric(self, patch: &Patch) -> Option<f64> {
+        match self {
+            Self::Mgm => Some(mgm(patch)),
+            Self::Mlr => Some(mlr(patch)),
+            Self::Patch => None,
+        }
+    }
+
+    /// A metric as the network takes it: its logarithm, centred and scaled to the order of 1.
+    #[must_use]
+    pub fn scaled(self, metric: f64) -> f32 {
+        match self {
+            Self::Mgm => ((metric + 0.5).ln() - 3.5) as f32,
+            Self::Mlr | Self::Patch => (0.5 * ((metric - 1.0).max(0.0) + 1e-4).ln() + 1.75) as f32,
+        }
+    }
+}
+
+/// The change of focal power that an action stands for.
+#[must_use]
+pub const fn action_step(action: usize) -> f64 {
+    match action {
+        0 => -STEP,
+        1 => 0.0,
+        _ => STEP,
+    }
+}
+
+/// A focal power as the networks take it.
+#[must_use]
+pub const fn scaled_focal_power(focal_power: f64) -> f32 {
+    2.0 * (focal_power as f32 - 0.5)
+}
+
+/// A policy's network: an encoder where it sees patches, and the head.
+#[derive(Debug)]
+pub struct ValueNetwork {
+    /// What it sees.
+    pub sight: Sight,
+    encoder: Option<Encoder>,
+    head: ValueHead,
+}
+
+impl ValueNetwork {
+    /// A fresh network whose weights live under `path`.
+    #[must_use]
+    pub fn new(path: &nn::Path<'_>, sight: Sight) -> Self {
+        let encoder = (sight == Sight::Patch).then(|| Encoder::new(&(path / "encoder")));
+        let head = ValueHead::new(&(path / "head"), HISTORY * (sight.width() + 1));
+        Self { sight, encoder, head }
+    }
+
+    /// Frames `[N, 1024]` (gray) or `[N, 1]` (scaled metric) as the head takes them: `[N, width]`.
+    pub fn encode(&self, frames: &Tensor) -> Tensor {
+        self.encoder.as_ref().map_or_else(|| frames.shallow_clone(), |encoder| encoder.forward(frames))
+    }
+
+    /// Action values `[N, 3]` from the histories' encodings `[N, 8 * width]` and scaled focal powers `[N, 8]`, oldest
+    /// first.
+    pub fn values(&self, encodings: &Tensor, focal_powers: &Tensor) -> Tensor {
+        self.head.forward(&Tensor::cat(&[encodings, focal_powers], 1))
+    }
+}
+
+/// A learned policy with its memory of eight frames. Before eight were seen, the first counts for those missing.
+pub struct Learned {
+    network: ValueNetwork,
+    encodings: VecDeque<Vec<f32>>,
+    focal_powers: VecDeque<f32>,
+    // Keeps the variables alive that the network's layers share.
+    _store: nn::VarStore,
+}
+
+impl Learned {
+    /// A policy with the weights in `bytes` (safetensors).
+    ///
+    /// # Errors
+    /// When the weights are damaged or another network's.
+    pub fn new(sight: Sight, bytes: &[u8]) -> Result<Self, WeightsError> {
+        let store = nn::VarStore::new(Device::Cpu);
+        let network = ValueNetwork::new(&store.root(), sight);
+        weights::load(&store, bytes)?;
+        Ok(Self { network, encodings: VecDeque::new(), focal_powers: VecDeque::new(), _store: store })
+    }
+
+    fn encode(&self, patch: &Patch, metric: Option<f64>) -> Vec<f32> {
+        if let Some(metric) = metric {
+            return vec![self.network.sight.scaled(metric)];
+        }
+        let encoding = self.network.encode(&Tensor::from_slice(&patch.0).view([1, -1]));
+        let mut values = vec![0.0; ENCODING];
+        encoding.view([-1]).copy_data(&mut values, ENCODING);
+        values
+    }
+
+    fn remember(&mut self, encoding: Vec<f32>, focal_power: f32) {
+        let missing = if self.encodings.is_empty() { HISTORY } else { 1 };
+        for _ in 0..missing {
+            self.encodings.push_back(encoding.clone());
+            self.focal_powers.push_back(focal_power);
+        }
+        while self.encodings.len() > HISTORY {
+            self.encodings.pop_front();
+            self.focal_powers.pop_front();
+        }
+    }
+}
+
+impl Policy for Learned {
+    fn step(&mut self, seen: &Observation<'_>) -> Decision {
+        tch::no_grad(|| {
+            let metric = self.network.sight.metric(seen.patch);
+            let encoding = self.encode(seen.patch, metric);
+            self.remember(encoding, scaled_focal_power(seen.focal_power.get()));
+            let encodings: Vec<f32> = self.encodings.iter().flatten().copied().collect();
+            let focal_powers: Vec<f32> = self.focal_powers.iter().copied().collect();
+            let row = |values: &[f32]| Tensor::from_slice(values).view([1, -1]);
+            let mut values = [0.0f32; ACTIONS];
+            self.network.values(&row(&encodings), &row(&focal_powers)).view([-1]).copy_data(&mut values, ACTIONS);
+            let step = action_step(best_action(&values));
+            Decision { target: seen.focal_power.moved(step).get(), metric, belief: None }
+        })
+    }
+}
+
+/// The action of highest value; standing still where it ties with a move.
+#[must_use]
+pub fn best_action(values: &[f32]) -> usize {
+    [1, 0, 2].into_iter().reduce(|best, other| if values[other] > values[best] { other } else { best }).unwrap_or(1)
+}

@@ -1,0 +1,393 @@
+//! Deep Q-learning on simulated focal-time scans (Mnih et al. 2015; double: van Hasselt et al. 2016), on windows of
+//! consecutive frames, so that each patch is encoded once for all the states that hold it.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    reason = "small counts as tensor sizes and shares"
+)]
+
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use tch::{Device, Kind, Reduction, Tensor, nn};
+
+use super::optimiser::{Optimiser, Rule};
+use super::replay::{Replay, Seen, Step};
+use super::scan::{Clip, Variety};
+use super::session::{Session, lead_astray};
+use crate::autofocus::STEP;
+use crate::autofocus::learned::{Sight, ValueNetwork, action_step, best_action, scaled_focal_power};
+use crate::autofocus::networks::{ACTIONS, HISTORY};
+use crate::imaging::PATCH_SIDE;
+use crate::lens::FocalPower;
+
+const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
+
+/// What the action values are fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
+pub enum Target {
+    /// Bellman's equation, from the action taken: rewards of `steps` frames, then the target network's value.
+    Bellman {
+        /// Discount a frame.
+        discount: f64,
+        /// Frames whose rewards are summed.
+        steps: usize,
+        /// Whether the online network picks the action that the target network values.
+        double: bool,
+    },
+    /// What each of the three actions would have gained over standing still at the next frame, in steps; known in
+    /// simulation for all three whichever was taken.
+    Lookahead,
+}
+
+/// How a DQN policy is trained.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DqnRecipe {
+    /// Scans side by side.
+    pub scans: usize,
+    /// Frames of a scan.
+    pub frames_a_scan: u16,
+    /// Frames played between updates, over all scans together a multiple of `scans`.
+    pub frames_an_update: usize,
+    /// Frames played before the first update.
+    pub warm_up: u64,
+    /// Most frames remembered.
+    pub replay: usize,
+    /// Windows in a batch.
+    pub windows: usize,
+    /// Consecutive frames in a window.
+    pub window: usize,
+    /// Updates in all.
+    pub updates: u64,
+    /// What values are fitted to.
+    pub target: Target,
+    /// Optimiser.
+    pub optimiser: Rule,
+    /// Largest norm of a gradient.
+    pub clip: f64,
+    /// Share of the learning rate left at the end; the way there is a half cosine. 1: constant.
+    pub final_rate: f64,
+    /// Share of random actions at first.
+    pub first_epsilon: f64,
+    /// Share of random actions at last.
+    pub last_epsilon: f64,
+    /// Frames over which the first decays exponentially to the last.
+    pub epsilon_frames: u64,
+    /// Share of the online network that the target network takes over an update.
+    pub target_share: f64,
+    /// Share of scans that differ from the reference in speed, spot, noise, exposure, lens.
+    pub variety: f64,
+    /// Share of scans on which the policy is led astray.
+    pub wandering: f64,
+}
+
+impl DqnRecipe {
+    /// Share of random actions after `frames` frames.
+    #[must_use]
+    pub fn epsilon(&self, frames: u64) -> f64 {
+        let done = (frames as f64 / self.epsilon_frames.max(1) as f64).min(1.0);
+        self.first_epsilon * (self.last_epsilon / self.first_epsilon).powf(done)
+    }
+}
+
+/// A training in progress.
+pub struct DqnTrainer {
+    recipe: DqnRecipe,
+    clips: Vec<Arc<Clip>>,
+    /// The variables of the network that is trained.
+    pub store: nn::VarStore,
+    network: ValueNetwork,
+    target_store: nn::VarStore,
+    target: ValueNetwork,
+    optimiser: Optimiser,
+    seats: Vec<Seat>,
+    replay: Replay,
+    rng: ChaCha8Rng,
+    updates: u64,
+    frames: u64,
+}
+
+/// A session and the encodings of its latest frames, oldest first.
+struct Seat {
+    session: Session,
+    age: u16,
+    frames_left: u16,
+    history: Vec<f32>,
+    focal_powers: Vec<f32>,
+}
+
+/// Windows as tensors, and the states in them that have a next frame.
+struct Batch {
+    /// `[F, 1024]` or `[F, 1]`: all windows' frames.
+    frames: Tensor,
+    /// `[F]`: scaled focal powers.
+    focal_powers: Tensor,
+    steps: Vec<Step>,
+    /// Frames that are states: their history lies in their window.
+    states: Vec<usize>,
+}
+
+impl DqnTrainer {
+    /// A training from nothing on `clips`.
+    #[must_use]
+    pub fn new(sight: Sight, recipe: DqnRecipe, clips: Vec<Arc<Clip>>, seed: u64) -> Self {
+        tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (store, mut target_store) = (nn::VarStore::new(Device::Cpu), nn::VarStore::new(Device::Cpu));
+        let network = ValueNetwork::new(&store.root(), sight);
+        let target = ValueNetwork::new(&target_store.root(), sight);
+        target_store.freeze();
+        tch::no_grad(|| blend(&target_store, &store, 1.0));
+        let optimiser = Optimiser::new(recipe.optimiser, &store);
+        let seats = (0..recipe.scans)
+            .map(|_| {
+                let mut seat = Seat::draw(&recipe, &clips, &mut rng);
+                // Scans end one after another, not all at once.
+                seat.frames_left = rng.random_range(1..=recipe.frames_a_scan);
+                seat
+            })
+            .collect();
+        let replay = Replay::new(recipe.replay, recipe.scans);
+        let (updates, frames) = (0, 0);
+        Self { recipe, clips, store, network, target_store, target, optimiser, seats, replay, rng, updates, frames }
+    }
+
+    /// Updates done.
+    #[must_use]
+    pub const fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// Frames played.
+    #[must_use]
+    pub const fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Plays some frames, learns from one batch, and returns its loss.
+    pub fn update(&mut self) -> f64 {
+        let goal = self.frames.max(self.recipe.warm_up) + self.recipe.frames_an_update as u64;
+        while self.frames < goal {
+            tch::no_grad(|| self.play_a_frame());
+        }
+        let batch = self.batch();
+        let loss = self.loss(&batch);
+        let done = (self.updates as f64 / self.recipe.updates as f64).min(1.0);
+        let floor = self.recipe.final_rate;
+        let rate = floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
+        self.optimiser.minimise(&loss, self.recipe.clip, rate);
+        if matches!(self.recipe.target, Target::Bellman { .. }) {
+            tch::no_grad(|| blend(&self.target_store, &self.store, self.recipe.target_share));
+        }
+        self.updates += 1;
+        loss.double_value(&[])
+    }
+
+    /// Every seat sees a frame, acts, and goes on.
+    fn play_a_frame(&mut self) {
+        let sight = self.network.sight;
+        let seen: Vec<Seen> = self
+            .seats
+            .iter_mut()
+            .map(|seat| {
+                let patch = seat.session.observe();
+                sight.metric(&patch).map_or_else(|| Seen::patch(&patch), |metric| Seen::Metric(sight.scaled(metric)))
+            })
+            .collect();
+        let encodings = self.network.encode(&as_tensor(&seen));
+        let count = self.seats.len() as i64;
+        let mut flat = vec![0.0f32; encodings.numel()];
+        encodings.contiguous().view([-1]).copy_data(&mut flat, encodings.numel());
+        let width = sight.width();
+        for (seat, encoding) in self.seats.iter_mut().zip(flat.chunks_exact(width)) {
+            seat.remember(encoding);
+        }
+        let gather = |part: fn(&Seat) -> &Vec<f32>| {
+            let all: Vec<f32> = self.seats.iter().flat_map(|seat| part(seat).iter().copied()).collect();
+            Tensor::from_slice(&all).view([count, -1])
+        };
+        let values = self.network.values(&gather(|seat| &seat.history), &gather(|seat| &seat.focal_powers));
+        let mut flat = vec![0.0f32; self.seats.len() * ACTIONS];
+        values.view([-1]).copy_data(&mut flat, self.seats.len() * ACTIONS);
+        let epsilon = self.recipe.epsilon(self.frames);
+        for (index, values) in flat.chunks_exact(ACTIONS).enumerate() {
+            let explore = self.rng.random_bool(epsilon);
+            let action = if explore { self.rng.random_range(0..ACTIONS) } else { best_action(values) };
+            self.finish_frame(index, &seen[index], action);
+        }
+        self.frames += self.seats.len() as u64;
+    }
+
+    fn finish_frame(&mut self, index: usize, seen: &Seen, action: usize) {
+        let seat = &mut self.seats[index];
+        let stood = seat.session.focal_power();
+        let mut target = stood.moved(action_step(action)).get();
+        if seat.session.wanders {
+            target = lead_astray(target, &mut self.rng);
+        }
+        seat.session.advance(target);
+        let next_optimum = seat.session.optimum().get() as f32;
+        let (focal_power, age) = (stood.get() as f32, seat.age);
+        self.replay.push(index, seen, Step { focal_power, next_optimum, action: action as u8, age });
+        seat.age += 1;
+        seat.frames_left -= 1;
+        if seat.frames_left == 0 {
+            *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+        }
+    }
+
+    fn batch(&mut self) -> Batch {
+        let length = self.recipe.window;
+        let (mut patches, mut metrics, mut steps) = (Vec::new(), Vec::new(), Vec::new());
+        let mut left = self.recipe.windows;
+        while left > 0 {
+            if let Some(window) = self.replay.draw(length, &mut self.rng) {
+                self.replay.read(window, length, &mut patches, &mut metrics, &mut steps);
+                left -= 1;
+            }
+        }
+        let frames = if metrics.is_empty() {
+            Tensor::from_slice(&patches).view([-1, PIXELS as i64]).to_kind(Kind::Float)
+        } else {
+            Tensor::from_slice(&metrics).view([-1, 1])
+        };
+        let focal_powers: Vec<f32> =
+            steps.iter().map(|step| scaled_focal_power(f64::from(step.focal_power))).collect();
+        let whole = |at: &usize| at % length >= reach(&steps[*at]);
+        let states = (0..steps.len()).filter(whole).collect();
+        Batch { frames, focal_powers: Tensor::from_slice(&focal_powers), steps, states }
+    }
+
+    /// Values `[S, 3]` of all of the batch's states by `network`.
+    fn values(network: &ValueNetwork, batch: &Batch) -> Tensor {
+        let history: Vec<i64> = batch
+            .states
+            .iter()
+            .flat_map(|&at| {
+                let reach = reach(&batch.steps[at]);
+                (0..HISTORY).rev().map(move |back| (at - back.min(reach)) as i64)
+            })
+            .collect();
+        let history = Tensor::from_slice(&history);
+        let count = batch.states.len() as i64;
+        let encodings = network.encode(&batch.frames).index_select(0, &history).view([count, -1]);
+        network.values(&encodings, &batch.focal_powers.index_select(0, &history).view([count, -1]))
+    }
+
+    fn loss(&self, batch: &Batch) -> Tensor {
+        let values = Self::values(&self.network, batch);
+        match self.recipe.target {
+            Target::Lookahead => {
+                let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[at])).collect();
+                let wanted = Tensor::from_slice(&wanted).view([-1, ACTIONS as i64]);
+                values.smooth_l1_loss(&wanted, Reduction::Mean, 1.0)
+            }
+            Target::Bellman { discount, steps, double } => {
+                let target = tch::no_grad(|| Self::values(&self.target, batch));
+                let picker = if double { values.detach() } else { target.shallow_clone() };
+                let next = target.gather(1, &picker.argmax(1, true), false).view([-1]);
+                let mut next_values = vec![0.0f32; batch.states.len()];
+                next.copy_data(&mut next_values, batch.states.len());
+                let (taken, wanted) = bellman(batch, &next_values, discount, steps, self.recipe.window);
+                let (rows, actions): (Vec<i64>, Vec<i64>) = taken.into_iter().unzip();
+                let chosen = values.index_select(0, &Tensor::from_slice(&rows));
+                let chosen = chosen.gather(1, &Tensor::from_slice(&actions).view([-1, 1]), false).view([-1]);
+                chosen.smooth_l1_loss(&Tensor::from_slice(&wanted), Reduction::Mean, 1.0)
+            }
+        }
+    }
+}
+
+/// Frames of its own scan that a step's state reaches back.
+fn reach(step: &Step) -> usize {
+    usize::from(step.age).min(HISTORY - 1)
+}
+
+/// What each action would gain at the next frame over standing still, in steps.
+fn gains(step: &Step) -> [f32; ACTIONS] {
+    let (stands, best) = (FocalPower::nearest(f64::from(step.focal_power)), f64::from(step.next_optimum));
+    let error = |action| (stands.moved(action_step(action)).get() - best).abs();
+    std::array::from_fn(|action| ((error(1) - error(action)) / STEP) as f32)
+}
+
+/// The states whose successors `steps` frames on are in the batch, as (row, action taken), and their targets.
+fn bellman(
+    batch: &Batch,
+    next_values: &[f32],
+    discount: f64,
+    steps: usize,
+    window: usize,
+) -> (Vec<(i64, i64)>, Vec<f32>) {
+    let mut row_of = vec![None; batch.steps.len()];
+    for (row, &at) in batch.states.iter().enumerate() {
+        row_of[at] = Some(row);
+    }
+    let (mut taken, mut wanted) = (Vec::new(), Vec::new());
+    for (row, &at) in batch.states.iter().enumerate() {
+        let end = at + steps;
+        let same_scan = end / window == at / window
+            && usize::from(batch.steps[end].age) == usize::from(batch.steps[at].age) + steps;
+        let Some(last) = same_scan.then(|| row_of[end]).flatten() else { continue };
+        let mut sum = discount.powi(steps as i32) * f64::from(next_values[last]);
+        for ahead in 0..steps {
+            let (now, next) = (&batch.steps[at + ahead], &batch.steps[at + ahead + 1]);
+            sum -= discount.powi(ahead as i32) * f64::from((now.next_optimum - next.focal_power).abs());
+        }
+        taken.push((row as i64, i64::from(batch.steps[at].action)));
+        wanted.push(sum as f32);
+    }
+    (taken, wanted)
+}
+
+impl Seat {
+    fn draw(recipe: &DqnRecipe, clips: &[Arc<Clip>], rng: &mut ChaCha8Rng) -> Self {
+        let session = Session::draw(clips, Variety { share: recipe.variety }, recipe.wandering, rng);
+        Self { session, age: 0, frames_left: recipe.frames_a_scan.max(1), history: Vec::new(), focal_powers: Vec::new() }
+    }
+
+    fn remember(&mut self, encoding: &[f32]) {
+        let focal_power = scaled_focal_power(self.session.focal_power().get());
+        if self.focal_powers.is_empty() {
+            self.history = encoding.repeat(HISTORY);
+            self.focal_powers = vec![focal_power; HISTORY];
+        } else {
+            self.history.drain(..encoding.len());
+            self.history.extend_from_slice(encoding);
+            self.focal_powers.remove(0);
+            self.focal_powers.push(focal_power);
+        }
+    }
+}
+
+/// Frames in their compact form as one float tensor, `[N, 1024]` or `[N, 1]`.
+fn as_tensor(seen: &[Seen]) -> Tensor {
+    let count = seen.len() as i64;
+    let (mut bytes, mut metrics) = (Vec::new(), Vec::new());
+    for frame in seen {
+        match frame {
+            Seen::Patch(patch) => bytes.extend_from_slice(patch),
+            Seen::Metric(metric) => metrics.push(*metric),
+        }
+    }
+    if metrics.is_empty() {
+        Tensor::from_slice(&bytes).view([count, -1]).to_kind(Kind::Float)
+    } else {
+        Tensor::from_slice(&metrics).view([count, 1])
+    }
+}
+
+/// Moves every variable of `slow` towards that of `fast` by `share`.
+fn blend(slow: &nn::VarStore, fast: &nn::VarStore, share: f64) {
+    let fast = fast.variables();
+    for (name, mut variable) in slow.variables() {
+        if let Some(towards) = fast.get(&name) {
+            let step = (towards - &variable) * share;
+            let _ = variable.g_add_(&step);
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Replay memory: the latest frames of every seat, patches as bytes, from which windows of consecutive frames are drawn.
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels are whole numbers, 0..=255")]
+
+use rand::{Rng, RngExt};
+
+use crate::imaging::Patch;
+
+/// What one frame leaves behind, besides what was seen.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Step {
+    /// Focal power the frame was seen at.
+    pub focal_power: f32,
+    /// Optimum at the next frame.
+    pub next_optimum: f32,
+    /// The action taken.
+    pub action: u8,
+    /// Frames since the scan's start.
+    pub age: u16,
+}
+
+/// What was seen of a frame, in its compact form.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Seen {
+    /// A patch, as bytes.
+    Patch(Box<[u8]>),
+    /// A scaled metric.
+    Metric(f32),
+}
+
+impl Seen {
+    /// A patch in its compact form.
+    #[must_use]
+    pub fn patch(patch: &Patch) -> Self {
+        Self::Patch(patch.0.iter().map(|&gray| gray as u8).collect())
+    }
+}
+
+/// Frames of many scans, each seat's in a ring of its own.
+#[derive(Debug)]
+pub struct Replay {
+    seats: Vec<Ring>,
+    capacity: usize,
+}
+
+#[derive(Debug, Default)]
+struct Ring {
+    steps: Vec<Step>,
+    patches: Vec<u8>,
+    metrics: Vec<f32>,
+    /// Where the next frame goes once the ring is full; the oldest frame.
+    head: usize,
+}
+
+/// Consecutive frames of one seat: positions in its ring, oldest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    seat: usize,
+    start: usize,
+}
+
+impl Replay {
+    /// A memory of at most `frames` frames for `seats` seats.
+    #[must_use]
+    pub fn new(frames: usize, seats: usize) -> Self {
+        Self { seats: (0..seats).map(|_| Ring::default()).collect(), capacity: (frames / seats.max(1)).max(1) }
+    }
+
+    /// Frames held.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.seats.iter().map(|ring| ring.steps.len()).sum()
+    }
+
+    /// Whether nothing is held.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Adds a frame of `seat`, in place of its oldest when full.
+    pub fn push(&mut self, seat: usize, seen: &Seen, step: Step) {
+        let capacity = self.capacity;
+        let ring = &mut self.seats[seat];
+        if ring.steps.len() < capacity {
+            ring.steps.push(step);
+            match seen {
+                Seen::Patch(bytes) => ring.patches.extend_from_slice(bytes),
+                Seen::Metric(metric) => ring.metrics.push(*metric),
+            }
+            return;
+        }
+        let at = ring.head;
+        ring.steps[at] = step;
+        match seen {
+            Seen::Patch(bytes) => ring.patches[at * bytes.len()..(at + 1) * bytes.len()].copy_from_slice(bytes),
+            Seen::Metric(metric) => ring.metrics[at] = *metric,
+        }
+        ring.head = (at + 1) % capacity;
+    }
+
+    /// A window of `length` frames, uniformly drawn; `None` before a drawn seat holds as many.
+    pub fn draw(&self, length: usize, rng: &mut impl Rng) -> Option<Window> {
+        let seat = rng.random_range(0..self.seats.len());
+        let held = self.seats[seat].steps.len();
+        (held >= length).then(|| Window { seat, start: rng.random_range(0..=held - length) })
+    }
+
+    /// Appends what was seen in `window`, and its steps, to the given lists.
+    pub fn read(
+        &self,
+        window: Window,
+        length: usize,
+        patches: &mut Vec<u8>,
+        metrics: &mut Vec<f32>,
+        steps: &mut Vec<Step>,
+    ) {
+        let ring = &self.seats[window.seat];
+        let patch = ring.patches.len() / ring.steps.len().max(1);
+        for offset in 0..length {
+            let at = (ring.head + window.start + offset) % ring.steps.len();
+            steps.push(ring.steps[at]);
+            patches.extend_from_slice(&ring.patches[at * patch..(at + 1) * patch]);
+            if let Some(metric) = ring.metrics.get(at) {
+                metrics.push(*metric);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_window_is_consecutive_after_the_ring_has_wrapped() {
+        let mut replay = Replay::new(20, 2);
+        for time in 0..37u16 {
+            replay.push(0, &Seen::Metric(f32::from(time)), Step { age: time, ..Step::default() });
+        }
+        assert_eq!(replay.len(), 10);
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut oldest = u16::MAX;
+        for _ in 0..200 {
+            let Some(window) = replay.draw(4, &mut rng) else { continue };
+            let (mut metrics, mut steps) = (Vec::new(), Vec::new());
+            replay.read(window, 4, &mut Vec::new(), &mut metrics, &mut steps);
+            assert!(steps.windows(2).all(|pair| pair[1].age == pair[0].age + 1));
+            assert!(steps.iter().zip(&metrics).all(|(step, metric)| f32::from(step.age) == *metric));
+            oldest = oldest.min(steps[0].age);
+        }
+        assert_eq!(oldest, 27);
+    }
+}
