@@ -129,10 +129,10 @@ impl Learned {
         values
     }
 
-    fn remember(&mut self, encoding: Vec<f32>, focal_power: f32) {
+    fn remember(&mut self, encoding: &[f32], focal_power: f32) {
         let missing = if self.encodings.is_empty() { HISTORY } else { 1 };
         for _ in 0..missing {
-            self.encodings.push_back(encoding.clone());
+            self.encodings.push_back(encoding.to_vec());
             self.focal_powers.push_back(focal_power);
         }
         while self.encodings.len() > HISTORY {
@@ -147,7 +147,7 @@ impl Policy for Learned {
         tch::no_grad(|| {
             let metric = self.network.sight.metric(seen.patch);
             let encoding = self.encode(seen.patch, metric);
-            self.remember(encoding, scaled_focal_power(seen.focal_power.get()));
+            self.remember(&encoding, scaled_focal_power(seen.focal_power.get()));
             let encodings: Vec<f32> = self.encodings.iter().flatten().copied().collect();
             let focal_powers: Vec<f32> = self.focal_powers.iter().copied().collect();
             let row = |values: &[f32]| Tensor::from_slice(values).view([1, -1]);

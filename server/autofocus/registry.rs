@@ -94,7 +94,9 @@ impl Registry {
             .with("mgm-hill-climber", "climbs the mean gradient magnitude, a step a frame", || {
                 Box::new(HillClimber::new(mgm))
             })
-            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || Box::new(HillClimber::new(mlr)));
+            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || {
+                Box::new(HillClimber::new(mlr))
+            });
         shipped::with_shipped(classical)
     }
 

@@ -88,7 +88,9 @@ fn put(registry: Registry, name: &str, summary: &'static str, design: Design, by
     match build(design, &bytes) {
         Err(error) => registry.without(name, summary, &format!("{error}; put sound weights in their place")),
         // The same bytes were sound a moment ago; should libtorch fail all the same, the lens stays where it is.
-        Ok(_) => registry.with(name, summary, move || build(design, &bytes).unwrap_or_else(|_| Box::new(Fixed::default()))),
+        Ok(_) => {
+            registry.with(name, summary, move || build(design, &bytes).unwrap_or_else(|_| Box::new(Fixed::default())))
+        }
     }
 }
 

@@ -5,6 +5,7 @@ mod devices;
 mod export;
 mod inspect;
 mod evaluate;
+mod export;
 mod lens;
 mod policies;
 mod serve;

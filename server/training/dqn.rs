@@ -256,8 +256,7 @@ impl DqnTrainer {
         } else {
             Tensor::from_slice(&metrics).view([-1, 1])
         };
-        let focal_powers: Vec<f32> =
-            steps.iter().map(|step| scaled_focal_power(f64::from(step.focal_power))).collect();
+        let focal_powers: Vec<f32> = steps.iter().map(|step| scaled_focal_power(f64::from(step.focal_power))).collect();
         let whole = |at: &usize| at % length >= reach(&steps[*at]);
         let states = (0..steps.len()).filter(whole).collect();
         Batch { frames, focal_powers: Tensor::from_slice(&focal_powers), steps, states }
@@ -347,7 +346,13 @@ fn bellman(
 impl Seat {
     fn draw(recipe: &DqnRecipe, clips: &[Arc<Clip>], rng: &mut ChaCha8Rng) -> Self {
         let session = Session::draw(clips, Variety { share: recipe.variety }, recipe.wandering, rng);
-        Self { session, age: 0, frames_left: recipe.frames_a_scan.max(1), history: Vec::new(), focal_powers: Vec::new() }
+        Self {
+            session,
+            age: 0,
+            frames_left: recipe.frames_a_scan.max(1),
+            history: Vec::new(),
+            focal_powers: Vec::new(),
+        }
     }
 
     fn remember(&mut self, encoding: &[f32]) {

@@ -7,7 +7,7 @@ use std::process::Command;
 use std::sync::Arc;
 
 use super::scan::{Area, Clip, ClipError};
-use crate::imaging::GrayImage;
+use crate::imaging::{ContentArea, GrayImage, content_area};
 
 /// Most lines of a picture: the height the paper's walks are meant for.
 const LINES: u32 = 480;
@@ -138,15 +138,23 @@ fn picture(bytes: &[u8]) -> Option<(GrayImage, &[u8])> {
     Some((GrayImage { width, height, data }, &rest[1 + width * height..]))
 }
 
-/// A clip of these pictures, within what is surely inside the bright circle of an endoscope.
+/// A clip of these pictures, within the content area of the first where it has one.
 fn clip(frames: Vec<Arc<GrayImage>>) -> Result<Clip, ClipError> {
-    let area = frames.first().filter(|frame| frame.height >= 200).map(|frame| middle(frame.width, frame.height));
+    let area = frames.first().and_then(|frame| content_area::detect(frame)).map(|circle| within(&circle));
     Clip::new(frames, area)
 }
 
-/// The middle 60 % by 70 %.
-const fn middle(width: usize, height: usize) -> Area {
-    Area { left: width / 5, top: height * 3 / 20, right: width - width / 5, bottom: height - height * 3 / 20 }
+/// The square that fits into the circle with a little to spare; what of it lies outside the picture is cut by the clip.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of a picture, from 0 on")]
+fn within(circle: &ContentArea) -> Area {
+    let half = 0.68 * circle.radius;
+    let pixel = |place: f64| place.max(0.0) as usize;
+    Area {
+        left: pixel(circle.x - half),
+        top: pixel(circle.y - half),
+        right: pixel(circle.x + half),
+        bottom: pixel(circle.y + half),
+    }
 }
 
 #[cfg(test)]

@@ -58,24 +58,24 @@ impl Path {
 /// what the next frame is seen at.
 pub fn roll_out(policy: &mut dyn Policy, scan: &mut Scan, frames: usize) -> Path {
     let mut focal_power = FocalPower::MIDDLE;
-    let mut path = Path::default();
+    let mut course = Path::default();
     for _ in 0..frames {
         let patch = scan.observe(focal_power);
-        path.focal_power.push(focal_power.get());
-        path.optimum.push(scan.optimum().get());
+        course.focal_power.push(focal_power.get());
+        course.optimum.push(scan.optimum().get());
         focal_power = FocalPower::nearest(policy.step(&Observation { patch: &patch, focal_power }).target);
         scan.advance();
     }
-    path
+    course
 }
 
 /// What a policy with the paper's steps could do at best, if it knew the next frame's optimum.
 pub fn roll_out_oracle(scan: &mut Scan, frames: usize) -> Path {
     let mut focal_power = FocalPower::MIDDLE;
-    let mut path = Path::default();
+    let mut course = Path::default();
     for _ in 0..frames {
-        path.focal_power.push(focal_power.get());
-        path.optimum.push(scan.optimum().get());
+        course.focal_power.push(focal_power.get());
+        course.optimum.push(scan.optimum().get());
         scan.advance();
         let best = scan.optimum();
         focal_power = [0.0, -STEP, STEP]
@@ -84,7 +84,7 @@ pub fn roll_out_oracle(scan: &mut Scan, frames: usize) -> Path {
             .min_by(|a, b| a.distance(best).total_cmp(&b.distance(best)))
             .unwrap_or(focal_power);
     }
-    path
+    course
 }
 
 #[cfg(test)]
