@@ -2,10 +2,10 @@
 
 mod announce;
 mod devices;
-mod export;
-mod inspect;
 mod evaluate;
 mod export;
+mod export;
+mod inspect;
 mod lens;
 mod policies;
 mod serve;
