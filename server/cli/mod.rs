@@ -4,7 +4,6 @@ mod announce;
 mod devices;
 mod evaluate;
 mod export;
-mod export;
 mod inspect;
 mod lens;
 mod policies;
