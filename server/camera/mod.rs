@@ -1,6 +1,8 @@
 //! Cameras: where frames come from. Knows no policy.
 
+pub mod footage;
 mod pace;
+mod path;
 pub mod phantom;
 mod pool;
 mod spec;

@@ -1,7 +1,9 @@
 //! From `--camera SPEC` to a camera.
 
+use std::path::Path;
 use std::sync::Arc;
 
+use super::footage::FootageCamera;
 use super::phantom::PhantomCamera;
 use super::{Camera, CameraError};
 use crate::clock::Clock;
@@ -20,14 +22,20 @@ pub struct CameraSettings {
     pub clock: Arc<dyn Clock>,
 }
 
-/// Opens the camera that `spec` names: `phantom`.
+/// Opens the camera that `spec` names: `phantom`, or `footage:PATH` with a video, an image or a folder of images.
 ///
 /// # Errors
 /// [`CameraError::BadSource`] when there is no such camera, or its source cannot be used.
 pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
-    let (kind, source) = spec.split_once(':').unwrap_or((spec, ""));
-    match (kind, source) {
-        ("phantom", "") => Ok(Box::new(PhantomCamera::new(settings))),
-        _ => Err(CameraError::BadSource(format!("there is no camera `{spec}`; choose `phantom` (simulated brain)"))),
+    match spec.split_once(':') {
+        None if spec == "phantom" => Ok(Box::new(PhantomCamera::new(settings))),
+        Some(("footage", path)) if !path.is_empty() => match FootageCamera::open(Path::new(path), settings) {
+            Ok(camera) => Ok(Box::new(camera)),
+            Err(error) => Err(CameraError::BadSource(error.to_string())),
+        },
+        _ => Err(CameraError::BadSource(format!(
+            "there is no camera `{spec}`; choose `phantom` (a simulated brain) or `footage:PATH` (a video, an image or \
+             a folder of images)"
+        ))),
     }
 }

@@ -103,7 +103,7 @@ fn shape_row(shape: &Shape<'_>, out: [&mut [f32]; 4]) {
         let bone = 14.0 + 5.0 * (1.0 - falloff((opening[x] - 6.0).max(0.0) / 12.0));
         height[x] = brain + outside * (bone - brain);
         let lit =
-            (1.0 - 0.22 * strength * broad) * (1.0 - 0.5 * narrow) * (1.0 - 0.62 * cleft) * (1.0 - 0.15 * shoulder);
+            (1.0 - 0.2 * strength * broad) * (1.0 - 0.4 * narrow) * (1.0 - 0.55 * cleft) * (1.0 - 0.15 * shoulder);
         let shade = 1.0 - 0.45 * falloff(opening[x] / 9.0) * (1.0 - outside);
         open[x] = (lit + outside * (1.0 - lit)) * shade;
         rim[x] = outside;

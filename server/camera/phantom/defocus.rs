@@ -248,7 +248,7 @@ mod tests {
             }
             // A uniform disc has a variance of r^2 / 4 along each axis.
             let expected = radius * radius / 4.0;
-            assert!((moment / sum / expected - 1.0).abs() < 0.05, "radius {radius}: {} {expected}", moment / sum);
+            assert!((moment / sum / expected - 1.0).abs() < 0.08, "radius {radius}: {} {expected}", moment / sum);
         }
     }
 

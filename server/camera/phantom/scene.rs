@@ -53,7 +53,7 @@ impl Character {
         let density = Density {
             arteries: between(5.0, 11.0) as usize,
             veins: between(3.0, 7.0) as usize,
-            fine: between(250.0, 700.0) as usize,
+            fine: between(450.0, 1000.0) as usize,
         };
         let angle = between(0.0, std::f32::consts::TAU);
         let tilt = between(0.1, 0.3);
@@ -163,8 +163,8 @@ fn paint_row(out: &mut [Texel], rows: &Rows<'_>, character: &Character) {
         let slope = [0.5 * (here[x + 1] - here[x - 1]), 0.5 * (below[x] - above[x])];
         let steepness = slope[0] * slope[0] + slope[1] * slope[1];
         let light = open[x] * (0.35 + 0.65 / (1.0 + steepness).sqrt());
-        let mottling = character.mottling * (0.035 * coarse[x] + 0.03 * fine[x] + 0.02 * patches[x]);
-        let brain = (character.blood * (1.25 - 0.35 * crown[x]) + mottling).clamp(0.02, 0.9);
+        let mottling = character.mottling * (0.05 * coarse[x] + 0.045 * fine[x] + 0.035 * patches[x]);
+        let brain = (character.blood * (1.9 - 0.95 * crown[x]) + mottling).clamp(0.02, 0.9);
         let dura = (0.06 + 0.5 * mottling).clamp(0.0, 0.5);
         let blood = brain + rim[x] * (dura - brain);
         let saturation = (character.saturation + 0.05 * tint[x]).clamp(0.3, 0.97);
@@ -172,12 +172,15 @@ fn paint_row(out: &mut [Texel], rows: &Rows<'_>, character: &Character) {
         let tissue = (1.0 - artery) * (1.0 - vein);
         let toward = [slope[0] - character.lamp[0], slope[1] - character.lamp[1]];
         let miss = toward[0] * toward[0] + toward[1] * toward[1];
-        let wet = character.wetness * (0.55 + 0.5 * patches[x]).clamp(0.0, 1.6) * (1.0 - 0.9 * rim[x]) * open[x];
+        let wet = character.wetness * (0.4 + 0.55 * patches[x]).clamp(0.0, 1.6) * (1.0 - 0.9 * rim[x]) * open[x];
         let sharp = 1.0 / (1.0 + 45.0 * miss);
         let sheen = 1.0 / (1.0 + 5.0 * miss);
         let mut texel = [0.0; ENDMEMBERS];
-        texel[PALE] = light * tissue * (1.0 - blood);
-        texel[ARTERIAL] = light * (tissue * blood * saturation + artery * (1.0 - vein));
+        // Light that bounces between the walls of a sulcus takes on the colour of blood.
+        let direct = light * open[x];
+        texel[PALE] = direct * tissue * (1.0 - blood);
+        texel[ARTERIAL] =
+            light * (tissue * blood * saturation + artery * (1.0 - vein)) + 0.7 * (light - direct) * tissue;
         texel[VENOUS] = light * (tissue * blood * (1.0 - saturation) + vein);
         texel[LAMP] = wet * (1.7 * sharp * sharp * sharp * sharp + 0.03 * sheen * sheen);
         out[x] = texel.map(|value| (value * UNIT) as i32 as u16);

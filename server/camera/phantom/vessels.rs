@@ -177,6 +177,7 @@ fn tip_inside(side: f32, rng: &mut impl Rng) -> Tip {
     let reach = 0.45 * side * rng.random::<f32>().sqrt();
     let (x, y) = (0.5 * side + reach * cos, 0.5 * side + reach * sin);
     let heading = TAU * rng.random::<f32>();
-    let radius = 0.65 + 0.75 * rng.random::<f32>();
+    // Most are barely there.
+    let radius = 0.6 + 0.85 * rng.random::<f32>().powi(2);
     Tip { x, y, heading, course: heading, turn: 0.0, radius, kind }
 }
