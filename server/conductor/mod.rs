@@ -3,6 +3,7 @@
 
 mod allocate;
 mod course;
+mod flow;
 mod library;
 mod remarks;
 mod reports;
@@ -21,12 +22,11 @@ pub use reports::{
 
 use crate::autofocus::Registry;
 use crate::clock::Clock;
-use crate::control::{Command, ControlHandle, Drive};
+use crate::control::ControlHandle;
 use crate::ids::SessionId;
 use crate::store::{Store, StoreError};
-use crate::trial::event::EventKind;
-use crate::trial::session::{Refusal, decide, decide_restart, decide_time};
-use crate::trial::view::{Action, NewAnswer, NewComment, OperatorView, Phase, Role, SurgeonView};
+use crate::trial::session::Refusal;
+use crate::trial::view::{Action, NewAnswer, NewComment, OperatorView, Role, SurgeonView};
 use course::Course;
 
 /// Time between two sendings of the time left, and the most that a killed server forgets of a segment's clock.
@@ -251,104 +251,4 @@ impl Conductor {
 
 fn operator_only(by: Role) -> Result<(), ConductError> {
     if by == Role::Operator { Ok(()) } else { Err(ConductError::Forbidden("only the operator can do this".to_owned())) }
-}
-
-impl Shared {
-    async fn act(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
-        let mut live = self.live.lock().await;
-        if live.course.as_ref().is_some_and(|course| course.session() == session) {
-            self.keep_time(&mut live).await?;
-        }
-        if let Some(course) = live.course.as_mut().filter(|course| course.session() == session) {
-            let kinds = decide(&course.state, by, action, self.clock.now())?;
-            self.record(course, by, kinds).await?;
-            self.publish(&live);
-            self.drive(&mut live);
-            self.changed.notify_one();
-            return Ok(());
-        }
-        let mut earlier = self.load(session).await?;
-        let kinds = decide(&earlier.state, by, action, self.clock.now())?;
-        self.record(&mut earlier, by, kinds).await
-    }
-
-    async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
-        let course = Course::load(self.store.reader(), session).await?;
-        course.ok_or_else(|| ConductError::NotFound("there is no such session; reload the page".to_owned()))
-    }
-
-    /// Takes up the session that was under way when the server ended.
-    async fn take_up(&self) -> Result<(), ConductError> {
-        let mut live = self.live.lock().await;
-        if let Some(course) = live.course.as_mut() {
-            let inspected = match course.state.segment() {
-                Some(segment) => self.store.reader().noted_clock(segment).await?,
-                None => Duration::ZERO,
-            };
-            let kinds = decide_restart(&course.state, inspected);
-            self.record(course, Role::System, kinds).await?;
-        }
-        self.publish(&live);
-        self.drive(&mut live);
-        Ok(())
-    }
-
-    async fn keep_time(&self, live: &mut Live) -> Result<(), ConductError> {
-        let Some(course) = live.course.as_mut() else { return Ok(()) };
-        let kinds = decide_time(&course.state, self.clock.now());
-        if kinds.is_empty() {
-            return Ok(());
-        }
-        self.record(course, Role::System, kinds).await?;
-        self.publish(live);
-        self.drive(live);
-        Ok(())
-    }
-
-    /// To disk, then into the state.
-    async fn record(&self, course: &mut Course, by: Role, kinds: Vec<EventKind>) -> Result<(), ConductError> {
-        if kinds.is_empty() {
-            return Ok(());
-        }
-        let events = course.number(by, kinds, self.clock.now(), self.clock.wall());
-        self.store.append_events(course.session(), &events).await?;
-        for event in events {
-            course.apply(event);
-        }
-        Ok(())
-    }
-
-    fn publish(&self, live: &Live) {
-        let now = self.clock.now();
-        let (surgeon, operator) = live.course.as_ref().map(|course| views::both(course, now)).unzip();
-        replace_if_changed(&self.surgeon, surgeon);
-        replace_if_changed(&self.operator, operator);
-    }
-
-    /// Tells the control loop what the session now asks of it, if that changed.
-    fn drive(&self, live: &mut Live) {
-        let wanted = live.course.as_ref().and_then(Course::driving);
-        if wanted == live.driving {
-            return;
-        }
-        let drive = match (&wanted, live.course.as_ref()) {
-            (Some(wanted), _) => Some(wanted.command()),
-            (None, Some(course)) if course.state.phase() == Phase::Ready => None,
-            (None, _) => Some(Command::Drive { drive: Drive::Hold, segment: None }),
-        };
-        live.driving = wanted;
-        if let Some(command) = drive {
-            self.control.send(command);
-        }
-    }
-}
-
-fn replace_if_changed<T: PartialEq>(sender: &watch::Sender<Option<Arc<T>>>, value: Option<T>) {
-    sender.send_if_modified(|shown| {
-        let changed = shown.as_deref() != value.as_ref();
-        if changed {
-            *shown = value.map(Arc::new);
-        }
-        changed
-    });
 }

@@ -11,6 +11,7 @@ mod reader;
 mod remarks;
 mod rows;
 mod sessions;
+mod sets;
 pub mod telemetry;
 
 use std::fs::{File, OpenOptions, TryLockError};
@@ -30,7 +31,8 @@ pub use error::StoreError;
 pub use reader::Reader;
 pub use remarks::Kept;
 pub use rows::*;
-pub use sessions::{NewSession, SetMember, StoredSession};
+pub use sessions::{NewSession, StoredSession};
+pub use sets::SetMember;
 
 /// The migrations, each with its way down.
 pub static MIGRATOR: Migrator = sqlx::migrate!("./migrations");

@@ -53,19 +53,6 @@ pub struct StoredSession {
     pub events: Vec<(i64, Event)>,
 }
 
-/// A session of a set that shares a seed.
-#[derive(Debug, Clone, Copy)]
-pub struct SetMember {
-    /// The seed.
-    pub seed: Seed,
-    /// Index in the set.
-    pub index: usize,
-    /// Whether it was aborted.
-    pub aborted: bool,
-    /// Whether it was unblinded.
-    pub unblinded: bool,
-}
-
 impl Store {
     /// Makes a session with its first event, or nothing.
     ///
@@ -244,44 +231,6 @@ impl Reader {
             .await?;
         Ok(Duration::from_millis(noted.and_then(|noted| u64::try_from(noted).ok()).unwrap_or(0)))
     }
-
-    /// The sessions that share the seed of the latest session by the protocol with this hash and algorithm.
-    ///
-    /// # Errors
-    /// When the database failed.
-    pub async fn latest_set(&self, protocol_sha256: &str, algorithm: Algorithm) -> Result<Vec<SetMember>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT seed, set_index,
-                 EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'aborted') AS aborted,
-                 EXISTS (SELECT 1 FROM events WHERE events.session = s.session AND kind = 'unblinded') AS unblinded
-             FROM sessions AS s WHERE protocol_sha256 = ?1 AND algorithm = ?2 AND seed = (
-                 SELECT seed FROM sessions WHERE protocol_sha256 = ?1 AND algorithm = ?2 ORDER BY rowid DESC LIMIT 1)",
-        )
-        .bind(protocol_sha256)
-        .bind(algorithm.name())
-        .fetch_all(self.pool())
-        .await?;
-        let member = |row: &SqliteRow| {
-            let (aborted, unblinded) = (row.try_get("aborted")?, row.try_get("unblinded")?);
-            Ok(SetMember { seed: seed(row)?, index: index(row)?, aborted, unblinded })
-        };
-        rows.iter().map(member).collect()
-    }
-
-    /// Whether every session that shares `seed` was unblinded, so that the seed gives nothing away.
-    ///
-    /// # Errors
-    /// When the database failed.
-    pub async fn set_unblinded(&self, seed: Seed) -> Result<bool, StoreError> {
-        let blinded: i64 = sqlx::query_scalar(
-            "SELECT count(*) FROM sessions AS s WHERE seed = ? AND NOT EXISTS (
-                 SELECT 1 FROM events WHERE events.session = s.session AND kind = 'unblinded')",
-        )
-        .bind(seed.to_hex())
-        .fetch_one(self.pool())
-        .await?;
-        Ok(blinded == 0)
-    }
 }
 
 fn event(row: &SqliteRow) -> Result<Event, StoreError> {
@@ -294,17 +243,17 @@ fn event(row: &SqliteRow) -> Result<Event, StoreError> {
     Ok(Event { number: row.try_get("number")?, by, at, wall, kind })
 }
 
-fn algorithm(row: &SqliteRow) -> Result<Algorithm, StoreError> {
+pub(super) fn algorithm(row: &SqliteRow) -> Result<Algorithm, StoreError> {
     let name: String = row.try_get("algorithm")?;
     Algorithm::named(&name).ok_or_else(|| StoreError::Damaged(format!("unknown algorithm '{name}'")))
 }
 
-fn seed(row: &SqliteRow) -> Result<Seed, StoreError> {
+pub(super) fn seed(row: &SqliteRow) -> Result<Seed, StoreError> {
     let text: String = row.try_get("seed")?;
     Seed::from_hex(&text).ok_or_else(|| StoreError::Damaged("a seed is not 64 hexadecimal digits".to_owned()))
 }
 
-fn index(row: &SqliteRow) -> Result<usize, StoreError> {
+pub(super) fn index(row: &SqliteRow) -> Result<usize, StoreError> {
     let index: i64 = row.try_get("set_index")?;
     usize::try_from(index).map_err(|_| StoreError::Damaged(format!("set index {index}")))
 }

@@ -1,0 +1,114 @@
+//! The one way that everything goes: decide, to disk, into the state, to the screens, to the control loop.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+
+use super::course::Course;
+use super::{ConductError, Live, Shared, views};
+use crate::control::{Command, Drive};
+use crate::ids::SessionId;
+use crate::trial::event::EventKind;
+use crate::trial::session::{decide, decide_restart, decide_time};
+use crate::trial::view::{Action, Phase, Role};
+
+impl Shared {
+    pub(super) async fn act(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+        let mut live = self.live.lock().await;
+        if live.course.as_ref().is_some_and(|course| course.session() == session) {
+            self.keep_time(&mut live).await?;
+        }
+        if let Some(course) = live.course.as_mut().filter(|course| course.session() == session) {
+            let kinds = decide(&course.state, by, action, self.clock.now())?;
+            self.record(course, by, kinds).await?;
+            self.publish(&live);
+            self.drive(&mut live);
+            self.changed.notify_one();
+            return Ok(());
+        }
+        let mut earlier = self.load(session).await?;
+        let kinds = decide(&earlier.state, by, action, self.clock.now())?;
+        self.record(&mut earlier, by, kinds).await
+    }
+
+    pub(super) async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
+        let course = Course::load(self.store.reader(), session).await?;
+        course.ok_or_else(|| ConductError::NotFound("there is no such session; reload the page".to_owned()))
+    }
+
+    /// Takes up the session that was under way when the server ended.
+    pub(super) async fn take_up(&self) -> Result<(), ConductError> {
+        let mut live = self.live.lock().await;
+        if let Some(course) = live.course.as_mut() {
+            let inspected = match course.state.segment() {
+                Some(segment) => self.store.reader().noted_clock(segment).await?,
+                None => Duration::ZERO,
+            };
+            let kinds = decide_restart(&course.state, inspected);
+            self.record(course, Role::System, kinds).await?;
+        }
+        self.publish(&live);
+        self.drive(&mut live);
+        Ok(())
+    }
+
+    pub(super) async fn keep_time(&self, live: &mut Live) -> Result<(), ConductError> {
+        let Some(course) = live.course.as_mut() else { return Ok(()) };
+        let kinds = decide_time(&course.state, self.clock.now());
+        if kinds.is_empty() {
+            return Ok(());
+        }
+        self.record(course, Role::System, kinds).await?;
+        self.publish(live);
+        self.drive(live);
+        Ok(())
+    }
+
+    /// To disk, then into the state.
+    async fn record(&self, course: &mut Course, by: Role, kinds: Vec<EventKind>) -> Result<(), ConductError> {
+        if kinds.is_empty() {
+            return Ok(());
+        }
+        let events = course.number(by, kinds, self.clock.now(), self.clock.wall());
+        self.store.append_events(course.session(), &events).await?;
+        for event in events {
+            course.apply(event);
+        }
+        Ok(())
+    }
+
+    pub(super) fn publish(&self, live: &Live) {
+        let now = self.clock.now();
+        let (surgeon, operator) = live.course.as_ref().map(|course| views::both(course, now)).unzip();
+        replace_if_changed(&self.surgeon, surgeon);
+        replace_if_changed(&self.operator, operator);
+    }
+
+    /// Tells the control loop what the session now asks of it, if that changed.
+    fn drive(&self, live: &mut Live) {
+        let wanted = live.course.as_ref().and_then(Course::driving);
+        if wanted == live.driving {
+            return;
+        }
+        let drive = match (&wanted, live.course.as_ref()) {
+            (Some(wanted), _) => Some(wanted.command()),
+            (None, Some(course)) if course.state.phase() == Phase::Ready => None,
+            (None, _) => Some(Command::Drive { drive: Drive::Hold, segment: None }),
+        };
+        live.driving = wanted;
+        if let Some(command) = drive {
+            self.control.send(command);
+        }
+    }
+}
+
+fn replace_if_changed<T: PartialEq>(sender: &watch::Sender<Option<Arc<T>>>, value: Option<T>) {
+    sender.send_if_modified(|shown| {
+        let changed = shown.as_deref() != value.as_ref();
+        if changed {
+            *shown = value.map(Arc::new);
+        }
+        changed
+    });
+}
