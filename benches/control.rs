@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use parfocal::autofocus::{Observation, PolicyName, Registry, mgm, mlr};
-use parfocal::camera::{Frame, FrameImage};
+use parfocal::camera::{self, CameraSettings, Frame, FrameImage};
 use parfocal::clock::{Clock, SystemClock};
-use parfocal::control::{Command, Drive, Eye, Stepper};
-use parfocal::imaging::{Calibration, MosaicFrame, PATCH_SIDE, Patch, Reconstructor};
-use parfocal::lens::{FocalPower, SimulatedLens};
+use parfocal::control::{Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, Stepper};
+use parfocal::imaging::{Calibration, GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage};
+use parfocal::lens::{FocalPower, Lens, SimulatedLens};
 
 fn texture(index: usize) -> usize {
     (index * index * 37 + index * 11) % 256
@@ -23,7 +23,6 @@ fn patch() -> Patch {
 
 fn metrics(criterion: &mut Criterion) {
     let patch = patch();
-    assert_eq!(patch.0.len(), PATCH_SIDE * PATCH_SIDE);
     criterion.bench_function("metric/mgm", |bench| bench.iter(|| mgm(black_box(&patch))));
     criterion.bench_function("metric/mlr", |bench| bench.iter(|| mlr(black_box(&patch))));
 }
@@ -69,5 +68,46 @@ fn steps(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, metrics, policies, steps);
+/// Exposure to lens command in the whole loop: phantom at 50 frames a second, telemetry drained, and a thread that makes a
+/// picture of each frame meanwhile, as the live view does.
+fn latency(_: &mut Criterion) {
+    const STEPS: usize = 500;
+    let clock = Arc::new(SystemClock);
+    let lens = Box::new(SimulatedLens::new(clock.clone()));
+    let settings = CameraSettings { fps: 50.0, seed: 1, optics: lens.optics(), clock: clock.clone() };
+    let camera = camera::open("phantom", settings).expect("is there");
+    let mut reconstructor = Reconstructor::new(&Calibration::default());
+    let rig = Rig { camera, lens, reconstructor: reconstructor.clone(), registry: Registry::standard(), clock };
+    let settings = Settings { frame_period: Duration::from_millis(20), telemetry_capacity: 256 };
+    let (control, handle, mut telemetry) = ControlLoop::spawn(settings, rig).expect("starts");
+    handle.send(Command::Drive {
+        drive: Drive::Policy { name: PolicyName::new("mgm-hill-climber"), start: None },
+        segment: None,
+    });
+    let frames = handle.frames.clone();
+    let viewer = std::thread::spawn(move || {
+        let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+        let mut encoder = JpegEncoder::new(80).expect("starts");
+        while !frames.is_closed() {
+            if let Some(ControlledFrame { frame: Frame { image: FrameImage::Mosaic(mosaic), .. }, .. }) =
+                frames.take(Duration::from_millis(100))
+            {
+                reconstructor.reconstruct(&mosaic, &mut rgb, &mut gray);
+                black_box(encoder.encode(&rgb).expect("encodes"));
+            }
+        }
+    });
+    let mut latencies: Vec<u32> = std::iter::from_fn(|| telemetry.blocking_recv())
+        .filter(|record| record.policy.is_some())
+        .map(|record| record.latency_micros)
+        .take(STEPS)
+        .collect();
+    let fps = handle.status.borrow().steps_per_second;
+    control.stop();
+    let _ = viewer.join();
+    let LatencyFigures { steps, p50, p99 } = LatencyFigures::of(&mut latencies);
+    println!("loop/latency            {steps} steps at {fps} a second: p50 {p50} µs, p99 {p99} µs");
+}
+
+criterion_group!(benches, metrics, policies, steps, latency);
 criterion_main!(benches);

@@ -17,6 +17,7 @@ pub use pilot::HoldReason;
 pub use slot::LatestSlot;
 pub use spawn::{ControlLoop, Rig, Settings};
 pub use stepper::Stepper;
+pub use window::LatencyFigures;
 
 use std::sync::Arc;
 

@@ -15,15 +15,28 @@ pub struct LatencyWindow {
     sorted: Vec<u32>,
 }
 
-/// What a window holds.
+/// Latencies of some steps in short.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LatencyFigures {
-    /// Steps in the window.
+    /// Steps.
     pub steps: usize,
     /// Median, microseconds; 0 without steps.
     pub p50: u32,
     /// 99th percentile, microseconds; 0 without steps.
     pub p99: u32,
+}
+
+impl LatencyFigures {
+    /// The figures of these latencies in microseconds, which it sorts; percentiles by nearest rank.
+    #[must_use]
+    pub fn of(latencies: &mut [u32]) -> Self {
+        latencies.sort_unstable();
+        let percentile = |percent: usize| {
+            let rank = (latencies.len() * percent).div_ceil(100).saturating_sub(1);
+            latencies.get(rank).copied().unwrap_or(0)
+        };
+        Self { steps: latencies.len(), p50: percentile(50), p99: percentile(99) }
+    }
 }
 
 impl LatencyWindow {
@@ -33,15 +46,12 @@ impl LatencyWindow {
         self.forget(now);
     }
 
-    /// The figures of the second before `now`; percentiles by nearest rank.
+    /// The figures of the second before `now`.
     pub fn figures(&mut self, now: Moment) -> LatencyFigures {
         self.forget(now);
         self.sorted.clear();
         self.sorted.extend(self.steps.iter().map(|&(_, latency)| latency));
-        self.sorted.sort_unstable();
-        let rank = |percent: usize| (self.sorted.len() * percent).div_ceil(100).saturating_sub(1);
-        let percentile = |percent| self.sorted.get(rank(percent)).copied().unwrap_or(0);
-        LatencyFigures { steps: self.sorted.len(), p50: percentile(50), p99: percentile(99) }
+        LatencyFigures::of(&mut self.sorted)
     }
 
     fn forget(&mut self, now: Moment) {

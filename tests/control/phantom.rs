@@ -1,0 +1,87 @@
+//! How well the classical policies keep the phantom in focus, through the whole step of the loop; faster than time.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use parfocal::autofocus::{PolicyName, Registry};
+use parfocal::camera::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
+use parfocal::camera::{Frame, FrameImage, Truth};
+use parfocal::clock::{Clock, ManualClock};
+use parfocal::control::{Command, Drive, Eye, Stepper};
+use parfocal::imaging::MosaicFrame;
+use parfocal::lens::{FocalPower, Lens, SimulatedLens};
+
+use super::fakes::reconstructor;
+
+/// A frame every 40 ms, exposed for 10 ms of them: the lens has come to rest before the next one.
+const EXPOSURE: Duration = Duration::from_millis(10);
+const FROM_COMMAND_TO_MIDDLE: Duration = Duration::from_millis(35);
+const SEEDS: [u64; 2] = [1, 2];
+const FRAMES: u64 = 75;
+
+/// Mean of |f - f*| at the middle of each exposure, and the share of frames where it is below 0.1.
+#[derive(Debug, Clone, Copy)]
+struct FocalError {
+    mean: f64,
+    in_focus: f64,
+}
+
+fn run(policy: &str, seed: u64) -> Vec<f64> {
+    let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
+    let lens = SimulatedLens::new(clock.clone());
+    let glass = lens.optics();
+    let (mut phantom, mut hand) = (Phantom::new(seed), Hand::new(seed));
+    let patience = Duration::from_secs(20);
+    let mut stepper =
+        Stepper::new(Box::new(lens), Eye::new(reconstructor()), Registry::standard(), clock.clone(), patience);
+    stepper.obey(Command::ContentArea(Some(phantom.content_area())));
+    let drive = Drive::Policy { name: PolicyName::new(policy), start: Some(FocalPower::MIDDLE) };
+    stepper.obey(Command::Drive { drive, segment: None });
+    let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
+    let mut errors = Vec::new();
+    for number in 1..=FRAMES {
+        clock.advance(FROM_COMMAND_TO_MIDDLE);
+        let middle = clock.now();
+        let pose = hand.pose_at(Duration::from_nanos(middle.as_nanos()));
+        let exposed = glass.focal_power_at(middle);
+        phantom.expose(&pose, exposed, &mut samples);
+        phantom.adjust_exposure(&samples);
+        clock.advance(EXPOSURE / 2);
+        let optimal = phantom.optimal(&pose);
+        let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, std::mem::take(&mut samples)).unwrap();
+        let image = FrameImage::Mosaic(Arc::new(mosaic));
+        let truth = Some(Truth { optimal, exposed });
+        let frame = Frame { number, exposed_at: clock.now(), exposure: EXPOSURE, image, truth };
+        let controlled = stepper.step(frame).unwrap();
+        assert_eq!(controlled.record.held, None);
+        errors.push(exposed.distance(optimal));
+        let FrameImage::Mosaic(mosaic) = controlled.frame.image else { unreachable!() };
+        samples = Arc::into_inner(mosaic).unwrap().into_samples();
+    }
+    errors
+}
+
+#[allow(clippy::cast_precision_loss, reason = "a few hundred frames")]
+fn focal_error(policy: &str) -> FocalError {
+    let errors: Vec<f64> = SEEDS.iter().flat_map(|&seed| run(policy, seed)).collect();
+    let count = errors.len() as f64;
+    FocalError {
+        mean: errors.iter().sum::<f64>() / count,
+        in_focus: errors.iter().filter(|&&error| error < 0.1).count() as f64 / count,
+    }
+}
+
+#[test]
+fn the_hill_climbers_keep_the_phantom_in_better_focus_than_no_policy() {
+    let policies = ["fixed", "mgm-hill-climber", "mlr-hill-climber"];
+    let [fixed, mgm, mlr] = std::thread::scope(|scope| {
+        policies.map(|policy| scope.spawn(move || focal_error(policy))).map(|thread| thread.join().unwrap())
+    });
+    for (policy, error) in policies.iter().zip([fixed, mgm, mlr]) {
+        println!("{policy:18} mean |f - f*| {:.3}, in focus {:.0} %", error.mean, 100.0 * error.in_focus);
+    }
+    for climber in [mgm, mlr] {
+        assert!(climber.mean < fixed.mean && climber.in_focus > fixed.in_focus, "{climber:?} {fixed:?}");
+    }
+}
