@@ -12,9 +12,8 @@ use crate::http::error::role_name;
 use crate::http::keys::{Keys, ROLES};
 use crate::trial::view::Role;
 
-/// The announcement for people at the terminal.
-pub fn announcement(listening: SocketAddr, keys: &Keys, status: &ControlStatus) -> String {
-    let host = SocketAddr::new(reachable(listening.ip()), listening.port());
+/// The announcement for people at the terminal, of a server that others reach at `host`.
+pub fn announcement(host: SocketAddr, keys: &Keys, status: &ControlStatus) -> String {
     let link = |role| format!("http://{host}/enter?key={}", keys.of(role));
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -30,7 +29,7 @@ pub fn announcement(listening: SocketAddr, keys: &Keys, status: &ControlStatus) 
     if let Ok(code) = QrCode::new(link(Role::Surgeon)) {
         let _ = writeln!(text, "\nThe surgeon's tablet can scan this:\n{}", code.render::<Dense1x2>().build());
     }
-    let advice = if listening.ip().is_loopback() {
+    let advice = if host.ip().is_loopback() {
         "Only this machine can reach it. For a tablet, start with --bind 0.0.0.0:8080 on a network you trust."
     } else {
         "Whoever has a link has its role: give each to its person only. The connection is not encrypted."
@@ -50,8 +49,9 @@ fn simulated(status: &ControlStatus) -> Option<String> {
 }
 
 /// An address that others can open: for "every address", the one that this machine would talk to the world from.
-fn reachable(address: IpAddr) -> IpAddr {
-    if address.is_unspecified() { outward().unwrap_or(address) } else { address }
+pub fn reachable(listening: SocketAddr) -> SocketAddr {
+    let outward = if listening.ip().is_unspecified() { outward() } else { None };
+    SocketAddr::new(outward.unwrap_or(listening.ip()), listening.port())
 }
 
 /// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The address

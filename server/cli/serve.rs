@@ -17,7 +17,7 @@ use tokio::time::timeout;
 use tracing_subscriber::EnvFilter;
 
 use super::Failure;
-use super::announce::announcement;
+use super::announce::{announcement, reachable};
 use super::devices;
 use crate::autofocus::Registry;
 use crate::camera::{self, CameraSettings};
@@ -116,13 +116,15 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         conductor,
         registry,
         keys: keys.clone(),
+        address: reachable(address),
         loopback_only: address.ip().is_loopback(),
         metrics: http::Metrics::default(),
         shutdown,
         control: control.clone(),
     });
+    let host = app.address;
     let server = tokio::spawn(http::run(listener, app));
-    print!("{}", announcement(address, &keys, &control.status.borrow()));
+    print!("{}", announcement(host, &keys, &control.status.borrow()));
     signals.any().await;
     tracing::info!("ending");
     let _ = end.send(true);

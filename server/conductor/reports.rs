@@ -11,7 +11,7 @@ use super::{ConductError, Conductor, ProtocolSummary, operator_only};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
 use crate::store::export::{self, ExportError};
-use crate::store::{Participant, PathPoint, SessionLine};
+use crate::store::{Participant, PathPoint, Reader, SessionLine};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::participant::ParticipantCode;
@@ -145,6 +145,12 @@ pub struct TimelineComment {
 }
 
 impl Conductor {
+    /// For reading what is kept.
+    #[must_use]
+    pub fn reader(&self) -> &Reader {
+        self.shared.store.reader()
+    }
+
     /// The participants, by code.
     ///
     /// # Errors

@@ -3,8 +3,10 @@
 pub mod assets;
 mod connections;
 pub mod error;
+mod export;
 mod health;
 pub mod keys;
+mod links;
 mod live;
 mod live_operator;
 mod live_surgeon;
@@ -52,6 +54,7 @@ pub fn router(app: AppState) -> Router {
         .merge(surgeon::routes())
         .merge(operator::routes())
         .merge(researcher::routes())
+        .merge(export::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())
         .merge(health::routes())

@@ -1,30 +1,213 @@
-//! The operator's page.
+//! The operator's page and what it sends: who focuses, participants, sessions.
+
+use std::sync::Arc;
 
 use askama::Template;
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::Html;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::Error;
-use super::roles::Operator;
+use super::error::{Error, ErrorBody};
+use super::roles::{Operator, Roles};
 use super::security::Nonce;
-use super::{AppState, assets};
+use super::surgeon::Act;
+use super::{App, AppState};
+use crate::autofocus::{PolicyEntry, PolicyError, PolicyName};
+use crate::conductor::ProtocolSummary;
+use crate::control::{Command, Drive};
+use crate::ids::SessionId;
+use crate::lens::FocalPower;
+use crate::trial::view::{OperatorView, Role};
+
+/// What [`ParticipantCode`](crate::trial::participant::ParticipantCode) takes, for browsers to check while typing.
+const CODE_PATTERN: &str = r"[A-Z0-9\-]{2,16}";
+const CODE_HINT: &str = "2 to 16 capital letters, digits and dashes, such as S-01";
 
 #[derive(Template)]
 #[template(path = "operator.html")]
 struct Page {
     nonce: String,
-    stylesheet: String,
-    viewer: String,
+    /// Whether this browser is let in as the researcher too.
+    researcher: bool,
+    surgeon_link: String,
+    /// Whether that link leads here from this machine alone.
+    loopback_only: bool,
+    /// The link as an SVG picture.
+    qr: String,
+    code_pattern: &'static str,
+    code_hint: &'static str,
 }
 
 /// The operator's page.
 #[utoipa::path(get, path = "/operator", tag = "operator", responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn page(_: Operator, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
-    let page = Page { nonce, stylesheet: assets::url("style.css"), viewer: assets::url("viewer.js") };
+async fn page(
+    _: Operator,
+    roles: Roles,
+    State(app): State<AppState>,
+    Nonce(nonce): Nonce,
+    headers: HeaderMap,
+) -> Result<Html<String>, Error> {
+    let surgeon_link = super::links::surgeon_link(&app, &headers);
+    let qr = super::links::qr_svg(&surgeon_link)?;
+    let researcher = roles.choose(Some(Role::Researcher)).is_ok();
+    let page = Page {
+        nonce,
+        researcher,
+        surgeon_link,
+        loopback_only: app.loopback_only,
+        qr,
+        code_pattern: CODE_PATTERN,
+        code_hint: CODE_HINT,
+    };
     page.render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// What the operator can choose from.
+#[derive(Debug, Serialize, ToSchema)]
+struct Choices {
+    /// Codes of the participants.
+    participants: Vec<String>,
+    /// Protocols.
+    protocols: Vec<ProtocolSummary>,
+    /// Policies.
+    #[schema(value_type = Vec<Object>)]
+    policies: Vec<PolicyEntry>,
+}
+
+/// What the operator can choose from.
+#[utoipa::path(get, path = "/api/operator/choices", tag = "operator", responses((status = 200, body = Choices)))]
+async fn choices(_: Operator, State(app): State<AppState>) -> Result<Json<Choices>, Error> {
+    let participants = codes(&app).await?;
+    Ok(Json(Choices { participants, protocols: app.conductor.protocols(), policies: app.registry.entries() }))
+}
+
+async fn codes(app: &App) -> Result<Vec<String>, Error> {
+    let participants = app.conductor.participants().await?;
+    Ok(participants.into_iter().map(|participant| participant.code).collect())
+}
+
+/// Who is to focus outside sessions.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum Focus {
+    /// Nobody: the lens goes to this focal power, 0..=1, and stays.
+    FocalPower(f64),
+    /// A policy.
+    Policy(String),
+}
+
+/// Lets a policy focus, or sets the focal power by hand. Not while a session is under way.
+#[utoipa::path(post, path = "/api/operator/focus", tag = "operator", request_body = Focus, responses(
+    (status = 204, description = "Done"),
+    (status = 409, description = "A session is under way, or the policy cannot run", body = ErrorBody),
+    (status = 422, description = "No such focal power or policy", body = ErrorBody)))]
+async fn focus(_: Operator, State(app): State<AppState>, Json(focus): Json<Focus>) -> Result<StatusCode, Error> {
+    if app.blinded() {
+        return Err(Error::Conflict("A session is under way: it decides who focuses until it is closed.".into()));
+    }
+    let drive = match focus {
+        Focus::FocalPower(value) => {
+            Drive::Manual(FocalPower::new(value).map_err(|error| Error::Invalid(error.to_string()))?)
+        }
+        Focus::Policy(name) => policy(&app, &name)?,
+    };
+    app.control.send(Command::Drive { drive, segment: None });
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Refuses here what the loop could only refuse without an answer.
+fn policy(app: &App, name: &str) -> Result<Drive, Error> {
+    let name = PolicyName::new(name);
+    match app.registry.build(&name) {
+        Ok(_) => Ok(Drive::Policy { name, start: None }),
+        Err(error @ PolicyError::Unknown { .. }) => Err(Error::Invalid(error.to_string())),
+        Err(error) => Err(Error::Conflict(error.to_string())),
+    }
+}
+
+/// A participant to be added.
+#[derive(Debug, Deserialize, ToSchema)]
+struct NewParticipant {
+    /// 2 to 16 capital letters, digits and dashes; never a name.
+    code: String,
+}
+
+/// Adds a participant; one that is there already stays as it is. Answers with all codes.
+#[utoipa::path(post, path = "/api/operator/participants", tag = "operator", request_body = NewParticipant, responses(
+    (status = 200, body = Vec<String>), (status = 422, description = "No such code", body = ErrorBody)))]
+async fn add_participant(
+    _: Operator,
+    State(app): State<AppState>,
+    Json(new): Json<NewParticipant>,
+) -> Result<Json<Vec<String>>, Error> {
+    app.conductor.add_participant(Role::Operator, &new.code).await?;
+    codes(&app).await.map(Json)
+}
+
+/// A session to be prepared.
+#[derive(Debug, Deserialize, ToSchema)]
+struct NewSession {
+    /// Participant's code.
+    participant: String,
+    /// Protocol's name.
+    protocol: String,
+}
+
+type View = Json<Option<Arc<OperatorView>>>;
+
+/// The session under way; null when there is none.
+#[utoipa::path(get, path = "/api/operator/session", tag = "operator", responses((status = 200, body = Option<OperatorView>)))]
+async fn session(_: Operator, State(app): State<AppState>) -> View {
+    Json(app.operator_view.borrow().clone())
+}
+
+/// Prepares a session: draws its order, and waits for its start.
+#[utoipa::path(post, path = "/api/operator/sessions", tag = "operator", request_body = NewSession, responses(
+    (status = 200, body = Option<OperatorView>),
+    (status = 404, description = "No such participant or protocol", body = ErrorBody),
+    (status = 409, description = "A session is under way", body = ErrorBody)))]
+async fn create(_: Operator, State(app): State<AppState>, Json(new): Json<NewSession>) -> Result<View, Error> {
+    app.conductor.create(Role::Operator, &new.participant, &new.protocol).await?;
+    Ok(Json(app.operator_view.borrow().clone()))
+}
+
+/// Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then.
+#[utoipa::path(post, path = "/api/operator/actions", tag = "operator", request_body = Act, responses(
+    (status = 200, body = Option<OperatorView>),
+    (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
+async fn act(_: Operator, State(app): State<AppState>, Json(act): Json<Act>) -> Result<View, Error> {
+    app.conductor.act(Role::Operator, act.session, act.action).await?;
+    Ok(Json(app.operator_view.borrow().clone()))
+}
+
+/// A session to be taken off the screens.
+#[derive(Debug, Deserialize, ToSchema)]
+struct Dismissal {
+    /// The session.
+    session: SessionId,
+}
+
+/// Takes an ended session off the screens, so that the next can be prepared.
+#[utoipa::path(post, path = "/api/operator/dismissals", tag = "operator", request_body = Dismissal, responses(
+    (status = 200, body = Option<OperatorView>), (status = 409, description = "It is under way", body = ErrorBody)))]
+async fn dismiss(_: Operator, State(app): State<AppState>, Json(gone): Json<Dismissal>) -> Result<View, Error> {
+    app.conductor.dismiss(Role::Operator, gone.session).await?;
+    Ok(Json(app.operator_view.borrow().clone()))
 }
 
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(page))
+    OpenApiRouter::new()
+        .routes(routes!(page))
+        .routes(routes!(choices))
+        .routes(routes!(focus))
+        .routes(routes!(add_participant))
+        .routes(routes!(session))
+        .routes(routes!(create))
+        .routes(routes!(act))
+        .routes(routes!(dismiss))
 }

@@ -1,30 +1,192 @@
-//! The researcher's page.
+//! The researcher's pages: the list of sessions, one session with its time line, unblinding.
+
+use std::collections::BTreeMap;
 
 use askama::Template;
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
 use axum::response::Html;
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+use serde::Deserialize;
+use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::error::Error;
+use super::AppState;
+use super::error::{Error, ErrorBody};
 use super::roles::Researcher;
 use super::security::Nonce;
-use super::{AppState, assets};
+use crate::autofocus::PolicyName;
+use crate::conductor::{AnswerLine, SessionDetail, Timeline};
+use crate::ids::SessionId;
+use crate::store::{SessionLine, SessionStatus};
+use crate::trial::view::{Action, AnswerValue, Role};
+
+/// Points of the focal path for each setting: about as many as there are pixels to draw them on.
+const POINTS: u32 = 600;
+
+/// When a session was made, on the clock of the room.
+pub(super) fn made(line: &SessionLine) -> String {
+    local(&line.created, "%Y-%m-%d %H:%M")
+}
+
+/// How far a session came, in words.
+pub(super) fn state(line: &SessionLine) -> String {
+    match line.status {
+        SessionStatus::UnderWay => format!("under way, {} of {} settings", line.finished_settings, line.settings),
+        SessionStatus::Completed => "completed".to_owned(),
+        SessionStatus::Aborted => format!("aborted after {} of {} settings", line.finished_settings, line.settings),
+    }
+}
+
+pub(super) fn local(at: &Timestamp, format: &str) -> String {
+    at.to_zoned(TimeZone::system()).strftime(format).to_string()
+}
 
 #[derive(Template)]
 #[template(path = "researcher.html")]
-struct Page {
-    nonce: String,
-    stylesheet: String,
-    viewer: String,
+struct ListPage {
+    sessions: Vec<SessionLine>,
+    practice: Vec<SessionLine>,
 }
 
-/// The researcher's page.
+/// The list of sessions, practice apart.
 #[utoipa::path(get, path = "/researcher", tag = "researcher", responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn page(_: Researcher, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
-    let page = Page { nonce, stylesheet: assets::url("style.css"), viewer: assets::url("viewer.js") };
-    page.render().map(Html).map_err(|_| Error::Internal)
+async fn list_page(_: Researcher, State(app): State<AppState>) -> Result<Html<String>, Error> {
+    let lines = app.conductor.sessions(true).await?;
+    let (practice, sessions) = lines.into_iter().partition(|line| line.practice);
+    ListPage { sessions, practice }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+#[derive(Template)]
+#[template(path = "session.html")]
+struct SessionPage {
+    nonce: String,
+    detail: SessionDetail,
+    /// Questions after a setting, each with its answer in every setting.
+    questions: Vec<QuestionRow>,
+    closing: Vec<AnswerLine>,
+}
+
+/// A question with its answer in each setting.
+struct QuestionRow {
+    text: String,
+    answers: Vec<String>,
+}
+
+impl SessionPage {
+    fn new(nonce: String, detail: SessionDetail) -> Self {
+        let (asked, closing): (Vec<_>, _) = detail.answers.iter().cloned().partition(|answer| answer.setting.is_some());
+        let questions = questions(&asked, detail.settings_detail.len());
+        Self { nonce, detail, questions, closing }
+    }
+
+    /// The policy of `setting`, once it was told.
+    fn policy(&self, setting: usize) -> Option<&PolicyName> {
+        self.detail.unblinding.as_ref()?.policies.get(setting.wrapping_sub(1))
+    }
+
+    fn ended(&self) -> bool {
+        self.detail.line.status != SessionStatus::UnderWay
+    }
+}
+
+/// One row for each question, in the order of the first answers.
+fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
+    let mut places = BTreeMap::new();
+    let mut rows: Vec<QuestionRow> = Vec::new();
+    for answer in answers {
+        let place = *places.entry(&answer.question).or_insert_with(|| {
+            rows.push(QuestionRow { text: answer.text.clone(), answers: vec!["–".to_owned(); settings] });
+            rows.len() - 1
+        });
+        let cell = answer.setting.and_then(|setting| rows[place].answers.get_mut(setting.wrapping_sub(1)));
+        if let Some(cell) = cell {
+            *cell = in_words(&answer.value);
+        }
+    }
+    rows
+}
+
+pub(super) fn in_words(value: &AnswerValue) -> String {
+    match value {
+        AnswerValue::Point(point) => point.to_string(),
+        AnswerValue::Points(points) => points.iter().map(u8::to_string).collect::<Vec<_>>().join(", "),
+        AnswerValue::Text(text) => text.clone(),
+    }
+}
+
+/// One session.
+#[utoipa::path(get, path = "/researcher/sessions/{session}", tag = "researcher", params(("session" = SessionId, Path)), responses(
+    (status = 200, description = "The page", content_type = "text/html"),
+    (status = 404, description = "No such session", body = ErrorBody)))]
+async fn session_page(
+    _: Researcher,
+    State(app): State<AppState>,
+    Nonce(nonce): Nonce,
+    Path(id): Path<SessionId>,
+) -> Result<Html<String>, Error> {
+    let detail = app.conductor.session_detail(id).await?;
+    SessionPage::new(nonce, detail).render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// The sessions, newest first, practice included and marked.
+#[utoipa::path(get, path = "/api/researcher/sessions", tag = "researcher", responses((status = 200, body = Vec<SessionLine>)))]
+async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<SessionLine>>, Error> {
+    Ok(Json(app.conductor.sessions(true).await?))
+}
+
+/// One session in detail; its policies once it was unblinded.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}", tag = "researcher", params(("session" = SessionId, Path)), responses(
+    (status = 200, body = SessionDetail), (status = 404, description = "No such session", body = ErrorBody)))]
+async fn session(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+) -> Result<Json<SessionDetail>, Error> {
+    Ok(Json(app.conductor.session_detail(id).await?))
+}
+
+/// One session over time. Its focal path may tell policies apart even before unblinding.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher", params(("session" = SessionId, Path)), responses(
+    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
+async fn timeline(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+) -> Result<Json<Timeline>, Error> {
+    Ok(Json(app.conductor.timeline(id, POINTS).await?))
+}
+
+/// Why policies are to be told.
+#[derive(Debug, Deserialize, ToSchema)]
+struct Reason {
+    /// Kept in the audit trail.
+    reason: String,
+}
+
+/// Tells which policies ran; on a session still under way this is emergency unblinding and marked so for good.
+#[utoipa::path(post, path = "/api/researcher/sessions/{session}/unblind", tag = "researcher", params(("session" = SessionId, Path)),
+    request_body = Reason, responses(
+    (status = 204, description = "Unblinded"), (status = 422, description = "No reason was given", body = ErrorBody)))]
+async fn unblind(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+    Json(why): Json<Reason>,
+) -> Result<StatusCode, Error> {
+    app.conductor.act(Role::Researcher, id, Action::Unblind { reason: why.reason }).await?;
+    Ok(StatusCode::NO_CONTENT)
 }
 
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(page))
+    OpenApiRouter::new()
+        .routes(routes!(list_page))
+        .routes(routes!(session_page))
+        .routes(routes!(list))
+        .routes(routes!(session))
+        .routes(routes!(timeline))
+        .routes(routes!(unblind))
 }

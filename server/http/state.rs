@@ -1,5 +1,6 @@
 //! What every handler holds of the rest of the server.
 
+use std::net::SocketAddr;
 use std::sync::Arc;
 
 use tokio::sync::watch;
@@ -31,6 +32,8 @@ pub struct App {
     pub registry: Registry,
     /// Keys of the three roles.
     pub keys: Keys,
+    /// Where other machines reach the server.
+    pub address: SocketAddr,
     /// Whether the server listens on the machine itself alone: then its operator needs no key.
     pub loopback_only: bool,
     /// Counters for Prometheus.

@@ -14,6 +14,8 @@ export function changeNotice(accept) {
   let focusBefore = null;
 
   dialog.addEventListener("cancel", (event) => event.preventDefault());
+  // A browser may close a dialog against that (Escape, a tablet's back gesture): then it comes back.
+  dialog.addEventListener("close", () => segment !== null && dialog.showModal());
   button.onclick = () => {
     if (performance.now() - shownAt < NOT_MEANT_MS) return;
     setText(byId("change-go"), "One moment…");
@@ -25,7 +27,7 @@ export function changeNotice(accept) {
     segment = state.segment;
     shownAt = performance.now();
     setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
-    ask();
+    ask("Tap to continue");
     byId("change-practice").hidden = !state.practice;
     if (dialog.open) return;
     focusBefore = document.activeElement;
@@ -35,12 +37,12 @@ export function changeNotice(accept) {
 
   function hide() {
     if (!dialog.open) return;
-    dialog.close();
     segment = null;
+    dialog.close();
     if (focusBefore?.isConnected) focusBefore.focus();
   }
 
   /** Asks (again) for the tap. */
-  const ask = () => setText(byId("change-go"), "Tap to continue");
+  const ask = (text) => setText(byId("change-go"), text);
   return { show, hide, ask };
 }

@@ -1,6 +1,6 @@
 // The devices' health as the operator sees it: a lamp each, and every warning as a sentence that says what to do.
 
-import { make } from "./dom.js";
+import { make, redraw } from "./dom.js";
 
 /** Draws a lamp for camera, lens and loop into `list`. */
 export function drawDevices(list, status) {
@@ -29,12 +29,4 @@ export function drawWarnings(box, status) {
   if (simulated.length > 0) warn(`Simulated ${simulated.join(" and ")}: this is not a real instrument.`);
   if (status.telemetry_dropped > 0) warn(`${status.telemetry_dropped} telemetry records were dropped: the disk cannot keep up. Comments and answers are not affected.`);
   redraw(box, lines);
-}
-
-/** Replaces the children only where they differ: a screen reader should not hear the same warning every second. */
-function redraw(parent, nodes) {
-  const markup = nodes.map((node) => node.outerHTML).join("");
-  if (parent.dataset.markup === markup) return;
-  parent.dataset.markup = markup;
-  parent.replaceChildren(...nodes);
 }

@@ -23,6 +23,14 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Replaces the children of `parent` only where they differ: nothing is heard twice, and focus and selection stay. */
+export function redraw(parent, nodes) {
+  const markup = nodes.map((node) => node.outerHTML).join("");
+  if (parent.dataset.markup === markup) return;
+  parent.dataset.markup = markup;
+  parent.replaceChildren(...nodes);
+}
+
 /** A random UUID, version 4. `crypto.randomUUID` is missing on plain http, which is what a tablet in theatre uses. */
 export function uuid() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -36,10 +44,4 @@ export function uuid() {
 export function clockText(seconds) {
   const whole = Math.max(0, Math.ceil(seconds));
   return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
-}
-
-/** What the server rendered into the page as data. */
-export function pageData(id = "page-data") {
-  const element = byId(id);
-  return element ? JSON.parse(element.textContent) : null;
 }

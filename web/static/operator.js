@@ -2,14 +2,14 @@
 
 import { get, inWords, post } from "./api.js";
 import { askIn, askReason } from "./dialogs.js";
-import { byId, clockText, make, setText } from "./dom.js";
+import { byId, clockText, make, redraw, setText } from "./dom.js";
 import { drawDevices, drawWarnings } from "./devices.js";
 import { mountViewer } from "./viewer.js";
 
 const BY_HAND = "by-hand";
 const viewer = mountViewer(byId("view"), { role: "operator", traces: byId("traces") });
 let session = null;
-let setup = null;
+let choices = null;
 let endsAt = null;
 
 /* Devices and focus */
@@ -25,10 +25,10 @@ function followStatus(next) {
 }
 
 function drawFocus() {
-  const busy = session !== null && !over(session);
+  const busy = session !== null;
   byId("focus-controls").disabled = busy;
   const power = status.focal_power.toFixed(3);
-  setText(byId("focus-now"), busy ? "The session decides until it ends." : `focal power ${power}`);
+  setText(byId("focus-now"), busy ? "The session decides until it is closed." : `focal power ${power}`);
   if (dragging || busy) return;
   byId("policy").value = status.policy ?? BY_HAND;
   if (status.policy === null) return;
@@ -36,9 +36,9 @@ function drawFocus() {
   setText(byId("focal-power-value"), power);
 }
 
-async function drive(order) {
+async function focus(order) {
   try {
-    await post("/api/operator/drive", order);
+    await post("/api/operator/focus", order);
     setText(byId("focus-trouble"), "");
   } catch (error) {
     setText(byId("focus-trouble"), inWords(error));
@@ -50,12 +50,12 @@ slider.addEventListener("input", () => {
   dragging = true;
   setText(byId("focal-power-value"), Number(slider.value).toFixed(3));
   byId("policy").value = BY_HAND;
-  drive({ focal_power: Number(slider.value) });
+  focus({ focal_power: Number(slider.value) });
 });
 slider.addEventListener("change", () => (dragging = false));
 byId("policy").addEventListener("change", () => {
   const policy = byId("policy").value;
-  drive(policy === BY_HAND ? { focal_power: status?.focal_power ?? 0.5 } : { policy });
+  focus(policy === BY_HAND ? { focal_power: status?.focal_power ?? 0.5 } : { policy });
 });
 
 /* The session */
@@ -75,7 +75,7 @@ const PHASES = {
 function followSession(next) {
   session = next;
   endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
-  byId("new-session").hidden = session !== null && !over(session);
+  byId("new-session").hidden = session !== null;
   byId("running").hidden = session === null;
   byId("follow").hidden = session === null;
   if (status) drawFocus();
@@ -97,7 +97,7 @@ function drawBadges() {
   const badges = session
     ? [make("span", { className: "badge" }, session.participant), session.practice && make("span", { className: "badge warn" }, "Practice"), session.paused && make("span", { className: "badge warn" }, "Paused")]
     : [];
-  byId("session-badges").replaceChildren(...badges.filter(Boolean));
+  redraw(byId("session-badges"), badges.filter(Boolean));
 }
 
 function drawTime() {
@@ -106,18 +106,16 @@ function drawTime() {
 }
 
 function drawActions() {
-  const { phase, paused, segment, setting } = session;
+  const { phase, paused, setting } = session;
   const buttons = [];
   const add = (label, onclick, className = "") => buttons.push(make("button", { type: "button", className, onclick }, label));
   if (phase === "ready") add("Start", () => act({ action: "start" }), "primary");
   if (paused) add("Resume", () => act({ action: "resume" }), "primary");
-  else if (phase === "inspecting") add(`End setting ${setting} now`, () => act({ action: "finish-segment", segment }));
+  else if (phase === "inspecting") add(`End setting ${setting} now`, () => act({ action: "finish-segment", segment: session.segment }));
   if (!paused && phase !== "ready" && !over(session)) add("Pause…", pause);
-  if (!over(session)) add("Abort…", abort, "danger");
-  const labels = JSON.stringify(buttons.map((button) => button.textContent));
-  if (byId("session-actions").dataset.labels === labels && segment === byId("session-actions").dataset.segment) return;
-  Object.assign(byId("session-actions").dataset, { labels, segment });
-  byId("session-actions").replaceChildren(...buttons);
+  if (over(session)) add("Close and prepare the next", dismiss, "primary");
+  else add("Abort…", abort, "danger");
+  redraw(byId("session-actions"), buttons);
 }
 
 function pause() {
@@ -137,6 +135,14 @@ function abort() {
     danger: true,
     done: (reason) => send({ action: "abort", reason }),
   });
+}
+
+async function dismiss() {
+  try {
+    followSession(await post("/api/operator/dismissals", { session: session.session }));
+  } catch (error) {
+    setText(byId("session-trouble"), inWords(error));
+  }
 }
 
 const send = async (action) => followSession(await post("/api/operator/actions", { session: session.session, ...action }));
@@ -160,8 +166,8 @@ function drawFeed() {
   setText(byId("comment-count"), String(session.comments));
   const comments = session.latest_comments.map((comment) => make("li", {}, time(comment.at), make("span", {}, comment.setting ? make("span", { className: "who" }, `setting ${comment.setting} · `) : null, SAID[comment.kind](comment))));
   const events = session.log.map((line) => make("li", {}, time(line.at), make("span", {}, line.text, make("span", { className: "who" }, ` · ${line.by}`))));
-  byId("comments").replaceChildren(...(comments.length ? comments : [make("li", { className: "empty" }, "None yet.")]));
-  byId("log").replaceChildren(...events);
+  redraw(byId("comments"), comments.length ? comments : [make("li", { className: "empty" }, "None yet.")]);
+  redraw(byId("log"), events);
 }
 
 /* Preparing a session */
@@ -170,17 +176,18 @@ function fill(select, options, chosen) {
   select.replaceChildren(...options.map(({ value, label, disabled }) => make("option", { value, disabled: disabled ?? false, selected: value === chosen }, label)));
 }
 
-function drawSetup(participant = byId("participant").value) {
-  fill(byId("participant"), setup.participants.map((code) => ({ value: code, label: code })), participant);
-  fill(byId("protocol"), setup.protocols.map(({ name, title, practice }) => ({ value: name, label: practice ? `${title} (practice)` : title })), byId("protocol").value);
-  const policies = setup.policies.map(({ name, available }) => ({ value: name, label: available ? name : `${name} (no weights)`, disabled: !available }));
+function drawChoices(participant = byId("participant").value) {
+  fill(byId("participant"), choices.participants.map((code) => ({ value: code, label: code })), participant);
+  fill(byId("protocol"), choices.protocols.map(({ name, researcher_title: label }) => ({ value: name, label })), byId("protocol").value);
+  const policies = choices.policies.map(({ name, available }) => ({ value: name, label: available ? name : `${name} (no weights)`, disabled: !available }));
   fill(byId("policy"), [{ value: BY_HAND, label: "By hand" }, ...policies], status?.policy ?? BY_HAND);
   drawSummary();
 }
 
 function drawSummary() {
-  const protocol = setup.protocols.find(({ name }) => name === byId("protocol").value);
-  setText(byId("protocol-summary"), protocol?.summary ?? "");
+  const protocol = choices.protocols.find(({ name }) => name === byId("protocol").value);
+  const length = protocol && `${protocol.settings} settings of at most ${clockText(protocol.segment_seconds)}`;
+  setText(byId("protocol-summary"), protocol ? `${length}${protocol.practice ? "; practice, kept apart from real data" : ""}.` : "");
 }
 
 byId("protocol").addEventListener("change", drawSummary);
@@ -196,8 +203,8 @@ byId("new-session").addEventListener("submit", async (event) => {
 byId("add-participant").onclick = () =>
   askIn(byId("participant-dialog"), byId("participant-trouble"), async () => {
     const code = byId("code").value.trim();
-    setup.participants = await post("/api/operator/participants", { code });
-    drawSetup(code);
+    choices.participants = await post("/api/operator/participants", { code });
+    drawChoices(code);
   });
 
 /* Wiring */
@@ -221,8 +228,8 @@ for (const box of document.querySelectorAll("[data-overlay]")) {
 
 async function refresh() {
   try {
-    setup = await get("/api/operator/setup");
-    drawSetup();
+    choices = await get("/api/operator/choices");
+    drawChoices();
   } catch (error) {
     setText(byId("session-trouble"), inWords(error));
   }

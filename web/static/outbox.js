@@ -66,12 +66,12 @@ export class Outbox extends EventTarget {
     this.#flush();
   }
 
-  /** Resolves once nothing waits, or false as soon as an attempt failed. */
-  async settled() {
+  /** Waits until nothing for `path` waits: true; or until an attempt at such an entry failed: false. */
+  async settled(path) {
     this.nudge();
-    while (this.#entries.size > 0) {
-      const state = await new Promise((resolve) => this.addEventListener("change", (e) => resolve(e.detail.state), { once: true }));
-      if (state === "waiting") return false;
+    while (this.waiting.some((entry) => entry.path === path)) {
+      const { entry, state } = await new Promise((resolve) => this.addEventListener("change", (event) => resolve(event.detail), { once: true }));
+      if (state === "waiting" && entry.path === path) return false;
     }
     return true;
   }

@@ -2,20 +2,37 @@
 
 import { get, inWords, post } from "./api.js";
 import { askReason } from "./dialogs.js";
-import { byId, clockText, make, pageData, setText } from "./dom.js";
+import { byId, clockText, make, setText } from "./dom.js";
 import { drawTimeline } from "./timeline.js";
 
-const data = pageData();
-let path = null;
+const { session, ended, unblinded } = byId("session").dataset;
+const API = `/api/researcher/sessions/${session}`;
+let timeline = null;
+let policies = [];
+let withPath = unblinded === "true";
 let point = () => {};
+let lines = [];
 
-const lines = data.comments.map((comment, index) => {
-  const said = comment.kind === "mark" ? make("em", {}, "Marked this moment") : comment.text;
-  const where = comment.setting ? `Setting ${comment.setting}` : "";
-  return make("button", { type: "button", onclick: () => choose(index), onfocus: () => choose(index) },
-    make("span", { className: "when" }, clockText(comment.at)), make("span", { className: "muted" }, where), make("span", { className: "said" }, said));
-});
-byId("comment-list").append(...lines.map((line) => make("li", {}, line)));
+async function load() {
+  try {
+    timeline = await get(`${API}/timeline`);
+    if (withPath) policies = (await get(API)).unblinding.policies;
+    listComments();
+    new ResizeObserver(draw).observe(byId("timeline"));
+  } catch (error) {
+    setText(byId("timeline-trouble"), inWords(error));
+  }
+}
+
+function listComments() {
+  lines = timeline.comments.map((comment, index) => {
+    const said = comment.kind === "mark" ? make("em", {}, "Marked this moment") : comment.text;
+    const where = comment.setting ? `Setting ${comment.setting}` : "";
+    return make("button", { type: "button", onclick: () => choose(index), onfocus: () => choose(index) },
+      make("span", { className: "when" }, clockText(comment.seconds)), make("span", { className: "muted" }, where), make("span", { className: "said" }, said));
+  });
+  byId("comment-list").replaceChildren(...lines.map((line) => make("li", {}, line)));
+}
 
 function choose(index) {
   point(index);
@@ -24,36 +41,28 @@ function choose(index) {
 }
 
 function draw() {
-  point = drawTimeline(byId("timeline"), data, path, choose);
-}
-
-async function showPath() {
-  try {
-    path = (await get(`/api/researcher/sessions/${data.session}/path`)).path;
-    byId("show-path").hidden = true;
-    draw();
-  } catch (error) {
-    setText(byId("timeline-trouble"), inWords(error));
-  }
+  point = drawTimeline(byId("timeline"), timeline, { withPath, policies, choose });
 }
 
 function unblind() {
   askReason({
-    heading: data.ended ? "Unblind this session" : "Emergency unblinding",
+    heading: ended === "true" ? "Unblind this session" : "Emergency unblinding",
     consequence: data.ended
       ? "You and everyone with this page will see which policy ran in which setting. This cannot be undone, and stands in the audit trail and in every export."
       : "The session is still under way. Unblinding now is an emergency measure: it is marked as such for good, in the audit trail and in every export. The surgeon’s and operator’s pages still do not show the policies.",
-    go: data.ended ? "Unblind" : "Unblind now",
+    go: ended === "true" ? "Unblind" : "Unblind now",
     danger: true,
     done: async (reason) => {
-      await post(`/api/researcher/sessions/${data.session}/unblind`, { reason });
+      await post(`${API}/unblind`, { reason });
       location.reload();
     },
   });
 }
 
-byId("show-path").onclick = showPath;
+byId("show-path").onclick = () => {
+  withPath = true;
+  byId("show-path").hidden = true;
+  draw();
+};
 if (byId("unblind")) byId("unblind").onclick = unblind;
-new ResizeObserver(draw).observe(byId("timeline"));
-draw();
-if (data.unblinded) showPath();
+load();

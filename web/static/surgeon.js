@@ -46,10 +46,10 @@ async function act(action) {
     follow(await post("/api/surgeon/actions", { session: state.session, ...action }));
     setText(byId("trouble"), "");
   } catch (error) {
-    change.ask();
-    const stale = error instanceof Refused && (error.status === 409 || error.status === 404);
-    if (stale) await refresh();
-    if (!stale || stands(action)) setText(byId("trouble"), inWords(error));
+    const refused = error instanceof Refused;
+    change.ask(refused ? "Tap to continue" : "No answer yet: tap again");
+    if (refused && !error.passing) await refresh();
+    if (stands(action)) setText(byId("trouble"), refused ? error.message : "The server does not answer. Try again in a moment.");
   }
 }
 
@@ -175,7 +175,7 @@ async function finishQuestions(segment) {
     return wanting[0].querySelector("input, textarea, button.confirm, button")?.focus();
   }
   setText(byId("missing"), "Saving…");
-  if (!(await outbox.settled())) return setText(byId("missing"), `${outbox.trouble} Your answers are kept on this device.`);
+  if (!(await outbox.settled(ANSWERS))) return setText(byId("missing"), `${outbox.trouble} Your answers are kept on this device.`);
   if (byId("panel").querySelector(".state.refused")) return setText(byId("missing"), "An answer was not taken: see above.");
   await act({ action: "finish-questions", segment });
   if (byId("missing")) setText(byId("missing"), byId("trouble").textContent);

@@ -5,25 +5,34 @@ const HEIGHT = 260;
 const EDGE = { left: 44, right: 12, top: 42, bottom: 26 };
 
 /**
- * Draws into `figure`. `data` is `{ seconds, segments: [{ setting, from, to, policy }], comments: [{ at, kind, text, setting }] }`,
- * times in seconds from the start of the session; `path` is `[[seconds, focalPower], ...]` with `null` where the path
- * breaks, or null. `choose(index)` is called when a marker is pointed at or tapped.
+ * Draws the server's `timeline` into `figure`; the focal path only `withPath`, since it may tell policies apart.
+ * `choose(index)` is called when a comment's marker is pointed at or tapped. Returns a function that points out a comment.
  */
-export function drawTimeline(figure, data, path, choose) {
+export function drawTimeline(figure, timeline, { withPath, policies, choose }) {
   const width = Math.max(figure.clientWidth, 320);
-  const total = Math.max(data.seconds, 1);
+  const total = length(timeline);
   const x = (seconds) => EDGE.left + (seconds / total) * (width - EDGE.left - EDGE.right);
   const y = (power) => HEIGHT - EDGE.bottom - power * (HEIGHT - EDGE.top - EDGE.bottom);
-  const svg = shape("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, role: "img", "aria-label": description(data, path) });
-  svg.append(...segments(data.segments, x, y), ...axes(total, width, x, y, path !== null));
-  if (path) svg.append(shape("path", { class: "path", d: trace(path, x, y) }));
-  const heights = data.comments.map((comment) => y(path ? valueAt(path, comment.at) : 0.5));
-  const markers = data.comments.map((comment, index) => marker(comment, x(comment.at), heights[index], y(0), () => choose(index)));
+  const points = withPath ? timeline.points : [];
+  const svg = shape("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, role: "img", "aria-label": description(timeline, withPath) });
+  svg.append(...settings(timeline.settings, policies, total, x, y), ...axes(total, width, x, y, withPath));
+  svg.append(shape("path", { class: "optimum", d: trace(points, (point) => point.optimal, x, y) }));
+  svg.append(shape("path", { class: "path", d: trace(points, powerOf, x, y) }));
+  const heights = timeline.comments.map((comment) => y(powerAt(points, comment.seconds)));
+  const markers = timeline.comments.map((comment, index) => marker(comment, x(comment.seconds), heights[index], y(0), () => choose(index)));
   svg.append(...markers);
   const caption = document.createElement("figcaption");
   figure.replaceChildren(svg, caption);
-  return (index) => point(figure, caption, markers, data.comments[index], index, x(data.comments[index].at), heights[index]);
+  return (index) => point(figure, caption, markers, timeline.comments[index], index, x(timeline.comments[index].seconds), heights[index]);
 }
+
+/** Seconds from the start to the last thing that happened. */
+function length({ settings, points, comments }) {
+  const ends = [...settings.map(({ from, to }) => to ?? from), ...comments.map(({ seconds }) => seconds)];
+  return Math.max(1, points.at(-1)?.seconds ?? 0, ...ends);
+}
+
+const powerOf = (point) => point.measured ?? point.asked;
 
 function shape(tag, attributes, text) {
   const element = document.createElementNS(SVG, tag);
@@ -32,12 +41,13 @@ function shape(tag, attributes, text) {
   return element;
 }
 
-function segments(list, x, y) {
-  return list.flatMap(({ setting, from, to, policy }) => {
-    const wide = x(to) - x(from);
-    const box = { x: x(from), y: y(1), width: Math.max(wide, 1), height: y(0) - y(1) };
-    const name = shape("text", { class: "segment-name", x: box.x + 6, y: y(1) - 22 }, wide > 70 ? `Setting ${setting}` : `${setting}`);
-    const ran = policy && wide > 70 ? [shape("text", { class: "policy", x: box.x + 6, y: y(1) - 6 }, policy)] : [];
+function settings(list, policies, total, x, y) {
+  return list.flatMap(({ setting, from, to }) => {
+    const box = { x: x(from), y: y(1), width: Math.max(x(to ?? total) - x(from), 1), height: y(0) - y(1) };
+    const roomy = box.width > 70;
+    const name = shape("text", { class: "segment-name", x: box.x + 6, y: y(1) - 22 }, roomy ? `Setting ${setting}` : setting);
+    const policy = policies[setting - 1];
+    const ran = policy && roomy ? [shape("text", { class: "policy", x: box.x + 6, y: y(1) - 6 }, policy)] : [];
     return [shape("rect", { class: `segment ${setting % 2 ? "odd" : ""}`, ...box }), name, ...ran];
   });
 }
@@ -56,27 +66,26 @@ function axes(total, width, x, y, withPower) {
   return parts;
 }
 
-function trace(path, x, y) {
-  let pen = "M";
-  return path
-    .map((sample) => {
-      if (sample === null) {
-        pen = "M";
-        return "";
-      }
-      const command = `${pen}${x(sample[0]).toFixed(1)} ${y(sample[1]).toFixed(1)}`;
-      pen = "L";
+/** A line through `value` of each point, broken between settings and where there is none. */
+function trace(points, value, x, y) {
+  let before = null;
+  return points
+    .map((point) => {
+      if (value(point) === null) return (before = null), "";
+      const command = `${point.setting === before ? "L" : "M"}${x(point.seconds).toFixed(1)} ${y(value(point)).toFixed(1)}`;
+      before = point.setting;
       return command;
     })
     .join("");
 }
 
-function valueAt(path, seconds) {
-  let nearest = [0, 0.5];
-  for (const sample of path) {
-    if (sample !== null && Math.abs(sample[0] - seconds) < Math.abs(nearest[0] - seconds)) nearest = sample;
+/** Focal power at about `seconds`; the middle where the path is not drawn. */
+function powerAt(points, seconds) {
+  let nearest = null;
+  for (const point of points) {
+    if (nearest === null || Math.abs(point.seconds - seconds) < Math.abs(nearest.seconds - seconds)) nearest = point;
   }
-  return nearest[1];
+  return nearest ? powerOf(nearest) : 0.5;
 }
 
 function marker(comment, cx, cy, foot, choose) {
@@ -95,7 +104,6 @@ function point(figure, caption, markers, comment, index, cx, cy) {
   caption.style.top = `${cy > HEIGHT / 2 ? cy - caption.offsetHeight - 14 : cy + 14}px`;
 }
 
-function description(data, path) {
-  const what = path ? "Focal power over time" : "Timeline";
-  return `${what}: ${data.segments.length} settings, ${data.comments.length} comments. The comments follow as a list.`;
+function description({ settings, comments }, withPath) {
+  return `${withPath ? "Focal power over time" : "Time line"}: ${settings.length} settings, ${comments.length} comments, which follow as a list.`;
 }

@@ -13,6 +13,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+pub use self::description::ALL as TABLES;
+pub use self::table::{Column, Table, Type};
+
 use self::blinded::Blinded;
 use self::folder::Folder;
 use self::unblinded::Unblinded;

@@ -20,10 +20,13 @@ pub enum Type {
 /// A column.
 #[derive(Debug, Clone, Copy)]
 pub struct Column {
+    /// Name.
     pub name: &'static str,
+    /// Type.
     pub kind: Type,
     /// Unit; empty where there is none.
     pub unit: &'static str,
+    /// What it means.
     pub description: &'static str,
 }
 
@@ -32,7 +35,9 @@ pub struct Column {
 pub struct Table {
     /// Name; its file is `NAME.csv`.
     pub name: &'static str,
+    /// What a row is.
     pub description: &'static str,
+    /// Its columns, in order.
     pub columns: &'static [Column],
     /// Columns that together name a row.
     pub key: &'static [&'static str],
@@ -42,7 +47,9 @@ pub struct Table {
 pub type Row = Vec<Value>;
 
 impl Type {
-    const fn name(self) -> &'static str {
+    /// Its Frictionless name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
         match self {
             Self::String => "string",
             Self::Integer => "integer",
@@ -67,6 +74,7 @@ impl Type {
 
 impl Table {
     /// The table's file.
+    #[must_use]
     pub fn file(&self) -> String {
         format!("{}.csv", self.name)
     }
@@ -77,6 +85,7 @@ impl Table {
     }
 
     /// Its rows as JSON objects.
+    #[must_use]
     pub fn objects(&self, rows: &[Row]) -> Value {
         let object = |row: &Row| {
             let cells = self.header().map(str::to_owned).zip(row.iter().cloned());

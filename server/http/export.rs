@@ -1,0 +1,72 @@
+//! Exports for the researcher's browser, and the dictionary of what is in them.
+
+use askama::Template;
+use axum::extract::{Path, Query, State};
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::{Html, IntoResponse};
+use serde::Deserialize;
+use tokio::runtime::Handle;
+use utoipa::IntoParams;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::roles::Researcher;
+use crate::ids::SessionId;
+use crate::store::export::{ExportError, TABLES, Table, export_zip, folder_name};
+
+impl From<ExportError> for Error {
+    fn from(error: ExportError) -> Self {
+        let text = error.to_string();
+        match error {
+            ExportError::NoSession { .. } => Self::NotFound(text),
+            ExportError::StillBlinded(_) => Self::Conflict(text),
+            ExportError::Exists(_) | ExportError::Unwritable { .. } | ExportError::Store(_) => Self::Storage(text),
+        }
+    }
+}
+
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct ExportQuery {
+    /// Whether to tell which policy ran in which setting; only after unblinding.
+    #[serde(default)]
+    unblinded: bool,
+}
+
+/// A session's export as one ZIP file: CSV, JSON, a data dictionary, checksums. The same as `parfocal export` writes.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/export.zip", tag = "researcher",
+    params(("session" = SessionId, Path), ExportQuery), responses(
+    (status = 200, description = "The file", content_type = "application/zip"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "It has not been unblinded", body = ErrorBody)))]
+async fn zip(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(session): Path<SessionId>,
+    Query(query): Query<ExportQuery>,
+) -> Result<impl IntoResponse, Error> {
+    let reader = app.conductor.reader().clone();
+    // It writes files, and would hold up the streams.
+    let work = move || Handle::current().block_on(export_zip(&reader, session, query.unblinded));
+    let zip = tokio::task::spawn_blocking(work).await.map_err(|_| Error::Internal)??;
+    let name = format!("attachment; filename=\"{}.zip\"", folder_name(session, query.unblinded));
+    Ok(([(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, name)], zip))
+}
+
+#[derive(Template)]
+#[template(path = "dictionary.html")]
+struct Dictionary {
+    tables: &'static [Table],
+}
+
+/// The data dictionary: every table and column of an export, with its unit.
+#[utoipa::path(get, path = "/researcher/dictionary", tag = "researcher", responses((status = 200, description = "The page", content_type = "text/html")))]
+async fn dictionary(_: Researcher) -> Result<Html<String>, Error> {
+    Dictionary { tables: &TABLES }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(zip)).routes(routes!(dictionary))
+}

@@ -1,0 +1,30 @@
+//! The surgeon's link, as text and as a code for a tablet's camera.
+
+use axum::http::HeaderMap;
+use axum::http::header::HOST;
+use qrcode::QrCode;
+use qrcode::render::svg;
+
+use super::App;
+use super::error::Error;
+use super::security::is_loopback_name;
+use crate::trial::view::Role;
+
+/// The link that lets a browser in as the surgeon: by the name that the operator's browser came by, unless that leads
+/// nowhere from a tablet.
+pub fn surgeon_link(app: &App, headers: &HeaderMap) -> String {
+    let asked = headers.get(HOST).and_then(|host| host.to_str().ok()).filter(|host| !is_loopback_name(host));
+    let host = asked.map_or_else(|| app.address.to_string(), str::to_owned);
+    format!("http://{host}/enter?key={}", app.keys.of(Role::Surgeon))
+}
+
+/// `link` as the inside of a page: an `<svg>` element.
+///
+/// # Errors
+/// When the link is too long for a code.
+pub fn qr_svg(link: &str) -> Result<String, Error> {
+    let code = QrCode::new(link).map_err(|_| Error::Internal)?;
+    let picture = code.render::<svg::Color<'_>>().quiet_zone(false).min_dimensions(132, 132).build();
+    // What comes before the element is for files.
+    Ok(picture.find("<svg").map_or_else(String::new, |start| picture[start..].to_owned()))
+}
