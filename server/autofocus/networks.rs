@@ -62,12 +62,14 @@ impl Encoder {
         Self { convolutions: [layer("0", 1), layer("2", 8), layer("4", 8), layer("6", 8)] }
     }
 
-    /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale. Each patch's mean is taken off first: brightness
-    /// tells nothing of focus.
+    /// Encodings `[N, 8]` of patches `[N, 1024]` on the 0..=255 scale. Each patch is brought to mean 0 and deviation 1
+    /// first: brightness and contrast tell nothing of focus.
     pub fn forward(&self, patches: &Tensor) -> Tensor {
         let patches = patches.view([-1, SIDE * SIDE]);
-        let contrast = (&patches - patches.mean_dim(1, true, Kind::Float)) / 64.0;
-        let mut x = contrast.view([-1, 1, SIDE, SIDE]);
+        let centred = &patches - patches.mean_dim(1, true, Kind::Float);
+        // 2 gray levels: what noise alone would give counts as flat.
+        let spread = centred.square().mean_dim(1, true, Kind::Float).sqrt() + 2.0;
+        let mut x = (centred / spread).view([-1, 1, SIDE, SIDE]);
         for (index, convolution) in self.convolutions.iter().enumerate() {
             x = convolution.forward_t(&x, false);
             if index < 3 {

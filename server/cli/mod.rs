@@ -8,6 +8,7 @@ mod inspect;
 mod lens;
 mod policies;
 mod serve;
+mod train;
 mod verify;
 
 use std::process::ExitCode;
@@ -36,6 +37,8 @@ enum Command {
     Policies(policies::Arguments),
     /// Start the server: the live view, the control loop and the trial.
     Serve(serve::Arguments),
+    /// Make a learned policy from nothing.
+    Train(train::Arguments),
     /// Check that an export is whole, unchanged and true to its commitment.
     Verify(verify::Arguments),
 }
@@ -64,6 +67,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
     }
 }

@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor, nn};
 
+use super::checkpoint::{Checkpoint, CheckpointError};
 use super::optimiser::{Optimiser, Rule};
 use super::scan::{Clip, Variety};
 use super::session::{Session, lead_astray};
@@ -75,13 +76,7 @@ impl BeliefTrainer {
         let store = nn::VarStore::new(Device::Cpu);
         let network = BeliefNetwork::new(&store.root());
         let optimiser = Optimiser::new(recipe.optimiser, &store);
-        let seats = (0..recipe.scans)
-            .map(|index| Seat {
-                session: Session::draw(&clips, Variety { share: recipe.variety }, recipe.wandering, &mut rng),
-                trace: Trace::default(),
-                windows_left: 1 + index % recipe.windows_a_scan,
-            })
-            .collect();
+        let seats = (0..recipe.scans).map(|_| Seat::draw(&recipe, &clips, &mut rng)).collect();
         let memory = network.blank(recipe.scans, Device::Cpu);
         Self { recipe, clips, store, network, optimiser, seats, memory, rng, updates: 0 }
     }
@@ -90,6 +85,35 @@ impl BeliefTrainer {
     #[must_use]
     pub const fn updates(&self) -> u64 {
         self.updates
+    }
+
+    /// Begins all scans anew, drawn from `seed`.
+    pub fn begin_leg(&mut self, seed: u64) {
+        self.rng = ChaCha8Rng::seed_from_u64(seed);
+        for (index, seat) in self.seats.iter_mut().enumerate() {
+            *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+            // Scans end one after another, not all at once.
+            seat.windows_left = 1 + index % self.recipe.windows_a_scan;
+        }
+        self.memory = self.network.blank(self.recipe.scans, Device::Cpu);
+    }
+
+    /// Adds all that [`BeliefTrainer::restore`] needs, between two legs.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.put_store("network", &self.store);
+        self.optimiser.save(checkpoint);
+        checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
+    }
+
+    /// Takes back what [`BeliefTrainer::save`] added.
+    ///
+    /// # Errors
+    /// When the checkpoint is of another training.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        checkpoint.fill_store("network", &self.store)?;
+        self.optimiser.restore(checkpoint)?;
+        self.updates = checkpoint.number("updates")?;
+        Ok(())
     }
 
     /// Steers all scans through one window, learns from it, and returns the mean cross-entropy.
@@ -149,12 +173,16 @@ impl BeliefTrainer {
         for (index, seat) in self.seats.iter_mut().enumerate() {
             seat.windows_left -= 1;
             if seat.windows_left == 0 {
-                let variety = Variety { share: self.recipe.variety };
-                seat.session = Session::draw(&self.clips, variety, self.recipe.wandering, &mut self.rng);
-                seat.trace = Trace::default();
-                seat.windows_left = self.recipe.windows_a_scan;
+                *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
                 let _ = self.memory.select(1, index as i64).fill_(0.0);
             }
         }
+    }
+}
+
+impl Seat {
+    fn draw(recipe: &BeliefRecipe, clips: &[Arc<Clip>], rng: &mut ChaCha8Rng) -> Self {
+        let session = Session::draw(clips, Variety { share: recipe.variety }, recipe.wandering, rng);
+        Self { session, trace: Trace::default(), windows_left: recipe.windows_a_scan }
     }
 }

@@ -14,6 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Reduction, Tensor, nn};
 
+use super::checkpoint::{Checkpoint, CheckpointError};
 use super::optimiser::{Optimiser, Rule};
 use super::replay::{Replay, Seen, Step};
 use super::scan::{Clip, Variety};
@@ -167,6 +168,46 @@ impl DqnTrainer {
     #[must_use]
     pub const fn frames(&self) -> u64 {
         self.frames
+    }
+
+    /// Share of random actions at present.
+    #[must_use]
+    pub fn epsilon(&self) -> f64 {
+        self.recipe.epsilon(self.frames)
+    }
+
+    /// Begins all scans anew, drawn from `seed`.
+    pub fn begin_leg(&mut self, seed: u64) {
+        self.rng = ChaCha8Rng::seed_from_u64(seed);
+        for seat in &mut self.seats {
+            *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+            // Scans end one after another, not all at once.
+            seat.frames_left = self.rng.random_range(1..=self.recipe.frames_a_scan);
+        }
+    }
+
+    /// Adds all that [`DqnTrainer::restore`] needs, between two legs.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.put_store("network", &self.store);
+        checkpoint.put_store("target", &self.target_store);
+        self.optimiser.save(checkpoint);
+        self.replay.save(checkpoint);
+        checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
+        checkpoint.notes.insert("frames".to_owned(), self.frames.to_string());
+    }
+
+    /// Takes back what [`DqnTrainer::save`] added.
+    ///
+    /// # Errors
+    /// When the checkpoint is of another training.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        checkpoint.fill_store("network", &self.store)?;
+        checkpoint.fill_store("target", &self.target_store)?;
+        self.optimiser.restore(checkpoint)?;
+        self.replay.restore(checkpoint)?;
+        self.updates = checkpoint.number("updates")?;
+        self.frames = checkpoint.number("frames")?;
+        Ok(())
     }
 
     /// Plays some frames, learns from one batch, and returns its loss.

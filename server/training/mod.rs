@@ -1,16 +1,20 @@
 //! Training: focal-time scans, replay memory, DQN, evaluation. Knows no web.
 
 pub mod belief;
+pub mod checkpoint;
 pub mod defocus;
 pub mod dqn;
 pub mod evaluate;
 pub mod footage;
 pub mod optimiser;
 pub mod pictures;
+pub mod recipe;
 pub mod replay;
 pub mod report;
 pub mod rollout;
+pub mod run;
 pub mod scan;
 pub mod session;
 pub mod statistics;
+pub mod tensorboard;
 pub mod texture;

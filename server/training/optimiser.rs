@@ -2,6 +2,8 @@
 
 use tch::{Kind, Tensor, nn};
 
+use super::checkpoint::{Checkpoint, CheckpointError};
+
 /// Which rule turns gradients into steps.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "name", deny_unknown_fields)]
@@ -59,18 +61,24 @@ impl Optimiser {
         });
     }
 
-    /// Tensors and step count to save.
-    #[must_use]
-    pub fn state(&self) -> (Vec<&Tensor>, i32) {
-        (self.state.iter().flatten().collect(), self.steps)
+    /// Adds the optimiser's state to a checkpoint.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        for (index, tensor) in self.state.iter().flatten().enumerate() {
+            checkpoint.put_tensor(&format!("optimiser.{index}"), tensor);
+        }
+        checkpoint.notes.insert("steps".to_owned(), self.steps.to_string());
     }
 
-    /// Takes back what [`Optimiser::state`] gave.
-    pub fn restore(&mut self, tensors: &[Tensor], steps: i32) {
-        for (mine, saved) in self.state.iter_mut().flatten().zip(tensors) {
-            mine.copy_(saved);
+    /// Takes back what [`Optimiser::save`] added.
+    ///
+    /// # Errors
+    /// When the checkpoint is of another network.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        for (index, tensor) in self.state.iter_mut().flatten().enumerate() {
+            checkpoint.fill(&format!("optimiser.{index}"), tensor)?;
         }
-        self.steps = steps;
+        self.steps = checkpoint.number("steps")?;
+        Ok(())
     }
 }
 

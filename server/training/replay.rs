@@ -3,6 +3,7 @@
 
 use rand::{Rng, RngExt};
 
+use super::checkpoint::{Checkpoint, CheckpointError};
 use crate::imaging::Patch;
 
 /// What one frame leaves behind, besides what was seen.
@@ -96,6 +97,56 @@ impl Replay {
             Seen::Metric(metric) => ring.metrics[at] = *metric,
         }
         ring.head = (at + 1) % capacity;
+    }
+
+    /// Adds all frames to a checkpoint, each seat's oldest first.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        for (index, ring) in self.seats.iter().enumerate() {
+            let (newer, older) = ring.steps.split_at(ring.head);
+            let steps = || older.iter().chain(newer);
+            let name = |part: &str| format!("replay.{index}.{part}");
+            checkpoint.put_floats(&name("focal_power"), steps().map(|step| step.focal_power));
+            checkpoint.put_floats(&name("next_optimum"), steps().map(|step| step.next_optimum));
+            checkpoint.put_bytes(&name("action"), steps().map(|step| step.action).collect());
+            checkpoint.put_bytes(&name("age"), steps().flat_map(|step| step.age.to_le_bytes()).collect());
+            let patch = ring.patches.len() / ring.steps.len().max(1);
+            let mut patches = ring.patches.clone();
+            patches.rotate_left(ring.head * patch);
+            checkpoint.put_bytes(&name("patches"), patches);
+            let mut metrics = ring.metrics.clone();
+            let turned = if metrics.is_empty() { 0 } else { ring.head };
+            metrics.rotate_left(turned);
+            checkpoint.put_floats(&name("metrics"), metrics);
+        }
+    }
+
+    /// Takes back what [`Replay::save`] added.
+    ///
+    /// # Errors
+    /// When the checkpoint is of another training.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        for (index, ring) in self.seats.iter_mut().enumerate() {
+            let name = |part: &str| format!("replay.{index}.{part}");
+            let focal_powers = checkpoint.floats(&name("focal_power"))?;
+            let optima = checkpoint.floats(&name("next_optimum"))?;
+            let (actions, ages) = (checkpoint.bytes(&name("action"))?, checkpoint.bytes(&name("age"))?);
+            let ages = ages.as_chunks::<2>().0;
+            ring.steps = focal_powers
+                .into_iter()
+                .zip(optima)
+                .zip(actions.iter().zip(ages))
+                .map(|((focal_power, next_optimum), (&action, &age))| Step {
+                    focal_power,
+                    next_optimum,
+                    action,
+                    age: u16::from_le_bytes(age),
+                })
+                .collect();
+            ring.patches = checkpoint.bytes(&name("patches"))?.to_vec();
+            ring.metrics = checkpoint.floats(&name("metrics"))?;
+            ring.head = 0;
+        }
+        Ok(())
     }
 
     /// A window of `length` frames, uniformly drawn; `None` before a drawn seat holds as many.

@@ -113,21 +113,24 @@ pub struct ScanSettings {
     pub noise: f64,
     /// Hand tremor: each frame is blurred further, by this many pixels (standard deviation) times a normal draw.
     pub tremor: f64,
+    /// Unsteady contrast (light, smoke, wet glints): each frame's is scaled by the exponential of this times a normal draw.
+    pub flicker: f64,
     /// Contrast and brightness: gray becomes `gain * gray + offset`.
     pub exposure: (f64, f64),
 }
 
 impl ScanSettings {
-    /// The reference benchmark's scans: over still pictures, which bring no tremor of their own. `docs/results.md` tells
+    /// The reference benchmark's scans: over still pictures, whose contrast is
+    /// unsteady as footage's is. `docs/results.md` tells
     /// how they were calibrated.
     #[must_use]
     pub fn reference() -> Self {
-        Self { tremor: 0.57, ..Self::default() }
+        Self { flicker: 0.11, ..Self::default() }
     }
 }
 
 impl Default for ScanSettings {
-    /// Scans over footage, which brings its own tremor.
+    /// Scans over footage, which is unsteady enough by itself.
     fn default() -> Self {
         Self {
             focus: Motion { speed: 0.012, memory: 60.0 },
@@ -136,6 +139,7 @@ impl Default for ScanSettings {
             spot: Spot::Gaussian,
             noise: 0.0,
             tremor: 0.0,
+            flicker: 0.0,
             exposure: (1.0, 0.0),
         }
     }
@@ -148,6 +152,7 @@ pub struct Scan {
     settings: ScanSettings,
     sigma0: f64,
     tremor: f64,
+    contrast: f64,
     time: usize,
     focus: Walk,
     crop: [Walk; 2],
@@ -169,7 +174,8 @@ impl Scan {
         let time = if clip.frames.len() > 1 { course.random_range(0..2 * clip.frames.len()) } else { 0 };
         let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
         let tremor = settings.tremor * standard_normal(&mut course);
-        Self { clip, settings, sigma0, tremor, time, focus, crop, course, noise, defocus: Defocus::default() }
+        let contrast = (settings.flicker * standard_normal(&mut course)).exp();
+        Self { clip, settings, sigma0, tremor, contrast, time, focus, crop, course, noise, defocus: Defocus::default() }
     }
 
     /// The optimal focal power at this frame.
@@ -190,8 +196,9 @@ impl Scan {
         let corner = (self.crop[0].position() as isize, self.crop[1].position() as isize);
         let mut patch = self.defocus.patch(self.clip.at(self.time), corner, sigma, self.settings.spot);
         let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
+        let mean = patch.0.iter().sum::<f32>() / patch.0.len() as f32;
         for value in &mut patch.0 {
-            let mut gray = gain * *value + offset;
+            let mut gray = gain * (mean + self.contrast as f32 * (*value - mean)) + offset;
             if self.settings.noise > 0.0 {
                 gray += self.settings.noise as f32 * cheap_normal(&mut self.noise);
             }
@@ -206,6 +213,7 @@ impl Scan {
         self.focus.advance(&mut self.course);
         self.crop.iter_mut().for_each(|walk| walk.advance(&mut self.course));
         self.tremor = self.settings.tremor * standard_normal(&mut self.course);
+        self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
     }
 }
 
@@ -236,7 +244,8 @@ impl Variety {
         settings.crop.speed *= factor(rng, 0.5);
         settings.crop.memory *= factor(rng, 0.4);
         settings.spot = if rng.random_bool(0.5) { Spot::Disc } else { Spot::Gaussian };
-        settings.tremor = rng.random_range(0.0..1.2);
+        settings.tremor = if rng.random_bool(0.5) { rng.random_range(0.0..0.6) } else { 0.0 };
+        settings.flicker = rng.random_range(0.0..0.2);
         settings.noise = if rng.random_bool(0.7) { rng.random_range(0.0..4.0) } else { 0.0 };
         let gain: f64 = rng.random_range(0.3..1.3);
         settings.exposure = (gain, rng.random_range(-0.5..1.0) * 120.0 * (1.0 - gain));

@@ -1,0 +1,125 @@
+//! `parfocal train`: makes a learned policy from nothing, on this machine.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::Failure;
+use crate::clock::SystemClock;
+use crate::training::recipe::{Recipe, names, shipped};
+use crate::training::run::{LEG, Run};
+use crate::training::{footage, run::Progress};
+
+/// Where to compute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Compute {
+    /// The processor.
+    Cpu,
+    /// An NVIDIA GPU.
+    Cuda,
+}
+
+/// What to train, and where to.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`; with `-paper` behind one of the first three, by the
+    /// paper's recipe.
+    policy: String,
+    /// Run folder: recipe, weights, model card, curves, checkpoint.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// A recipe of your own (TOML) in place of the one that ships.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// A video, an image or a folder of images to train on in place of drawn pictures.
+    #[arg(long, value_name = "PATH")]
+    footage: Vec<PathBuf>,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value = "cpu")]
+    device: Compute,
+    /// Go on where the run folder's checkpoint stands.
+    #[arg(long)]
+    resume: bool,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When recipe, footage, folder or checkpoint are unusable.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    tch::set_num_threads(1);
+    if arguments.device == Compute::Cuda {
+        let reason = if tch::Cuda::is_available() { "trains on the processor only" } else { "has no CUDA" };
+        return Err(format!("this build {reason}; use --device cpu").into());
+    }
+    let recipe = recipe(arguments)?;
+    let mut clips = Vec::new();
+    for path in &arguments.footage {
+        clips.extend(footage::clips(path)?);
+    }
+    let total = recipe.updates();
+    let mut run = Run::start(recipe, arguments.seed, clips, &arguments.out, arguments.resume)?;
+    let stop = stop_on_interrupt()?;
+    let bar = bar(total, run.updates());
+    let mut validation = run.best();
+    let whole = run.go(&SystemClock, &|| stop.load(Ordering::Relaxed), &mut |progress: &Progress| {
+        validation = progress.validation.unwrap_or(validation);
+        let epsilon = progress.epsilon.map_or(String::new(), |epsilon| format!(", epsilon {epsilon:.2}"));
+        bar.set_position(progress.updates);
+        bar.set_message(format!("loss {:.4}{epsilon}, validation MAE {validation:.4}", progress.loss));
+    })?;
+    bar.finish_and_clear();
+    if whole {
+        println!("best validation MAE {:.4}; weights and model card in {}", run.best(), arguments.out.display());
+    } else {
+        println!("stopped after {} of {total} updates; go on with --resume", run.updates());
+    }
+    Ok(())
+}
+
+fn recipe(arguments: &Arguments) -> Result<Recipe, Failure> {
+    if let Some(file) = &arguments.config {
+        let text = std::fs::read_to_string(file)
+            .map_err(|error| format!("cannot read the recipe {}: {error}", file.display()))?;
+        let recipe = Recipe::parse(&text).map_err(|error| format!("in the recipe {}: {error}", file.display()))?;
+        if recipe.policy != arguments.policy {
+            return Err(format!("the recipe {} makes '{}'", file.display(), recipe.policy).into());
+        }
+        return Ok(recipe);
+    }
+    let unknown = || format!("nothing trains '{}'; there are recipes for {}", arguments.policy, names().join(", "));
+    let text = shipped(&arguments.policy).ok_or_else(unknown)?;
+    Ok(Recipe::parse(text)?)
+}
+
+/// A flag that the first Ctrl-C raises; the second ends the process at once.
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
+        runtime.block_on(async {
+            if tokio::signal::ctrl_c().await.is_ok() {
+                eprintln!("saving after at most {LEG} more updates; Ctrl-C again to leave at once");
+                flag.store(true, Ordering::Relaxed);
+                if tokio::signal::ctrl_c().await.is_ok() {
+                    std::process::exit(130);
+                }
+            }
+        });
+    })?;
+    Ok(stop)
+}
+
+fn bar(total: u64, done: u64) -> ProgressBar {
+    let bar = ProgressBar::new(total).with_position(done);
+    bar.reset_eta();
+    let template = "{bar:25} {pos}/{len} updates, {per_sec}, {eta} left: {msg}";
+    ProgressStyle::with_template(template).map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
+}

@@ -1,0 +1,106 @@
+//! TensorBoard event files: scalars only. Each record is its length, a masked CRC-32C of that, an `Event` protocol buffer,
+//! and a masked CRC-32C of that (`tensorflow/core/lib/io/record_writer.h`).
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+
+use crc::{CRC_32_ISCSI, Crc};
+
+use crate::clock::Clock;
+
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
+
+/// An open event file.
+#[derive(Debug)]
+pub struct EventFile {
+    file: File,
+}
+
+impl EventFile {
+    /// A new event file in `folder`, named by the time and by the update the curves start at.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn create(folder: &Path, clock: &dyn Clock, step: u64) -> io::Result<Self> {
+        let now = clock.wall();
+        let mut file = File::create(folder.join(format!("events.out.tfevents.{}.{step}", now.as_second())))?;
+        let mut event = seconds(clock);
+        put_bytes(&mut event, 3, b"brain.Event:2");
+        file.write_all(&record(&event))?;
+        Ok(Self { file })
+    }
+
+    /// Adds the value of curve `tag` at `step`.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn scalar(&mut self, clock: &dyn Clock, step: u64, tag: &str, value: f32) -> io::Result<()> {
+        let mut entry = Vec::new();
+        put_bytes(&mut entry, 1, tag.as_bytes());
+        entry.push(2 << 3 | 5);
+        entry.extend(value.to_le_bytes());
+        let mut summary = Vec::new();
+        put_bytes(&mut summary, 1, &entry);
+        let mut event = seconds(clock);
+        event.push(2 << 3);
+        put_varint(&mut event, step);
+        put_bytes(&mut event, 5, &summary);
+        self.file.write_all(&record(&event))
+    }
+}
+
+/// An event's beginning: field 1, the wall clock in seconds.
+#[allow(clippy::cast_precision_loss, reason = "milliseconds since 1970 fit 53 bits")]
+fn seconds(clock: &dyn Clock) -> Vec<u8> {
+    let mut event = vec![1 << 3 | 1];
+    event.extend((clock.wall().as_millisecond() as f64 / 1000.0).to_le_bytes());
+    event
+}
+
+fn put_bytes(message: &mut Vec<u8>, field: u8, bytes: &[u8]) {
+    message.push(field << 3 | 2);
+    put_varint(message, bytes.len() as u64);
+    message.extend_from_slice(bytes);
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "seven bits at a time")]
+fn put_varint(message: &mut Vec<u8>, mut value: u64) {
+    while value >= 0x80 {
+        message.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    message.push(value as u8);
+}
+
+fn record(event: &[u8]) -> Vec<u8> {
+    let length = (event.len() as u64).to_le_bytes();
+    let mut record = length.to_vec();
+    record.extend(masked(&length).to_le_bytes());
+    record.extend_from_slice(event);
+    record.extend(masked(event).to_le_bytes());
+    record
+}
+
+/// `TensorFlow`'s masked checksum: rotated and offset, so that a checksum of checksummed data is none of its own.
+fn masked(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes).rotate_right(15).wrapping_add(0xa282_ead8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_crc_32c() {
+        // RFC 3720, B.4: 32 bytes of zeros.
+        assert_eq!(CRC.checksum(&[0; 32]), 0x8a91_36aa);
+    }
+
+    #[test]
+    fn numbers_are_varints() {
+        let mut message = Vec::new();
+        put_varint(&mut message, 300);
+        assert_eq!(message, [0xac, 0x02]);
+    }
+}

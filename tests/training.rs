@@ -1,0 +1,103 @@
+//! Training and evaluation from outside: a short training learns, stopping changes nothing, the same seed gives the same
+//! figures.
+
+use std::cell::Cell;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use parfocal::clock::SystemClock;
+use parfocal::training::recipe::{Recipe, shipped};
+use parfocal::training::run::{LEG, Run};
+
+/// The recipe that ships for `policy`, small.
+fn small(policy: &str, updates: u64) -> Recipe {
+    let mut recipe = Recipe::parse(shipped(policy).unwrap()).unwrap();
+    (recipe.pictures, recipe.validate_every) = (6, updates);
+    if let Some(dqn) = &mut recipe.dqn {
+        (dqn.scans, dqn.frames_an_update, dqn.warm_up, dqn.replay) = (8, 16, 1000, 4000);
+        (dqn.windows, dqn.window, dqn.updates) = (8, 16, updates);
+        (dqn.epsilon_frames, dqn.variety) = (5000, 0.0);
+    }
+    if let Some(belief) = &mut recipe.belief {
+        (belief.scans, belief.window, belief.updates, belief.variety) = (8, 16, updates, 0.0);
+    }
+    recipe
+}
+
+/// Trains for at most `legs` legs; returns whether the training is complete.
+fn train(recipe: &Recipe, folder: &Path, legs: u64, resume: bool) -> bool {
+    tch::set_num_threads(1);
+    let mut run = Run::start(recipe.clone(), 7, Vec::new(), folder, resume).unwrap();
+    let left = Cell::new(legs);
+    run.go(&SystemClock, &|| left.replace(left.get().saturating_sub(1)) == 0, &mut |_| ()).unwrap()
+}
+
+#[test]
+fn a_short_training_beats_a_lens_that_stays_where_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut recipe = small("mgm-learned", 600);
+    if let Some(dqn) = &mut recipe.dqn {
+        (dqn.windows, dqn.window, dqn.frames_an_update) = (16, 32, 64);
+    }
+    assert!(train(&recipe, folder.path(), u64::MAX, false));
+    let curves = std::fs::read_to_string(folder.path().join("curves.csv")).unwrap();
+    let mae: f64 = curves.trim_end().rsplit(',').next().unwrap().parse().unwrap();
+    // `fixed` has 0.25: the mean distance of a uniformly spread optimum from the middle.
+    assert!(mae < 0.2, "{mae}");
+}
+
+#[test]
+fn training_resumed_is_training_never_stopped() {
+    for policy in ["mgm-learned", "parfocal"] {
+        let recipe = small(policy, 2 * LEG);
+        let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        assert!(train(&recipe, whole.path(), u64::MAX, false));
+        assert!(!train(&recipe, parts.path(), 1, false));
+        assert!(train(&recipe, parts.path(), u64::MAX, true));
+        for file in ["curves.csv", &format!("{policy}.safetensors")] {
+            let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();
+            assert!(read(&whole) == read(&parts), "{policy}: {file} differs");
+        }
+    }
+}
+
+fn parfocal(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap()
+}
+
+#[test]
+fn the_same_seed_gives_the_same_figures_to_the_last_digit() {
+    let evaluate =
+        || parfocal(&["evaluate", "--count", "2", "--policies", "fixed,mgm-hill-climber,parfocal", "--json"]);
+    let (first, second) = (evaluate(), evaluate());
+    assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
+    assert_eq!(first.stdout, second.stdout);
+    let report: serde_json::Value = serde_json::from_slice(&first.stdout).unwrap();
+    let names: Vec<_> = report["rows"].as_array().unwrap().iter().map(|row| row["policy"].as_str().unwrap()).collect();
+    assert_eq!(names, ["oracle", "fixed", "mgm-hill-climber", "parfocal"]);
+    assert_eq!(report["comparisons"].as_array().unwrap().len(), 3);
+    assert!(report["rows"][0]["in_focus"].as_f64().unwrap() > 0.9);
+}
+
+#[test]
+fn bad_input_is_answered_with_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let out = out.to_str().unwrap();
+    let recipe = folder.path().join("recipe.toml");
+    std::fs::write(&recipe, shipped("mgm-learned").unwrap().replace("warm_up", "warmup")).unwrap();
+    let recipe = recipe.to_str().unwrap();
+    for (arguments, told) in [
+        (vec!["evaluate", "--policies", "nonsense", "--count", "1"], "there is no policy 'nonsense'"),
+        (vec!["evaluate", "--footage", "/no/such.mp4"], "there is no such file"),
+        (vec!["train", "fixed", "--out", out], "nothing trains 'fixed'"),
+        (vec!["train", "parfocal", "--out", out, "--device", "cuda"], "use --device cpu"),
+        (vec!["train", "mgm-learned", "--out", out, "--config", recipe], "unknown field `warmup`"),
+        (vec!["train", "parfocal", "--out", out, "--resume"], "cannot use the checkpoint"),
+    ] {
+        let output = parfocal(&arguments);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
+        assert!(error.contains(told), "{arguments:?}: {error}");
+    }
+}
