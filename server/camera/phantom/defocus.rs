@@ -63,7 +63,8 @@ impl Stack {
 
     /// The surface at a place (in texels), through a disc of the given squared radius: between the two nearest levels
     /// such that the second moment is exact.
-    #[inline]
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     pub(super) fn at(&self, u: f32, v: f32, square: f32) -> [f32; ENDMEMBERS] {
         let index = ((square * (1.0 / SQUARE_STEP)) as usize).min(self.below.len() - 1);
         let below = usize::from(self.below[index]);
@@ -74,7 +75,11 @@ impl Stack {
             return sharper;
         }
         let softer = self.levels[below + 1].at(u, v);
-        std::array::from_fn(|k| sharper[k] + part * (softer[k] - sharper[k]))
+        let mut between = sharper;
+        for (value, softer) in between.iter_mut().zip(softer) {
+            *value += part * (softer - *value);
+        }
+        between
     }
 
     /// Bytes held.
@@ -95,7 +100,8 @@ impl Level {
     }
 
     /// Bilinear look-up; the border's value beyond it.
-    #[inline]
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     fn at(&self, u: f32, v: f32) -> [f32; ENDMEMBERS] {
         let last = (self.side - 1) as f32 - 0.001;
         let x = ((u + 0.5) * self.scale - 0.5).clamp(0.0, last);
@@ -106,12 +112,13 @@ impl Level {
         let upper = &self.texels[start..][..2];
         let lower = &self.texels[start + self.side..][..2];
         let weights = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
-        std::array::from_fn(|k| {
-            f32::from(upper[0][k]) * weights[0]
-                + f32::from(upper[1][k]) * weights[1]
-                + f32::from(lower[0][k]) * weights[2]
-                + f32::from(lower[1][k]) * weights[3]
-        })
+        let mut sum = [0.0; ENDMEMBERS];
+        for (texel, weight) in [upper[0], upper[1], lower[0], lower[1]].into_iter().zip(weights) {
+            for (sum, value) in sum.iter_mut().zip(texel) {
+                *sum += weight * f32::from(value);
+            }
+        }
+        sum
     }
 }
 

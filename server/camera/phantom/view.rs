@@ -128,7 +128,8 @@ impl Mapping {
     }
 
     /// Place on the surface that a pixel sees, texels.
-    #[inline]
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     pub(super) fn place(&self, x: f32, y: f32) -> (f32, f32) {
         let (x, y) = (x - self.centre[0], y - self.centre[1]);
         let [cos, sin] = self.across;
@@ -136,7 +137,8 @@ impl Mapping {
     }
 
     /// Focal power that would be sharp at a pixel that sees a place of this height; may lie outside 0..=1.
-    #[inline]
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     pub(super) fn sharp_at(&self, x: f32, y: f32, height: f32) -> f32 {
         let (x, y) = (x - self.centre[0], y - self.centre[1]);
         self.focus[0] + self.focus[1] * x + self.focus[2] * y + self.per_height * height
@@ -144,7 +146,8 @@ impl Mapping {
 }
 
 /// Height of the surface at a place, from the relief of every second texel.
-#[inline]
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
 #[allow(clippy::cast_sign_loss, reason = "clamped to the surface")]
 pub(super) fn height_at(relief: &Field, u: f32, v: f32) -> f32 {
     let last = (relief.side - 1) as f32;
