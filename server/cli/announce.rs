@@ -12,8 +12,9 @@ use crate::http::error::role_name;
 use crate::http::keys::{Keys, ROLES};
 use crate::trial::view::Role;
 
-/// The announcement for people at the terminal, of a server that others reach at `host`.
-pub fn announcement(host: SocketAddr, keys: &Keys, status: &ControlStatus) -> String {
+/// The announcement for people, of a server that others reach at `host`; `terminal`, whether it goes to a terminal, which
+/// knows colours.
+pub fn announcement(host: SocketAddr, keys: &Keys, status: &ControlStatus, terminal: bool) -> String {
     let link = |role| format!("http://{host}/enter?key={}", keys.of(role));
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -27,7 +28,7 @@ pub fn announcement(host: SocketAddr, keys: &Keys, status: &ControlStatus) -> St
         let _ = writeln!(text, "{:>10}  {}", role_name(role), link(role));
     }
     if let Ok(code) = QrCode::new(link(Role::Surgeon)) {
-        let _ = writeln!(text, "\nThe surgeon's tablet can scan this:\n{}", code.render::<Dense1x2>().build());
+        let _ = writeln!(text, "\nThe surgeon's tablet can scan this:\n\n{}", drawn(&code, terminal));
     }
     let advice = if host.ip().is_loopback() {
         "Only this machine can reach it. For a tablet, start with --bind 0.0.0.0:8080 on a network you trust."
@@ -36,6 +37,18 @@ pub fn announcement(host: SocketAddr, keys: &Keys, status: &ControlStatus) -> St
     };
     let _ = writeln!(text, "{advice}\nCtrl-C ends it.");
     text
+}
+
+/// The code, black on white whatever the terminal's own colours are.
+fn drawn(code: &QrCode, terminal: bool) -> String {
+    let picture = code.render::<Dense1x2>().build();
+    if !terminal {
+        return picture;
+    }
+    picture
+        .split_inclusive('\n')
+        .flat_map(|line| ["\x1b[38;5;16;48;5;231m", line.trim_end_matches('\n'), "\x1b[0m\n"])
+        .collect()
 }
 
 fn simulated(status: &ControlStatus) -> Option<String> {

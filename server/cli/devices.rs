@@ -19,7 +19,7 @@ pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Rece
             if last.replace(working) == Some(working) {
                 continue;
             }
-            tracing::info!(device, working, %message, "device");
+            tracing::info!("{device}: {message}");
             let (wall, at) = (clock.wall(), clock.now());
             let event = DeviceEvent { wall, at, device: device.to_owned(), working, message: message.to_string() };
             if let Err(error) = store.device_event(&event).await {

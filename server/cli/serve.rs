@@ -111,6 +111,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let app = Arc::new(App {
         clock,
         live,
+        store: store.clone(),
         surgeon_view: conductor.surgeon_view(),
         operator_view: conductor.operator_view(),
         conductor,
@@ -124,7 +125,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     });
     let host = app.address;
     let server = tokio::spawn(http::run(listener, app));
-    print!("{}", announcement(host, &keys, &control.status.borrow()));
+    print!("{}", announcement(host, &keys, &control.status.borrow(), std::io::stdout().is_terminal()));
     signals.any().await;
     tracing::info!("ending");
     let _ = end.send(true);

@@ -72,11 +72,13 @@ pub(super) struct SurgeonStatus {
 }
 
 impl SurgeonStatus {
+    /// Tells of devices that fail, whatever policy runs. A policy that fails is the operator's business: a notice that
+    /// came with one policy alone would tell it from the others.
     fn new(status: &ControlStatus) -> Self {
         let notice = match status.held {
             Some(Hold::CameraFailed) => Some("The camera is not delivering pictures."),
-            Some(Hold::Paused) | None => None,
-            Some(_) => Some("The focus is being held for the moment."),
+            Some(Hold::LensFailed) => Some("The focus is being held for the moment."),
+            _ => None,
         };
         Self { camera_simulated: status.camera.simulated, lens_simulated: status.lens.simulated, notice }
     }

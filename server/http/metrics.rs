@@ -1,6 +1,6 @@
 //! `/metrics`: counters for Prometheus. For operator and researcher; nothing in it is told apart by policy.
 
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
@@ -39,6 +39,7 @@ async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoR
 fn collect(app: &App) -> Registry {
     let status = app.control.status.borrow();
     let counts = app.live.counts();
+    let telemetry = app.store.telemetry_counts();
     let mut registry = Registry::with_prefix("parfocal");
     let counters = [
         ("steps", "Steps of the control loop", status.steps),
@@ -46,6 +47,12 @@ fn collect(app: &App) -> Registry {
         ("frames_skipped", "Frames that the imaging thread had no time for", app.control.frames.overwritten()),
         ("frames_encoded", "Frames made into JPEG", counts.encoded()),
         ("telemetry_dropped", "Telemetry records dropped because the writer fell behind", status.telemetry_dropped),
+        ("telemetry_written", "Telemetry records on disk", telemetry.written.load(Ordering::Relaxed)),
+        (
+            "telemetry_lost",
+            "Telemetry records given up because the disk failed",
+            telemetry.lost.load(Ordering::Relaxed),
+        ),
     ];
     for (name, help, value) in counters {
         registry.register(name, help, ConstCounter::new(value));
@@ -54,11 +61,11 @@ fn collect(app: &App) -> Registry {
     registry.register("frames_sent", "Frames sent to viewers", app.metrics.frames_sent.clone());
     registry.register_with_unit("stream", "Frames sent to viewers", Unit::Bytes, app.metrics.bytes_sent.clone());
     registry.register("viewers", "Viewers that want pictures now", ConstGauge::new(counts.viewers()));
+    let latency = counts.latency().clone();
+    registry.register_with_unit("latency", "Time from exposure to lens command", Unit::Seconds, latency);
     let gauges = [
         ("steps_per_second", "Steps of the control loop over the last second", status.steps_per_second),
         ("camera_fps", "Frames a second from the camera", status.camera.fps),
-        ("latency_p50_seconds", "Median time from exposure to lens command", seconds(status.latency_p50_micros)),
-        ("latency_p99_seconds", "99th percentile of the same", seconds(status.latency_p99_micros)),
         ("camera_working", "Whether the camera delivers frames", f64::from(u8::from(status.camera.working))),
         ("lens_working", "Whether the lens takes commands", f64::from(u8::from(status.lens.working))),
     ];
@@ -66,10 +73,6 @@ fn collect(app: &App) -> Registry {
         registry.register(name, help, ConstGauge::new(value));
     }
     registry
-}
-
-fn seconds(micros: u32) -> f64 {
-    f64::from(micros) / 1e6
 }
 
 /// The routes of this file.

@@ -12,6 +12,7 @@ use crate::clock::Clock;
 use crate::conductor::Conductor;
 use crate::control::ControlHandle;
 use crate::live::LiveHandle;
+use crate::store::Store;
 use crate::trial::view::{OperatorView, SurgeonView};
 
 /// The server's parts, made once at start.
@@ -22,6 +23,8 @@ pub struct App {
     pub control: ControlHandle,
     /// Pictures.
     pub live: LiveHandle,
+    /// The database.
+    pub store: Store,
     /// Trial sessions.
     pub conductor: Conductor,
     /// The session under way as surgeons may see it.

@@ -11,14 +11,30 @@ pub use thread::start;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use prometheus_client::metrics::histogram::Histogram;
 use tokio::sync::watch;
 
+/// Upper ends of the latency histogram's buckets, seconds: about the bars, 1 ms for the median and 3 ms for 99 in 100.
+const LATENCY_BUCKETS: [f64; 10] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3, 1e-2, 2e-2, 5e-2];
+
 /// What the imaging thread has done so far.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Counts {
     viewers: AtomicU64,
     encoded: AtomicU64,
     jpeg_bytes: AtomicU64,
+    latency: Histogram,
+}
+
+impl Default for Counts {
+    fn default() -> Self {
+        Self {
+            viewers: AtomicU64::default(),
+            encoded: AtomicU64::default(),
+            jpeg_bytes: AtomicU64::default(),
+            latency: Histogram::new(LATENCY_BUCKETS),
+        }
+    }
 }
 
 impl Counts {
@@ -38,6 +54,12 @@ impl Counts {
     #[must_use]
     pub fn jpeg_bytes(&self) -> u64 {
         self.jpeg_bytes.load(Ordering::Relaxed)
+    }
+
+    /// From exposure to lens command, seconds, of the frames that reached the imaging thread.
+    #[must_use]
+    pub const fn latency(&self) -> &Histogram {
+        &self.latency
     }
 }
 

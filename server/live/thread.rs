@@ -56,6 +56,7 @@ impl Worker {
     }
 
     fn turn(&mut self, frame: ControlledFrame) {
+        self.counts.latency.observe(f64::from(frame.record.latency_micros) / 1e6);
         let watched = self.counts.viewers() > 0;
         let detect = frame.frame.number.is_multiple_of(DETECT_EVERY);
         if !watched && !detect {

@@ -145,9 +145,13 @@ async fn counters_are_told_to_prometheus_without_naming_a_policy() {
     assert!(response.headers()[CONTENT_TYPE].to_str().unwrap().starts_with("application/openmetrics-text"));
     let text = response.text().await.unwrap();
     assert!(text.ends_with("# EOF\n"));
-    for name in
-        ["parfocal_steps_total", "parfocal_viewers", "parfocal_frames_encoded_total", "parfocal_jpeg_bytes_total"]
-    {
+    for name in [
+        "parfocal_steps_total",
+        "parfocal_viewers",
+        "parfocal_frames_encoded_total",
+        "parfocal_jpeg_bytes_total",
+        "parfocal_latency_seconds_bucket",
+    ] {
         assert!(text.lines().any(|line| line.starts_with(name)), "{name} in {text}");
     }
     assert!(!text.contains("policy") && !text.contains("climber"));
