@@ -2,6 +2,8 @@
 
 mod support;
 
+#[path = "http/blinding.rs"]
+mod blinding;
 #[path = "http/live.rs"]
 mod live;
 #[path = "http/roles.rs"]

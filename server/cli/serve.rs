@@ -1,6 +1,6 @@
 //! `parfocal serve`: wires camera, lens, loop, trial and pages together and serves them.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -125,7 +125,9 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     });
     let host = app.address;
     let server = tokio::spawn(http::run(listener, app));
-    print!("{}", announcement(host, &keys, &control.status.borrow(), std::io::stdout().is_terminal()));
+    let announcement = announcement(host, &keys, &control.status.borrow(), std::io::stdout().is_terminal());
+    // The server serves whether or not anyone reads this.
+    let _ = std::io::stdout().write_all(announcement.as_bytes());
     signals.any().await;
     tracing::info!("ending");
     let _ = end.send(true);

@@ -27,7 +27,7 @@ const BUFFER: usize = 16 * 1024;
 const UNSENT: u32 = 16 * 1024;
 
 /// A browser that has not said what it wants by then never will.
-const HEADERS_WITHIN: Duration = Duration::from_secs(10);
+const HEADERS_WITHIN: Duration = Duration::from_secs(30);
 
 /// Wait after a failed accept: the system is out of something, and will be at once again.
 const BREATHER: Duration = Duration::from_millis(50);

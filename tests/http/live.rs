@@ -11,10 +11,19 @@ use tungstenite::Message;
 use crate::support::Server;
 
 /// A page's end of the stream.
-struct Page {
+pub struct Page {
     socket: WebSocketStream<MaybeTlsStream<TcpStream>>,
-    /// State messages so far.
-    told: Vec<Value>,
+    /// All that came so far, without the pictures themselves.
+    pub heard: Vec<Heard>,
+}
+
+/// What a page hears.
+#[derive(Debug)]
+pub enum Heard {
+    /// State, as it came.
+    Text(String),
+    /// What came with a picture.
+    Frame(Value),
 }
 
 /// A frame as a page gets it.
@@ -36,25 +45,54 @@ impl Frame {
 }
 
 impl Page {
-    async fn open(server: &Server, role: &str) -> Self {
+    pub async fn open(server: &Server, role: &str) -> Self {
         let address = format!("ws://{}/live?role={role}", server.address);
         let mut request = address.into_client_request().unwrap();
         let bearer = format!("Bearer {}", server.key(role)).parse().unwrap();
         request.headers_mut().insert("authorization", bearer);
-        Self { socket: connect_async(request).await.unwrap().0, told: Vec::new() }
+        Self { socket: connect_async(request).await.unwrap().0, heard: Vec::new() }
     }
 
     async fn say(&mut self, message: Value) {
         self.socket.send(Message::text(message.to_string())).await.unwrap();
     }
 
+    /// The next message other than a ping, waiting for it.
+    async fn message(&mut self) -> Message {
+        let message = self.socket.next().await.unwrap().unwrap();
+        match &message {
+            Message::Text(text) => self.heard.push(Heard::Text(text.to_string())),
+            Message::Binary(frame) => self.heard.push(Heard::Frame(unpack(frame).header)),
+            _ => {}
+        }
+        message
+    }
+
     /// The next frame, waiting for it.
     async fn frame(&mut self) -> Frame {
         loop {
-            match self.socket.next().await.unwrap().unwrap() {
-                Message::Binary(message) => return unpack(&message),
-                Message::Text(text) => self.told.push(serde_json::from_str(&text).unwrap()),
-                _ => {}
+            if let Message::Binary(frame) = self.message().await {
+                return unpack(&frame);
+            }
+        }
+    }
+
+    /// State messages so far.
+    fn told(&self) -> Vec<Value> {
+        let texts = self.heard.iter().filter_map(|heard| match heard {
+            Heard::Text(text) => Some(serde_json::from_str(text).unwrap()),
+            Heard::Frame(_) => None,
+        });
+        texts.collect()
+    }
+
+    /// Waits for a state message that is `wanted`.
+    pub async fn until(&mut self, wanted: impl Fn(&Value) -> bool) {
+        loop {
+            if let Message::Text(text) = self.message().await
+                && wanted(&serde_json::from_str(&text).unwrap())
+            {
+                return;
             }
         }
     }
@@ -64,13 +102,12 @@ impl Page {
     }
 
     /// Frames that the server has sent by the time that it answers this.
-    async fn sent_so_far(&mut self) -> usize {
+    pub async fn sent_so_far(&mut self) -> usize {
         self.socket.send(Message::Ping("so far".into())).await.unwrap();
         let mut frames = 0;
         loop {
-            match self.socket.next().await.unwrap().unwrap() {
+            match self.message().await {
                 Message::Binary(_) => frames += 1,
-                Message::Text(text) => self.told.push(serde_json::from_str(&text).unwrap()),
                 Message::Pong(payload) if payload == "so far" => return frames,
                 _ => {}
             }
@@ -78,7 +115,7 @@ impl Page {
     }
 
     /// Draws `count` frames.
-    async fn watch(&mut self, count: usize) {
+    pub async fn watch(&mut self, count: usize) {
         for _ in 0..count {
             let frame = self.frame().await;
             self.drawn(&frame).await;
@@ -145,11 +182,12 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
     let frame = surgeon.frame().await;
     assert_eq!(frame.fields(), ["age", "area", "estimated", "frame", "height", "patch", "width"]);
     surgeon.sent_so_far().await;
-    let status = surgeon.told.iter().find(|told| told["type"] == "status").expect("a status");
+    let told = surgeon.told();
+    let status = told.iter().find(|told| told["type"] == "status").expect("a status");
     let mut fields: Vec<_> = status.as_object().unwrap().keys().collect();
     fields.sort_unstable();
     assert_eq!(fields, ["camera_simulated", "lens_simulated", "notice", "type"]);
-    assert!(surgeon.told.contains(&json!({"type": "session", "view": null})));
+    assert!(told.contains(&json!({"type": "session", "view": null})));
 
     let mut operator = Page::open(&server, "operator").await;
     let frame = operator.frame().await;
@@ -174,7 +212,7 @@ async fn nonsense_closes_the_connection_with_a_reason() {
     let mut page = Page::open(&server, "operator").await;
     page.socket.send(Message::text("{\"type\":\"drawn\"}")).await.unwrap();
     let code = loop {
-        match page.socket.next().await.unwrap().unwrap() {
+        match page.message().await {
             Message::Close(Some(frame)) => break frame.code,
             Message::Close(None) => panic!("no reason"),
             _ => {}

@@ -59,6 +59,14 @@ fn what_cannot_be_served_is_refused_in_a_sentence() {
     assert!(said.contains("keys.toml") && said.lines().count() == 1, "{said}");
 }
 
+#[test]
+fn one_data_folder_has_one_server() {
+    let server = Server::start();
+    let (code, said) = refused(server.data.path(), &["--bind", "127.0.0.1:0"]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains(server.data.path().to_str().unwrap()) && said.lines().count() == 1, "{said}");
+}
+
 #[tokio::test]
 async fn every_page_has_a_nonce_of_its_own_and_strict_headers() {
     let server = Server::start();

@@ -82,7 +82,7 @@ class Viewer extends EventTarget {
     this.#picture.drawImage(bitmap, 0, 0, header.width, header.height);
     this.#last = { header, receivedAt };
     this.frame = header.frame;
-    if (this.#shown.has("peaking")) this.#peaking.look(bitmap);
+    if (this.#shown.has("peaking")) this.#peaking.look(bitmap, header.area);
     this.#drawOverlays();
     this.#traces?.add(header, receivedAt - header.age);
     this.#colour.hidden = !header.estimated;

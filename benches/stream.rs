@@ -1,0 +1,161 @@
+//! The whole system's figures: the real server in a process of its own, watched by 1 to 16 viewers and over a slow link.
+//!
+//! `cargo bench --bench stream`. One table; what is worth comparing is compared within one run. Ages are exact: the
+//! server's record of each frame's exposure and the viewers' clock are the same monotonic clock.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "figures for a table"
+)]
+
+#[path = "stream/link.rs"]
+mod link;
+#[path = "stream/process.rs"]
+mod process;
+#[path = "stream/viewer.rs"]
+mod viewer;
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use parfocal::clock::{Clock, SystemClock};
+use process::{Server, Usage};
+use sqlx::{Connection, SqliteConnection};
+use viewer::Seen;
+
+/// Each row is measured for so long, after so long a start.
+const MEASURED: Duration = Duration::from_secs(10);
+const WARM_UP: Duration = Duration::from_secs(3);
+
+/// One row of the table.
+struct Scenario {
+    name: &'static str,
+    /// The camera, and what its colour picture is made of.
+    camera: Camera,
+    viewers: usize,
+    /// Bits a second of the viewers' link, if it is a slow one.
+    link: Option<u64>,
+}
+
+#[derive(Clone, Copy)]
+enum Camera {
+    Phantom,
+    /// Colour pictures as they are: what is left is JPEG and serving.
+    Picture,
+}
+
+const SCENARIOS: [Scenario; 7] = [
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 0, link: None },
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 1, link: None },
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 4, link: None },
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 16, link: None },
+    Scenario { name: "picture", camera: Camera::Picture, viewers: 1, link: None },
+    Scenario { name: "picture", camera: Camera::Picture, viewers: 16, link: None },
+    Scenario { name: "picture, 4 Mbit/s", camera: Camera::Picture, viewers: 1, link: Some(4_000_000) },
+];
+
+/// What a row says.
+struct Row {
+    first_answer: Duration,
+    usage: Usage,
+    frames: usize,
+    bytes: usize,
+    ages: Vec<f64>,
+    latencies: Vec<f64>,
+}
+
+#[tokio::main(flavor = "multi_thread", worker_threads = 2)]
+async fn main() {
+    // `cargo test --benches` only asks whether it starts.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+    println!(
+        "{:<18} {:>7} {:>6} {:>6} {:>13} {:>13} {:>26} {:>6} {:>7}",
+        "camera", "viewers", "fps", "KB", "age ms", "latency ms", "% of a core", "RSS", "answer"
+    );
+    println!(
+        "{:<18} {:>7} {:>6} {:>6} {:>13} {:>13} {:>26} {:>6} {:>7}",
+        "", "", "", "", "p50 / p99", "p50 / p99", "loop / imaging / serving", "MB", "ms"
+    );
+    for scenario in &SCENARIOS {
+        report(scenario, &measure(scenario).await);
+    }
+}
+
+async fn measure(scenario: &Scenario) -> Row {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut server = match scenario.camera {
+        Camera::Phantom => Server::start("phantom"),
+        Camera::Picture => Server::start(&process::picture(&folder)),
+    };
+    let first_answer = server.first_answer().await;
+    let address = match scenario.link {
+        Some(bits) => link::slow(server.address, bits).await,
+        None => server.address,
+    };
+    let viewers: Vec<_> =
+        (0..scenario.viewers).map(|_| tokio::spawn(viewer::watch(address, WARM_UP + MEASURED))).collect();
+    tokio::time::sleep(WARM_UP).await;
+    let (from, before) = (SystemClock.now().as_nanos(), server.usage());
+    tokio::time::sleep(MEASURED).await;
+    let (to, after) = (SystemClock.now().as_nanos(), server.usage());
+    let mut seen: Vec<Seen> = Vec::new();
+    for viewer in viewers {
+        seen.extend(viewer.await.expect("a viewer"));
+    }
+    seen.retain(|seen| (from..to).contains(&seen.at));
+    let steps = steps(server.end()).await;
+    let during = |exposed: u64| (from..to).contains(&exposed);
+    Row {
+        first_answer,
+        usage: after.since(&before, MEASURED),
+        frames: seen.len() / scenario.viewers.max(1),
+        bytes: seen.iter().map(|seen| seen.bytes).sum::<usize>() / seen.len().max(1),
+        ages: sorted(seen.iter().filter_map(|seen| Some((seen.at - steps.get(&seen.frame)?.0) as f64 / 1e6))),
+        latencies: sorted(steps.values().filter(|step| during(step.0)).map(|step| step.1 / 1e3)),
+    }
+}
+
+/// End of exposure (nanoseconds) and latency (microseconds) of each frame, from the server's own records.
+async fn steps(data: tempfile::TempDir) -> HashMap<u64, (u64, f64)> {
+    let address = format!("sqlite://{}", data.path().join("parfocal.db").display());
+    let mut database = SqliteConnection::connect(&address).await.expect("the database");
+    let rows: Vec<(i64, i64, i64)> = sqlx::query_as("SELECT frame, exposed_ns, latency_micros FROM telemetry")
+        .fetch_all(&mut database)
+        .await
+        .expect("the telemetry");
+    rows.into_iter().map(|(frame, exposed, latency)| (frame as u64, (exposed as u64, latency as f64))).collect()
+}
+
+fn report(scenario: &Scenario, row: &Row) {
+    let pair = |values: &[f64]| match values {
+        [] => "-".to_owned(),
+        _ => format!("{:.2} / {:.2}", quantile(values, 0.5), quantile(values, 0.99)),
+    };
+    let cores = &row.usage;
+    println!(
+        "{:<18} {:>7} {:>6.1} {:>6.1} {:>13} {:>13} {:>26} {:>6} {:>7}",
+        scenario.name,
+        scenario.viewers,
+        row.frames as f64 / MEASURED.as_secs_f64(),
+        row.bytes as f64 / 1e3,
+        pair(&row.ages),
+        pair(&row.latencies),
+        format!("{:.1} / {:.1} / {:.1}", cores.control, cores.imaging, cores.serving),
+        cores.resident_mb,
+        row.first_answer.as_millis(),
+    );
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<_> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize]
+}

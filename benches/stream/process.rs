@@ -1,0 +1,129 @@
+//! The server in a process of its own, and what it uses.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use parfocal::clock::{Clock, Moment, SystemClock};
+use rustix::process::{Pid, Signal, kill_process};
+use tempfile::TempDir;
+
+/// A running server.
+pub struct Server {
+    process: Child,
+    started: Moment,
+    /// Where it is reached.
+    pub address: SocketAddr,
+    data: TempDir,
+}
+
+impl Server {
+    /// A server with `camera` at 50 frames a second.
+    pub fn start(camera: &str) -> Self {
+        let data = tempfile::tempdir().expect("a folder");
+        let started = SystemClock.now();
+        let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"))
+            .args(["serve", "--bind", "127.0.0.1:0", "--fps", "50", "--seed", "1", "--camera", camera, "--data-dir"])
+            .arg(data.path())
+            .env("RUST_LOG", "error")
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the server");
+        let lines = BufReader::new(process.stdout.take().expect("its output")).lines();
+        let link = lines.map_while(Result::ok).find(|line| line.contains("/enter?key=")).expect("its address");
+        let port = link.split("/enter").next().and_then(|host| host.rsplit(':').next()?.parse().ok()).expect("a port");
+        Self { process, started, address: SocketAddr::from(([127, 0, 0, 1], port)), data }
+    }
+
+    /// From the start of the process to its first answer.
+    pub async fn first_answer(&self) -> Duration {
+        let client = reqwest::Client::builder().no_proxy().build().expect("a client");
+        client.get(format!("http://{}/healthz", self.address)).send().await.expect("an answer");
+        SystemClock.now().since(self.started)
+    }
+
+    /// What it has used so far.
+    pub fn usage(&self) -> Counted {
+        Counted::of(self.process.id())
+    }
+
+    /// Ends it as a service manager would; what it kept is left.
+    pub fn end(&mut self) -> TempDir {
+        kill_process(Pid::from_child(&self.process), Signal::TERM).expect("a signal");
+        self.process.wait().expect("its end");
+        std::mem::replace(&mut self.data, tempfile::tempdir().expect("a folder"))
+    }
+}
+
+/// Processor time so far by kind of thread, in seconds, and memory.
+pub struct Counted {
+    control: f64,
+    imaging: f64,
+    serving: f64,
+    resident_mb: u64,
+}
+
+/// Shares of a core, in percent, and memory.
+pub struct Usage {
+    /// The control loop.
+    pub control: f64,
+    /// The imaging thread: colour, JPEG, content area.
+    pub imaging: f64,
+    /// The threads that serve.
+    pub serving: f64,
+    /// Resident memory.
+    pub resident_mb: u64,
+}
+
+impl Counted {
+    fn of(process: u32) -> Self {
+        let mut counted = Self { control: 0.0, imaging: 0.0, serving: 0.0, resident_mb: resident_mb(process) };
+        for task in fs::read_dir(format!("/proc/{process}/task")).expect("its threads").flatten() {
+            let name = fs::read_to_string(task.path().join("comm")).unwrap_or_default();
+            let kind = match name.trim() {
+                "control" => &mut counted.control,
+                "imaging" => &mut counted.imaging,
+                name if name.starts_with("tokio") => &mut counted.serving,
+                _ => continue,
+            };
+            // Nanoseconds on a processor come first.
+            let text = fs::read_to_string(task.path().join("schedstat")).unwrap_or_default();
+            *kind += text.split(' ').next().and_then(|time| time.parse::<f64>().ok()).unwrap_or_default() / 1e9;
+        }
+        counted
+    }
+
+    /// Usage since `before`, which was `time` ago.
+    pub fn since(&self, before: &Self, time: Duration) -> Usage {
+        let share = |now: f64, then: f64| (now - then) / time.as_secs_f64() * 100.0;
+        Usage {
+            control: share(self.control, before.control),
+            imaging: share(self.imaging, before.imaging),
+            serving: share(self.serving, before.serving),
+            resident_mb: self.resident_mb,
+        }
+    }
+}
+
+fn resident_mb(process: u32) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap_or_default();
+    line.split_whitespace().next().and_then(|kb| kb.parse::<u64>().ok()).unwrap_or_default() / 1024
+}
+
+/// A picture for the footage camera, whose window shows three quarters of it, 512 by 272: with as much detail as makes a
+/// JPEG of about 30 KB.
+pub fn picture(folder: &TempDir) -> String {
+    let (width, height) = (683, 363);
+    let picture = image::RgbImage::from_fn(width, height, |x, y| {
+        let (u, v) = (f64::from(x), f64::from(y));
+        let waves = (u / 3.1).sin() * (v / 2.7).cos() + ((u + v) / 9.0).sin() + ((u - 2.0 * v) / 23.0).cos();
+        let shade = |offset: f64| (128.0 + 35.0 * (waves + (waves * 1.7 + offset).sin())) as u8;
+        image::Rgb([shade(0.0), shade(1.0), shade(2.0)])
+    });
+    let path = folder.path().join("picture.png");
+    picture.save(&path).expect("a picture");
+    format!("footage:{}", path.display())
+}

@@ -1,0 +1,41 @@
+//! A viewer that draws at once: acknowledges each frame as soon as it is there.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use futures_util::{SinkExt, StreamExt};
+use parfocal::clock::{Clock, SystemClock};
+use tokio_tungstenite::connect_async;
+use tokio_tungstenite::tungstenite::Message;
+
+/// A frame that arrived.
+pub struct Seen {
+    /// Its number.
+    pub frame: u64,
+    /// When it was complete, monotonic nanoseconds.
+    pub at: u64,
+    /// Bytes of its message.
+    pub bytes: usize,
+}
+
+/// Watches for `time`.
+pub async fn watch(address: SocketAddr, time: Duration) -> Vec<Seen> {
+    let (mut socket, _) = connect_async(format!("ws://{address}/live?role=operator")).await.expect("the stream");
+    let mut seen = Vec::new();
+    let end = tokio::time::Instant::now() + time;
+    while let Ok(Some(Ok(message))) = tokio::time::timeout_at(end, socket.next()).await {
+        let Message::Binary(message) = message else { continue };
+        let at = SystemClock.now().as_nanos();
+        let frame = number(&message);
+        seen.push(Seen { frame, at, bytes: message.len() });
+        let drawn = format!("{{\"type\":\"drawn\",\"frame\":{frame}}}");
+        socket.send(Message::text(drawn)).await.expect("the stream");
+    }
+    seen
+}
+
+fn number(message: &[u8]) -> u64 {
+    let length = usize::from(u16::from_le_bytes([message[0], message[1]]));
+    let header: serde_json::Value = serde_json::from_slice(&message[2..2 + length]).expect("a header");
+    header["frame"].as_u64().expect("a number")
+}

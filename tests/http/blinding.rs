@@ -1,0 +1,162 @@
+//! Blinding: a whole session as the surgeon's browser gets it, every byte of it read.
+
+use std::collections::{BTreeSet, HashSet};
+
+use reqwest::{Method, StatusCode};
+use serde_json::{Value, json};
+
+use crate::live::{Heard, Page};
+use crate::support::{Server, client};
+
+/// What would tell a policy, or how one works.
+const TELLING: [&str; 10] =
+    ["polic", "fixed", "climber", "learned", "mgm", "mlr", "cnn", "metric", "asked", "measured"];
+
+/// A session in the hands of its operator and its surgeon.
+struct Session<'a> {
+    server: &'a Server,
+    /// All that was sent to the surgeon's browser, but pictures.
+    heard: Vec<String>,
+    segments: Vec<String>,
+    keys: u32,
+}
+
+impl Session<'_> {
+    async fn ask(&self, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
+        let request = client().request(method, self.server.url(path)).bearer_auth(self.server.key(role)).json(body);
+        let response = request.send().await.unwrap();
+        (response.status(), format!("{:?} ", response.headers()) + &response.text().await.unwrap())
+    }
+
+    async fn operator(&self, path: &str, body: Value) {
+        let (status, said) = self.ask("operator", Method::POST, path, &body).await;
+        assert!(status.is_success(), "{path}: {status} {said}");
+    }
+
+    async fn surgeon(&mut self, path: &str, body: Value) {
+        let (status, said) = self.ask("surgeon", Method::POST, path, &body).await;
+        assert!(status.is_success(), "{path} {body}: {status} {said}");
+        self.heard.push(said);
+    }
+
+    async fn view(&mut self) -> Value {
+        let (_, said) = self.ask("surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
+        let view = serde_json::from_str(said.split_once("} ").unwrap().1).unwrap();
+        self.heard.push(said);
+        view
+    }
+
+    /// A key no other request has.
+    fn key(&mut self) -> String {
+        self.keys += 1;
+        format!("00000000-0000-4000-8000-{:012}", self.keys)
+    }
+
+    async fn inspect(&mut self, page: &mut Page) {
+        let view = self.view().await;
+        let segment = view["segment"].as_str().expect("a segment").to_owned();
+        let act = |action: &str| json!({"session": view["session"], "action": action, "segment": segment});
+        self.surgeon("/api/surgeon/actions", act("acknowledge")).await;
+        page.watch(5).await;
+        let comment = json!({"key": self.key(), "session": view["session"], "segment": segment, "frame": 1,
+            "client_millis": 0, "kind": "text", "text": "as sharp as before"});
+        self.surgeon("/api/surgeon/comments", comment).await;
+        self.surgeon("/api/surgeon/actions", act("finish-segment")).await;
+        self.segments.push(segment);
+    }
+
+    /// Answers what is asked, if anything is.
+    async fn answer(&mut self) {
+        let view = self.view().await;
+        let segment = if view["phase"] == "questions" { view["segment"].clone() } else { Value::Null };
+        for question in view["questions"].as_array().unwrap() {
+            let value = match question["kind"].as_str().unwrap() {
+                "likert" => json!(3),
+                "ranking" => json!((1..=view["settings"].as_u64().unwrap()).collect::<Vec<_>>()),
+                "sus" => json!(vec![3; 10]),
+                _ => json!("nothing to add"),
+            };
+            let answer = json!({"key": self.key(), "session": view["session"], "segment": segment,
+                "question": question["id"], "value": value});
+            self.surgeon("/api/surgeon/answers", answer).await;
+        }
+        let done = json!({"session": view["session"], "action": "finish-questions", "segment": segment});
+        self.surgeon("/api/surgeon/actions", done).await;
+    }
+}
+
+#[tokio::test]
+async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
+    let server = Server::start();
+    let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
+    let mut page = Page::open(&server, "surgeon").await;
+    session.operator("/api/operator/participants", json!({"code": "S01"})).await;
+    session.operator("/api/operator/sessions", json!({"participant": "S01", "protocol": "paper"})).await;
+    let id = session.view().await["session"].clone();
+    session.operator("/api/operator/actions", json!({"session": id, "action": "start"})).await;
+    let settings = session.view().await["settings"].as_u64().unwrap();
+    for _ in 0..settings {
+        session.inspect(&mut page).await;
+        session.answer().await;
+    }
+    assert_eq!(session.view().await["phase"], "closing");
+    session.answer().await;
+    assert_eq!(session.view().await["phase"], "completed");
+    page.sent_so_far().await;
+
+    let distinct: HashSet<_> = session.segments.iter().collect();
+    assert_eq!(distinct.len(), 6, "no two segments share an id");
+    let (_, html) = session.ask("surgeon", Method::GET, "/surgeon", &Value::Null).await;
+    session.heard.push(html);
+    let mut forms = BTreeSet::new();
+    for message in page.heard {
+        match message {
+            Heard::Text(text) => session.heard.push(text),
+            Heard::Frame(header) => {
+                forms.insert(form(&header));
+                session.heard.push(header.to_string());
+            }
+        }
+    }
+    // With and without a content area: nothing else varies.
+    assert!(forms.len() <= 2, "{forms:?}");
+    assert!(session.heard.len() > 60);
+    for heard in &session.heard {
+        let heard = heard.to_lowercase();
+        for telling in TELLING {
+            // The name of a header that every response has.
+            let heard = heard.replace("content-security-policy", "").replace("referrer-policy", "");
+            let heard = heard.replace("cross-origin-resource-policy", "");
+            assert!(!heard.contains(telling), "'{telling}' in {heard}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn during_a_session_the_operator_is_not_told_the_policy_either() {
+    let server = Server::start();
+    let session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
+    session.operator("/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
+    let mut page = Page::open(&server, "operator").await;
+    page.until(|told| told["policy"] == "mgm-hill-climber").await;
+    session.operator("/api/operator/participants", json!({"code": "S01"})).await;
+    session.operator("/api/operator/sessions", json!({"participant": "S01", "protocol": "paper"})).await;
+    page.until(|told| told["type"] == "session" && !told["view"].is_null()).await;
+    page.until(|told| told["type"] == "status" && told["policy"].is_null()).await;
+    page.heard.clear();
+    page.watch(5).await;
+    let told: Vec<_> = page.heard.iter().map(|message| format!("{message:?}")).collect();
+    assert!(told.iter().all(|told| !told.contains("climber")), "{told:?}");
+}
+
+/// The names of all fields, and whether there is a content area.
+fn form(header: &Value) -> String {
+    match header {
+        Value::Object(fields) => {
+            let fields: Vec<_> = fields.iter().map(|(name, value)| format!("{name}:{}", form(value))).collect();
+            fields.join(";")
+        }
+        Value::Null => "none".into(),
+        _ => String::new(),
+    }
+}
