@@ -101,7 +101,6 @@ export function composer(outbox, now) {
 
   outbox.addEventListener("change", ({ detail: { entry, state, reason } }) => {
     if (entry.path !== PATH) return;
-    if (state === "saved") kept += 1;
     if (state === "refused") refused(entry, reason);
     drawState();
   });

@@ -12,6 +12,7 @@ let policies = [];
 let withPath = unblinded === "true";
 let point = () => {};
 let lines = [];
+let chosen = null;
 
 async function load() {
   try {
@@ -35,6 +36,7 @@ function listComments() {
 }
 
 function choose(index) {
+  chosen = index;
   point(index);
   lines.forEach((line, other) => (other === index ? line.setAttribute("aria-current", "true") : line.removeAttribute("aria-current")));
   lines[index].scrollIntoView({ block: "nearest" });
@@ -42,12 +44,13 @@ function choose(index) {
 
 function draw() {
   point = drawTimeline(byId("timeline"), timeline, { withPath, policies, choose });
+  if (chosen !== null) point(chosen);
 }
 
 function unblind() {
   askReason({
     heading: ended === "true" ? "Unblind this session" : "Emergency unblinding",
-    consequence: data.ended
+    consequence: ended === "true"
       ? "You and everyone with this page will see which policy ran in which setting. This cannot be undone, and stands in the audit trail and in every export."
       : "The session is still under way. Unblinding now is an emergency measure: it is marked as such for good, in the audit trail and in every export. The surgeon’s and operator’s pages still do not show the policies.",
     go: ended === "true" ? "Unblind" : "Unblind now",

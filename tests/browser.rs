@@ -1,0 +1,24 @@
+//! A whole blinded trial in real browsers on the real server, as surgeon, operator and researcher do it; what reached the
+//! surgeon's browser; and a server killed again and again.
+
+#[allow(dead_code, reason = "shared with other tests")]
+mod support;
+
+#[path = "browser/blinding.rs"]
+mod blinding;
+#[path = "browser/killed.rs"]
+mod killed;
+#[path = "browser/proxy.rs"]
+mod proxy;
+#[path = "browser/screenshots.rs"]
+mod screenshots;
+#[path = "browser/theatre.rs"]
+mod theatre;
+#[path = "browser/trial.rs"]
+mod trial;
+#[path = "browser/wait.rs"]
+mod wait;
+#[path = "browser/webdriver.rs"]
+mod webdriver;
+#[path = "browser/wire.rs"]
+mod wire;

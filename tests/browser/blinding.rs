@@ -1,0 +1,186 @@
+//! Reads every byte that the surgeon's browser received and looks for anything that could tell which policy ran. Only
+//! pixels are left out: the picture is what the surgeon is to judge.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::proxy::Connection;
+use crate::wire::{Received, take_apart};
+
+/// Names of policies, and words that only someone who knows the policy would use.
+const TELLING: [&str; 16] = [
+    "fixed",
+    "hill-climber",
+    "hill_climber",
+    "mgm",
+    "mlr",
+    "cnn",
+    "learned",
+    "policy",
+    "policies",
+    "metric",
+    "focal_power",
+    "focal power",
+    "asked",
+    "measured",
+    "schedule",
+    "seed",
+];
+
+/// Every key of JSON that a surgeon's browser may receive.
+const KEYS: [&str; 41] = [
+    "age",
+    "answers",
+    "area",
+    "camera_simulated",
+    "comments",
+    "error",
+    "estimated",
+    "frame",
+    "height",
+    "high",
+    "id",
+    "kind",
+    "lens_simulated",
+    "low",
+    "may_resume",
+    "notice",
+    "optional",
+    "patch",
+    "paused",
+    "phase",
+    "points",
+    "practice",
+    "prompt",
+    "questions",
+    "quick_comments",
+    "radius",
+    "remaining_seconds",
+    "segment",
+    "session",
+    "setting",
+    "settings",
+    "text",
+    "title",
+    "type",
+    "view",
+    "width",
+    "x",
+    "y",
+    "preference",
+    "remarks",
+    "sharpness",
+];
+/// Ids of questions are keys too, where answers are told.
+const QUESTION_IDS: [&str; 2] = ["usability", "closing-remarks"];
+
+/// What the check has seen, so that it can be seen to have looked.
+#[derive(Debug, Default)]
+pub struct Seen {
+    /// Pages, JSON answers, messages and picture headers searched.
+    pub texts: usize,
+    /// Static files compared.
+    pub files: BTreeSet<String>,
+    /// Pictures, whose headers were searched.
+    pub pictures: usize,
+    /// The id of each setting's segment.
+    pub segments: BTreeMap<u64, BTreeSet<String>>,
+    /// What a surgeon is told while inspecting, without what differs from moment to moment.
+    inspecting: BTreeSet<String>,
+}
+
+/// Checks everything on `connections`; panics at what tells.
+pub fn check(connections: &[Connection]) -> Seen {
+    let mut seen = Seen::default();
+    for received in connections.iter().flat_map(take_apart) {
+        match received {
+            Received::Answer { path, head, body } => answer(&mut seen, &path, &head, &body),
+            Received::Text(text) => json(&mut seen, &text),
+            Received::Binary(message) => {
+                seen.pictures += 1;
+                let length = usize::from(u16::from_le_bytes([message[0], message[1]]));
+                // A picture cut off by a killed server may lack the end of its header.
+                if let Some(header) = message.get(2..2 + length) {
+                    json(&mut seen, std::str::from_utf8(header).unwrap());
+                    assert!(message[2 + length..].is_empty() || message[2 + length..].starts_with(&[0xff, 0xd8]));
+                }
+            }
+        }
+    }
+    let ids: Vec<_> = seen.segments.values().flatten().collect();
+    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), ids.len(), "two settings share an id: {:?}", seen.segments);
+    assert!(seen.segments.values().all(|ids| ids.len() == 1), "a setting changed its id: {:?}", seen.segments);
+    assert!(seen.inspecting.len() <= 1, "settings are told differently: {:#?}", seen.inspecting);
+    seen
+}
+
+fn answer(seen: &mut Seen, path: &str, head: &str, body: &[u8]) {
+    let told = head.lines().filter(|line| !line.to_ascii_lowercase().starts_with("sec-websocket-accept"));
+    let told = told.collect::<Vec<_>>().join("\n").to_ascii_lowercase();
+    search(path, &told.replace("-policy", ""));
+    let kind = told.lines().find_map(|line| line.strip_prefix("content-type: ")).unwrap_or_default();
+    if let Some((_, name)) = path.strip_prefix("/static/").and_then(|path| path.split_once('/')) {
+        file(seen, name, body);
+    } else if kind.starts_with("application/json") {
+        json(seen, std::str::from_utf8(body).unwrap());
+    } else {
+        seen.texts += 1;
+        search(path, &String::from_utf8_lossy(body).to_ascii_lowercase());
+    }
+}
+
+/// A static file is the same whatever runs if it is the file of the repository.
+fn file(seen: &mut Seen, name: &str, body: &[u8]) {
+    if body.is_empty() {
+        return; // kept by the browser from before: 304
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("web/static").join(name);
+    assert!(std::fs::read(file).unwrap() == body, "{name} is not the file of the repository");
+    seen.files.insert(name.to_owned());
+}
+
+fn json(seen: &mut Seen, text: &str) {
+    // Cut off where the server was killed.
+    let Ok(value) = serde_json::from_str::<Value>(text) else {
+        return search("cut-off message", &text.to_ascii_lowercase());
+    };
+    seen.texts += 1;
+    search("JSON", &text.to_ascii_lowercase());
+    keys(&value);
+    let view = if value.get("view").is_some() { &value["view"] } else { &value };
+    if let (Some(setting), Some(segment)) = (view["setting"].as_u64(), view["segment"].as_str()) {
+        seen.segments.entry(setting).or_default().insert(segment.to_owned());
+    }
+    if view["phase"] == "inspecting" {
+        let mut form = view.clone();
+        for changing in ["setting", "segment", "remaining_seconds", "comments", "prompt", "paused", "may_resume"] {
+            form[changing] = Value::Null;
+        }
+        seen.inspecting.insert(form.to_string());
+    }
+}
+
+fn keys(value: &Value) {
+    match value {
+        Value::Object(members) => {
+            for (key, value) in members {
+                let known = KEYS.contains(&key.as_str()) || QUESTION_IDS.contains(&key.as_str());
+                assert!(known, "the key '{key}' is not among those that a surgeon's browser may receive");
+                keys(value);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(keys),
+        _ => {}
+    }
+}
+
+fn search(place: &str, text: &str) {
+    for word in TELLING {
+        if let Some(at) = text.find(word) {
+            let around: String = text.chars().skip(at.saturating_sub(60)).take(140).collect();
+            panic!("'{word}' reached the surgeon's browser in {place}: …{around}…");
+        }
+    }
+}

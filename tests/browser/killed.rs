@@ -1,0 +1,112 @@
+//! A server killed, as by a power cut, right after it acknowledged a comment, at every point of a session: it goes on at
+//! the same place, and nothing acknowledged is lost.
+
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+use uuid::Uuid;
+
+use crate::support::{Server, client};
+use crate::theatre;
+
+/// The surgeon's and the operator's programs.
+struct Trial {
+    server: Server,
+    session: String,
+    acknowledged: Vec<String>,
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_killed_server_loses_nothing_that_it_acknowledged() {
+    let mut trial = Trial::begin().await;
+    for number in 1..=2 {
+        trial.say_and_kill("notice", number).await;
+        trial.act(json!({ "action": "acknowledge" })).await;
+        trial.say_and_kill("inspecting", number).await;
+        trial.act(json!({ "action": "finish-segment" })).await;
+        trial.answer("sharpness", json!(4)).await;
+        trial.say_and_kill("questions", number).await;
+        let view = trial.view().await;
+        assert_eq!(view["answers"]["sharpness"], 4, "the answer is still there");
+        trial.act(json!({ "action": "finish-questions" })).await;
+    }
+    for number in 3..=6 {
+        assert_eq!(trial.view().await["setting"], number);
+        trial.act(json!({ "action": "acknowledge" })).await;
+        trial.act(json!({ "action": "finish-segment" })).await;
+        trial.answer("sharpness", json!(4)).await;
+        trial.act(json!({ "action": "finish-questions" })).await;
+    }
+    trial.say_and_kill("closing", 6).await;
+    assert_eq!(trial.kept().await, trial.acknowledged);
+}
+
+impl Trial {
+    async fn begin() -> Self {
+        let server = theatre::server();
+        let mut trial = Self { server, session: String::new(), acknowledged: Vec::new() };
+        trial.post("operator", "participants", json!({ "code": "S-02" })).await;
+        let made = trial.post("operator", "sessions", json!({ "participant": "S-02", "protocol": "short" })).await;
+        trial.session = made["session"].as_str().unwrap().to_owned();
+        trial.post("operator", "actions", json!({ "session": trial.session, "action": "start" })).await;
+        trial
+    }
+
+    /// A comment, the server's word that it is kept, and the power cut; then the same place as before.
+    async fn say_and_kill(&mut self, phase: &str, setting: u64) {
+        let before = self.view().await;
+        assert_eq!((before["phase"].as_str(), before["setting"].as_u64()), (Some(phase), Some(setting)));
+        let text = format!("{phase} {setting}");
+        let comment = json!({
+            "key": Uuid::from_u128(0x4000_8000 << 64 | self.acknowledged.len() as u128),
+            "session": self.session, "segment": before["segment"], "kind": "text", "text": text,
+        });
+        self.post("surgeon", "comments", comment.clone()).await;
+        self.acknowledged.push(text);
+        theatre::kill(&mut self.server);
+        theatre::start_again(&mut self.server);
+        // A tablet that never got the answer sends it again.
+        self.post("surgeon", "comments", comment).await;
+        let after = self.view().await;
+        assert_eq!((&after["phase"], &after["segment"]), (&before["phase"], &before["segment"]));
+        assert_eq!((&after["paused"], &after["may_resume"]), (&json!(true), &json!(true)));
+        self.act(json!({ "action": "resume" })).await;
+    }
+
+    async fn view(&self) -> Value {
+        let request = client().get(self.server.url("/api/surgeon/session")).bearer_auth(self.server.key("surgeon"));
+        request.send().await.unwrap().json().await.unwrap()
+    }
+
+    /// The surgeon acts on what is under way.
+    async fn act(&self, mut action: Value) {
+        action["session"] = json!(self.session);
+        action["segment"] = self.view().await["segment"].clone();
+        self.post("surgeon", "actions", action).await;
+    }
+
+    async fn answer(&self, question: &str, value: Value) {
+        let segment = self.view().await["segment"].clone();
+        let key = Uuid::parse_str(segment.as_str().unwrap()).unwrap();
+        let answer =
+            json!({ "key": key, "session": self.session, "segment": segment, "question": question, "value": value });
+        self.post("surgeon", "answers", answer).await;
+    }
+
+    async fn post(&self, role: &str, what: &str, body: Value) -> Value {
+        let request = client().post(self.server.url(&format!("/api/{role}/{what}"))).bearer_auth(self.server.key(role));
+        let answer = request.json(&body).send().await.unwrap();
+        let (status, text) = (answer.status(), answer.text().await.unwrap());
+        assert!(status.is_success(), "{what} {body}: {status} {text}");
+        if status == StatusCode::NO_CONTENT { Value::Null } else { serde_json::from_str(&text).unwrap() }
+    }
+
+    /// The comments in the database.
+    async fn kept(&self) -> Vec<String> {
+        let file = self.server.data.path().join("parfocal.db");
+        let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+        let comments = sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
+        pool.close().await;
+        comments
+    }
+}

@@ -1,0 +1,70 @@
+//! A TCP proxy that keeps every byte that the server sends to the browser, and what it was asked for.
+
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
+
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+
+/// One connection's bytes.
+#[derive(Debug, Clone, Default)]
+pub struct Connection {
+    /// From the browser.
+    pub asked: Vec<u8>,
+    /// From the server.
+    pub answered: Vec<u8>,
+}
+
+type Recording = Arc<Mutex<Connection>>;
+
+/// A proxy to one server.
+pub struct Proxy {
+    /// Where the browser finds it.
+    pub address: SocketAddr,
+    recordings: Arc<Mutex<Vec<Recording>>>,
+}
+
+impl Proxy {
+    /// A proxy to `server`, which may come and go.
+    pub async fn to(server: SocketAddr) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let recordings = Arc::<Mutex<Vec<Recording>>>::default();
+        let all = Arc::clone(&recordings);
+        tokio::spawn(async move {
+            while let Ok((browser, _)) = listener.accept().await {
+                let recording = Recording::default();
+                all.lock().unwrap().push(Arc::clone(&recording));
+                tokio::spawn(pass(browser, server, recording));
+            }
+        });
+        Self { address, recordings }
+    }
+
+    /// Everything so far, a connection each.
+    pub fn recorded(&self) -> Vec<Connection> {
+        self.recordings.lock().unwrap().iter().map(|recording| recording.lock().unwrap().clone()).collect()
+    }
+}
+
+async fn pass(browser: TcpStream, server: SocketAddr, recording: Recording) {
+    // While the server is down its port refuses: the browser's connection just closes.
+    let Ok(server) = TcpStream::connect(server).await else { return };
+    let (from_browser, to_browser) = browser.into_split();
+    let (from_server, to_server) = server.into_split();
+    tokio::join!(
+        copy(from_browser, to_server, |bytes| recording.lock().unwrap().asked.extend_from_slice(bytes)),
+        copy(from_server, to_browser, |bytes| recording.lock().unwrap().answered.extend_from_slice(bytes)),
+    );
+}
+
+async fn copy(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + Unpin, keep: impl Fn(&[u8])) {
+    let mut buffer = vec![0; 64 * 1024];
+    while let Ok(length @ 1..) = from.read(&mut buffer).await {
+        keep(&buffer[..length]);
+        if to.write_all(&buffer[..length]).await.is_err() {
+            break;
+        }
+    }
+    let _ = to.shutdown().await;
+}

@@ -1,0 +1,117 @@
+//! The stage of a trial: the server, the surgeon's browser behind the recording proxy, and the operator's browser; and
+//! what each of them does there.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use rustix::process::Signal;
+use serde_json::json;
+use tempfile::TempDir;
+
+use crate::proxy::Proxy;
+use crate::support::Server;
+use crate::wait::until;
+use crate::webdriver::{Browser, Driver};
+
+/// Server and browsers.
+pub struct Theatre<'a> {
+    /// The server.
+    pub server: Server,
+    /// What the surgeon's browser receives goes through here.
+    pub proxy: Proxy,
+    /// The surgeon's browser.
+    pub surgeon: Browser<'a>,
+    /// The operator's browser.
+    pub operator: Browser<'a>,
+}
+
+/// A server on the phantom and the simulated lens, with the test's protocol.
+pub fn server() -> Server {
+    start(Arc::new(tempfile::tempdir().unwrap()), "127.0.0.1:0")
+}
+
+fn start(data: Arc<TempDir>, address: &str) -> Server {
+    let protocols = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser");
+    // Few frames: the camera and two browsers share the machine.
+    Server::on(data, &["--bind", address, "--fps", "10", "--protocols", protocols.to_str().unwrap()])
+}
+
+/// Ends `server` as a power cut would.
+pub fn kill(server: &mut Server) {
+    assert!(!server.end(Signal::KILL));
+}
+
+/// Starts `server` again, on the same data and address.
+pub fn start_again(server: &mut Server) {
+    *server = start(Arc::clone(&server.data), &server.address.to_string());
+}
+
+impl<'a> Theatre<'a> {
+    /// Opens the theatre: both are let in by their links.
+    pub async fn open(driver: &'a Driver) -> Self {
+        let server = server();
+        let proxy = Proxy::to(server.address).await;
+        let (surgeon, operator) = tokio::join!(driver.browser(), driver.browser());
+        surgeon.open(&format!("http://{}/enter?key={}", proxy.address, server.key("surgeon"))).await;
+        operator.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+        Self { server, proxy, surgeon, operator }
+    }
+
+    /// The surgeon taps the notice of setting `number`: once it is there, and as often as it takes to be meant.
+    pub async fn tap_notice(&self, number: usize) {
+        let title = format!("Setting {number} of 6");
+        self.surgeon.sees("#change-title", &title).await;
+        until("the notice to take the tap", || async {
+            self.surgeon.try_click("#change-tap").await;
+            self.surgeon.text("#change-title").await != title
+        })
+        .await;
+        self.surgeon.sees("#setting", &title).await;
+        self.surgeon.sees("#remaining", "left").await;
+    }
+
+    /// The surgeon writes `text` into the comment box, at its end.
+    pub async fn write(&self, text: &str) {
+        self.surgeon.click("#comment").await;
+        self.surgeon.tools("Input.insertText", json!({ "text": text })).await;
+    }
+
+    /// The surgeon writes a comment, presses Enter and sees it saved as the `total`th.
+    pub async fn say(&self, text: &str, total: usize) {
+        self.write(text).await;
+        self.surgeon.type_into("#comment", "\u{e007}").await;
+        self.sees_saved(total).await;
+    }
+
+    /// Waits until the surgeon sees `total` comments saved.
+    pub async fn sees_saved(&self, total: usize) {
+        let told = if total == 1 { "1 comment saved".to_owned() } else { format!("{total} comments saved") };
+        self.surgeon.sees("#comment-state", &told).await;
+    }
+
+    /// What stands in the comment box.
+    pub async fn comment_box(&self) -> String {
+        let value = self.surgeon.run("return document.getElementById('comment').value", json!([])).await;
+        value.as_str().unwrap().to_owned()
+    }
+
+    /// The surgeon is done with the setting, answers `point` to its question, writes a remark, and goes on.
+    pub async fn finish_setting(&self, point: u8) {
+        self.surgeon.click("#finish").await;
+        self.answer_questions(point).await;
+    }
+
+    /// The surgeon answers the questions after a setting and goes on.
+    pub async fn answer_questions(&self, point: u8) {
+        self.surgeon.sees("#panel h2", "before the next one").await;
+        self.choose("sharpness", point).await;
+        self.surgeon.sees("[data-question=sharpness] > .state", "Saved").await;
+        self.surgeon.click(".questions .done button").await;
+        self.surgeon.sees_no("[data-question=sharpness]").await;
+    }
+
+    /// The surgeon chooses point `point` of the scale called `name`.
+    pub async fn choose(&self, name: &str, point: u8) {
+        self.surgeon.click(&format!("input[name='{name}'][value='{point}']")).await;
+    }
+}
