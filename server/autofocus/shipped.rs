@@ -30,19 +30,19 @@ const SHIPPED: [Shipped; 4] = [
         name: "mgm-learned",
         summary: "learned optimiser of the mean gradient magnitude",
         design: Design::Values(Sight::Mgm),
-        weights: None,
+        weights: Some(include_bytes!("../../policies/mgm-learned.safetensors")),
     },
     Shipped {
         name: "mlr-learned",
         summary: "learned optimiser of the mean local ratio",
         design: Design::Values(Sight::Mlr),
-        weights: None,
+        weights: Some(include_bytes!("../../policies/mlr-learned.safetensors")),
     },
     Shipped {
         name: "cnn-learned",
         summary: "learned end to end from the last eight patches",
         design: Design::Values(Sight::Patch),
-        weights: None,
+        weights: Some(include_bytes!("../../policies/cnn-learned.safetensors")),
     },
     Shipped {
         name: "parfocal",
