@@ -136,14 +136,15 @@ impl<'a> Keys<'a> {
 
     fn references(&mut self, calibration: &mut Calibration) -> Result<(), CalibrationError> {
         let most = calibration.full_scale();
+        // White must be a count above dark at least: a smaller span would blow noise up without bound.
         let dark = self.counts("dark", |dark| {
-            let holds = dark.iter().all(|count| (0.0..most).contains(count));
-            check(holds, &format!("every count must be at least 0 and below {most}"))
+            let holds = dark.iter().all(|count| (0.0..=most - 1.0).contains(count));
+            check(holds, &format!("every count must be between 0 and {}", most - 1.0))
         })?;
         let dark = dark.unwrap_or(calibration.dark.band_means());
         let white = self.counts("white", |white| {
-            let holds = white.iter().zip(&dark).all(|(white, dark)| white > dark && *white <= most);
-            check(holds, &format!("every count must be above that band's dark and at most {most}"))
+            let holds = white.iter().zip(&dark).all(|(white, dark)| (dark + 1.0..=most).contains(white));
+            check(holds, &format!("every count must be above that band's dark by 1 or more, and at most {most}"))
         })?;
         calibration.dark = Reference::PerBand(dark);
         if let Some(white) = white {
@@ -227,7 +228,8 @@ mod tests {
             message("dark = 900\nwhite = 800")
                 .starts_with("line 2, key 'white': every count must be above that band's dark")
         );
-        assert!(message("white = 2000").ends_with("dark and at most 1023"));
+        assert!(message("dark = 100\nwhite = 100.0001").contains("by 1 or more"));
+        assert!(message("white = 2000").ends_with("by 1 or more, and at most 1023"));
         assert!(message("name = 'a'\nwhtie = 1").starts_with("line 2, key 'whtie': is not a key"));
         assert!(message("centre_nm = [nan]").contains("key 'centre_nm'"));
         assert!(message("name = 'a'\n= 3").starts_with("line 2: "));
@@ -235,6 +237,6 @@ mod tests {
 
     #[test]
     fn a_dark_at_the_default_white_is_refused() {
-        assert_eq!(message("dark = 1023"), "line 1, key 'dark': every count must be at least 0 and below 1023");
+        assert_eq!(message("dark = 1023"), "line 1, key 'dark': every count must be between 0 and 1022");
     }
 }
