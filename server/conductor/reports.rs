@@ -10,7 +10,6 @@ use super::course::Course;
 use super::{ConductError, Conductor, ProtocolSummary, operator_only};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
-use crate::store::export::{self, ExportError};
 use crate::store::{Participant, PathPoint, Reader, SessionLine};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
@@ -240,20 +239,6 @@ impl Conductor {
             points: reader.focal_path(session, points).await?.into_iter().map(point).collect(),
             comments: comments.collect(),
         })
-    }
-
-    /// Session `session` as a ZIP file of the folder that `parfocal export` writes, and a name for it.
-    ///
-    /// # Errors
-    /// When there is no such session, it is asked for unblinded before it was, or disk or database failed.
-    pub async fn export(&self, session: SessionId, unblinded: bool) -> Result<(String, Vec<u8>), ConductError> {
-        let archive = export::export_zip(self.shared.store.reader(), session, unblinded).await;
-        let archive = archive.map_err(|error| match error {
-            ExportError::NoSession { .. } => ConductError::NotFound(error.to_string()),
-            ExportError::StillBlinded(_) => ConductError::Conflict(error.to_string()),
-            _ => ConductError::Storage(error.to_string()),
-        })?;
-        Ok((format!("{}.zip", export::folder_name(session, unblinded)), archive))
     }
 
     async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
