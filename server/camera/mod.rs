@@ -1,6 +1,9 @@
 //! Cameras: where frames come from. Knows no policy.
 
+mod controls;
 pub mod footage;
+#[cfg(feature = "aravis")]
+pub mod gige;
 mod pace;
 mod path;
 pub mod phantom;
@@ -8,6 +11,7 @@ mod pool;
 mod spec;
 pub mod walk;
 
+pub use controls::{Adjustable, ControlError, Controls, Setting};
 pub use pace::Pace;
 pub use pool::MosaicPool;
 pub use spec::{CameraSettings, open};
@@ -35,6 +39,11 @@ pub trait Camera: Send {
 
     /// What the camera is, and how it does.
     fn health(&self) -> CameraHealth;
+
+    /// Its settings, where an operator can change any.
+    fn controls(&self) -> Option<Controls> {
+        None
+    }
 }
 
 /// One exposure.

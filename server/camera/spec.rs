@@ -33,9 +33,17 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
             Ok(camera) => Ok(Box::new(camera)),
             Err(error) => Err(CameraError::BadSource(error.to_string())),
         },
+        #[cfg(feature = "aravis")]
+        Some(("gige", source)) => Ok(Box::new(super::gige::GigeCamera::open(source, settings)?)),
+        #[cfg(not(feature = "aravis"))]
+        Some(("gige", _)) => Err(CameraError::BadSource(
+            "this build has no GigE Vision: install libaravis-dev and libusb-1.0-0-dev, then build it with \
+             `--features aravis`"
+                .into(),
+        )),
         _ => Err(CameraError::BadSource(format!(
-            "there is no camera `{spec}`; choose `phantom` (a simulated brain) or `footage:PATH` (a video, an image or \
-             a folder of images)"
+            "there is no camera `{spec}`; choose `phantom` (a simulated brain), `footage:PATH` (a video, an image or a \
+             folder of images) or `gige:ID` (`gige:list` says which there are)"
         ))),
     }
 }

@@ -1,0 +1,118 @@
+//! What an operator may change on a real camera while it runs: exposure, gain, frame rate.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde::{Deserialize, Serialize};
+
+/// A setting of a camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Setting {
+    /// Exposure time, microseconds.
+    Exposure,
+    /// Gain, in the camera's own units, usually decibel.
+    Gain,
+    /// Frames a second.
+    FrameRate,
+}
+
+impl Setting {
+    /// Every setting.
+    pub const ALL: [Self; 3] = [Self::Exposure, Self::Gain, Self::FrameRate];
+}
+
+/// A setting's value and the bounds that the camera gives for it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Adjustable {
+    /// Which.
+    pub setting: Setting,
+    /// As the camera has it.
+    pub value: f64,
+    /// Least value.
+    pub min: f64,
+    /// Greatest value.
+    pub max: f64,
+}
+
+/// A camera's settings, shared between the operator and the camera's thread. Clone freely; never blocks.
+#[derive(Debug, Clone, Default)]
+pub struct Controls(Arc<Mutex<Inner>>);
+
+#[derive(Debug, Default)]
+struct Inner {
+    available: Vec<Adjustable>,
+    wanted: Vec<(Setting, f64)>,
+}
+
+/// Why a setting cannot be changed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ControlError {
+    /// The camera is away, or does not have it.
+    #[error("the camera does not offer this setting now")]
+    NotOffered,
+    /// Outside the camera's bounds.
+    #[error("must be from {min} to {max}")]
+    OutOfBounds {
+        /// Least value.
+        min: f64,
+        /// Greatest value.
+        max: f64,
+    },
+}
+
+impl Controls {
+    /// Every setting that the camera offers now.
+    #[must_use]
+    pub fn available(&self) -> Vec<Adjustable> {
+        self.inner().available.clone()
+    }
+
+    /// Asks for `setting` to become `value`; the camera's thread does it before the next frame.
+    ///
+    /// # Errors
+    /// When the camera does not offer the setting, or not that value.
+    pub fn ask(&self, setting: Setting, value: f64) -> Result<(), ControlError> {
+        let mut inner = self.inner();
+        let offered = inner.available.iter().find(|one| one.setting == setting);
+        let &Adjustable { min, max, .. } = offered.ok_or(ControlError::NotOffered)?;
+        if !(min..=max).contains(&value) {
+            return Err(ControlError::OutOfBounds { min, max });
+        }
+        inner.wanted.retain(|(other, _)| *other != setting);
+        inner.wanted.push((setting, value));
+        Ok(())
+    }
+
+    /// The camera's side: what it offers now.
+    pub fn offer(&self, available: Vec<Adjustable>) {
+        self.inner().available = available;
+    }
+
+    /// The camera's side: takes what was asked for.
+    #[must_use]
+    pub fn take(&self) -> Vec<(Setting, f64)> {
+        std::mem::take(&mut self.inner().wanted)
+    }
+
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_offered_can_be_asked_and_the_last_word_counts() {
+        let controls = Controls::default();
+        assert_eq!(controls.ask(Setting::Gain, 1.0), Err(ControlError::NotOffered));
+        controls.offer(vec![Adjustable { setting: Setting::Gain, value: 0.0, min: 0.0, max: 24.0 }]);
+        assert_eq!(controls.ask(Setting::Gain, 25.0), Err(ControlError::OutOfBounds { min: 0.0, max: 24.0 }));
+        assert!(controls.ask(Setting::Gain, f64::NAN).is_err());
+        controls.ask(Setting::Gain, 3.0).unwrap();
+        controls.ask(Setting::Gain, 6.0).unwrap();
+        assert_eq!(controls.take(), [(Setting::Gain, 6.0)]);
+        assert!(controls.take().is_empty());
+    }
+}

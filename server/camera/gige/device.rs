@@ -1,0 +1,217 @@
+//! One connection to a camera: opened, set up, streaming.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use ::aravis::prelude::*;
+use ::aravis::{AcquisitionMode, Auto, Buffer, BufferStatus, Stream, glib};
+
+use super::pixels::PixelFormat;
+use crate::camera::{Adjustable, CameraError, Setting};
+use crate::imaging::CELL;
+use crate::options::{BadOptions, Options};
+
+/// Size of the sensor this program is made for.
+const SENSOR: (i32, i32) = (2048, 1088);
+/// Frames that may be under way between camera and thread.
+const BUFFERS: usize = 8;
+
+/// Which camera, and how it is to be set up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wanted {
+    /// Identity, or address.
+    pub id: String,
+    /// Pixel format, if not the best that the camera has.
+    format: Option<PixelFormat>,
+    width: Option<i32>,
+    height: Option<i32>,
+    /// Bytes of a GigE Vision packet, if they are not to be negotiated.
+    packet: Option<i32>,
+    fps: f64,
+}
+
+impl Wanted {
+    /// What `source` and `fps` ask for.
+    pub fn parse(source: &str, fps: f64) -> Result<Self, CameraError> {
+        let bad = |error: BadOptions| CameraError::BadSource(format!("camera gige: {error}"));
+        let (id, mut options) = Options::split(source).map_err(bad)?;
+        let wanted = Self {
+            id: id.to_owned(),
+            format: options.take("format").map_err(bad)?,
+            width: options.take("width").map_err(bad)?,
+            height: options.take("height").map_err(bad)?,
+            packet: options.take("packet").map_err(bad)?,
+            fps,
+        };
+        options.finish().map_err(bad)?;
+        Ok(wanted)
+    }
+}
+
+/// A camera that streams, until dropped.
+pub struct Device {
+    camera: ::aravis::Camera,
+    stream: Stream,
+    lost: Arc<AtomicBool>,
+    /// Maker and model.
+    pub name: String,
+    /// Whether it is Aravis's own fake camera.
+    pub fake: bool,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// How pixels come.
+    pub format: PixelFormat,
+    /// Bytes of a packet, on GigE Vision.
+    pub packet: Option<u32>,
+}
+
+/// Why a camera cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DeviceError {
+    /// Aravis says so.
+    #[error("{0}")]
+    Aravis(#[from] glib::Error),
+    /// Ours.
+    #[error("{0}")]
+    Unsuitable(String),
+}
+
+/// What came.
+pub enum Arrival {
+    /// A whole frame.
+    Whole(Buffer),
+    /// A frame with parts missing.
+    Incomplete(u64),
+    /// Nothing in time.
+    Nothing,
+}
+
+impl Device {
+    /// Connects to the camera that is wanted, sets it up and starts it.
+    pub fn open(wanted: &Wanted) -> Result<Self, DeviceError> {
+        let camera = ::aravis::Camera::new(Some(&wanted.id))?;
+        let (vendor, model) = (camera.vendor_name()?, camera.model_name()?);
+        let format = choose_format(&camera, wanted.format)?;
+        let (width, height) = set_region(&camera, wanted)?;
+        camera.set_acquisition_mode(AcquisitionMode::Continuous)?;
+        // A camera that cannot do one of these runs as it is: exposure and rate can still be set by hand.
+        let _ = camera.set_exposure_time_auto(Auto::Off);
+        let _ = camera.set_gain_auto(Auto::Off);
+        set_frame_rate(&camera, wanted.fps);
+        let packet = negotiate_packet(&camera, wanted.packet)?;
+        let stream = camera.create_stream()?;
+        let payload = usize::try_from(camera.payload()?).unwrap_or_default();
+        for _ in 0..BUFFERS {
+            stream.push_buffer(Buffer::new_allocate(payload));
+        }
+        let lost = Arc::new(AtomicBool::new(false));
+        if let Some(device) = camera.device() {
+            let noted = lost.clone();
+            device.connect_control_lost(move |_| noted.store(true, Ordering::Relaxed));
+        }
+        camera.start_acquisition()?;
+        let (name, fake) = (format!("{vendor} {model}"), vendor == "Aravis");
+        Ok(Self { camera, stream, lost, name, fake, width, height, format, packet })
+    }
+
+    /// Whether the camera has been noticed to be gone.
+    pub fn is_lost(&self) -> bool {
+        self.lost.load(Ordering::Relaxed)
+    }
+
+    /// Waits for what comes next. Give a whole frame's buffer back.
+    pub fn wait(&self, timeout: Duration) -> Arrival {
+        let micros = u64::try_from(timeout.as_micros()).unwrap_or(u64::MAX);
+        let Some(buffer) = self.stream.timeout_pop_buffer(micros) else { return Arrival::Nothing };
+        if buffer.status() == BufferStatus::Success {
+            return Arrival::Whole(buffer);
+        }
+        let number = buffer.frame_id();
+        self.give_back(buffer);
+        Arrival::Incomplete(number)
+    }
+
+    /// Lets the camera fill `buffer` again.
+    pub fn give_back(&self, buffer: Buffer) {
+        self.stream.push_buffer(buffer);
+    }
+
+    /// What the camera offers to change.
+    pub fn offers(&self) -> Vec<Adjustable> {
+        let offer = |setting| {
+            let (value, (min, max)) = match setting {
+                Setting::Exposure => (self.camera.exposure_time().ok()?, self.camera.exposure_time_bounds().ok()?),
+                Setting::Gain => (self.camera.gain().ok()?, self.camera.gain_bounds().ok()?),
+                Setting::FrameRate => (self.camera.frame_rate().ok()?, self.camera.frame_rate_bounds().ok()?),
+            };
+            Some(Adjustable { setting, value, min, max })
+        };
+        Setting::ALL.into_iter().filter_map(offer).collect()
+    }
+
+    /// Changes a setting.
+    pub fn change(&self, setting: Setting, value: f64) -> Result<(), DeviceError> {
+        match setting {
+            Setting::Exposure => self.camera.set_exposure_time(value)?,
+            Setting::Gain => self.camera.set_gain(value)?,
+            Setting::FrameRate => self.camera.set_frame_rate(value)?,
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        let _ = self.camera.stop_acquisition();
+    }
+}
+
+fn choose_format(camera: &::aravis::Camera, wanted: Option<PixelFormat>) -> Result<PixelFormat, DeviceError> {
+    let offered = camera.dup_available_pixel_formats_as_strings()?;
+    let has = |format: &PixelFormat| offered.iter().any(|name| name == format.name());
+    let chosen = wanted.map_or_else(|| PixelFormat::ALL.into_iter().find(has), |format| Some(format).filter(has));
+    let Some(format) = chosen else {
+        let wanted = wanted.map_or("any format that can be read".into(), |format| format.name().to_owned());
+        return Err(DeviceError::Unsuitable(format!("it does not offer {wanted}; it offers {}", offered.join(", "))));
+    };
+    camera.set_pixel_format_from_string(format.name())?;
+    Ok(format)
+}
+
+fn set_region(camera: &::aravis::Camera, wanted: &Wanted) -> Result<(usize, usize), DeviceError> {
+    let (width_most, height_most) = (camera.width_bounds()?.1, camera.height_bounds()?.1);
+    let width = wanted.width.unwrap_or(width_most.min(SENSOR.0));
+    let height = wanted.height.unwrap_or(height_most.min(SENSOR.1));
+    let fits = |side: i32, most: i32| side > 0 && side <= most && side % 4 == 0;
+    if !fits(width, width_most) || !fits(height, height_most) {
+        return Err(DeviceError::Unsuitable(format!(
+            "{width}x{height} cannot be used: sides must be multiples of {CELL}, at most {width_most}x{height_most}"
+        )));
+    }
+    camera.set_region(0, 0, width, height)?;
+    let (_, _, width, height) = camera.region()?;
+    Ok((usize::try_from(width).unwrap_or_default(), usize::try_from(height).unwrap_or_default()))
+}
+
+/// As near to `fps` as the camera comes.
+fn set_frame_rate(camera: &::aravis::Camera, fps: f64) {
+    let nearest = camera.frame_rate_bounds().map_or(fps, |(min, max)| fps.clamp(min, max.max(min)));
+    if let Err(error) = camera.set_frame_rate(nearest) {
+        tracing::warn!(%error, "the camera keeps its own frame rate");
+    }
+}
+
+/// Large packets cost less: Aravis finds the largest that come through.
+fn negotiate_packet(camera: &::aravis::Camera, wanted: Option<i32>) -> Result<Option<u32>, DeviceError> {
+    if !camera.is_gv_device() {
+        return Ok(None);
+    }
+    match wanted {
+        Some(bytes) => camera.gv_set_packet_size(bytes)?,
+        None => camera.gv_auto_packet_size()?,
+    }
+    Ok(Some(camera.gv_get_packet_size()?))
+}

@@ -1,0 +1,107 @@
+//! GigE Vision and USB3 Vision cameras, through Aravis.
+//!
+//! A thread of its own talks to the camera: it unpacks each frame to the sensor's mosaic, leaves the latest for
+//! [`Camera::next_frame`], and looks for the camera again when it is lost.
+
+mod device;
+mod pixels;
+mod timestamps;
+mod worker;
+
+use std::sync::{Arc, OnceLock};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ::aravis::Aravis;
+
+use self::device::{Device, Wanted};
+use self::worker::Shared;
+use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
+
+/// A machine vision camera.
+pub struct GigeCamera {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl GigeCamera {
+    /// Connects to the camera `source`: an identity as [`list`] gives it, or an address; with options `format` (a pixel
+    /// format), `width`, `height`, `packet` (bytes, instead of negotiating). `list` says which cameras there are.
+    ///
+    /// # Errors
+    /// [`CameraError::BadSource`] when it cannot be used right now; says why. Later failures heal by themselves.
+    pub fn open(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
+        let wanted = Wanted::parse(source, settings.fps)?;
+        if wanted.id == "list" {
+            return Err(CameraError::BadSource(listing()));
+        }
+        let device = Device::open(&wanted)
+            .map_err(|error| CameraError::BadSource(format!("{}: {error}; {}", wanted.id, listing())))?;
+        let shared = Arc::new(Shared::new(settings.clock, &device));
+        let theirs = shared.clone();
+        let thread = std::thread::Builder::new()
+            .name("gige".into())
+            .spawn(move || worker::run(&theirs, &wanted, device))
+            .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
+        Ok(Self { shared, thread: Some(thread) })
+    }
+}
+
+impl Camera for GigeCamera {
+    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
+        self.shared.next_frame(timeout)
+    }
+
+    fn health(&self) -> CameraHealth {
+        self.shared.health()
+    }
+
+    fn controls(&self) -> Option<Controls> {
+        Some(self.shared.controls.clone())
+    }
+}
+
+impl Drop for GigeCamera {
+    fn drop(&mut self) {
+        // A thread that is looking for a lost camera ends by itself within seconds; nobody need wait for that.
+        let streaming = self.shared.stop();
+        if let Some(thread) = self.thread.take().filter(|_| streaming) {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// A camera that can be opened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    /// What to name it by.
+    pub id: String,
+    /// Who made it, and which.
+    pub model: String,
+    /// Where it is.
+    pub address: String,
+}
+
+/// Every camera that answers, on every network interface and USB port. Takes about a second.
+#[must_use]
+pub fn list() -> Vec<Found> {
+    static ARAVIS: OnceLock<Option<std::sync::Mutex<Aravis>>> = OnceLock::new();
+    let aravis = ARAVIS.get_or_init(|| Aravis::initialize().ok().map(std::sync::Mutex::new));
+    let Some(aravis) = aravis else { return Vec::new() };
+    let devices = aravis.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_device_list();
+    let found = devices.into_iter().map(|device| Found {
+        id: device.id.to_string_lossy().into_owned(),
+        model: format!("{} {}", device.vendor.to_string_lossy(), device.model.to_string_lossy()),
+        address: device.address.to_string_lossy().into_owned(),
+    });
+    found.collect()
+}
+
+fn listing() -> String {
+    let found = list();
+    if found.is_empty() {
+        return "no camera answers: check power, cable and the network interface's address".into();
+    }
+    let one = |found: &Found| format!("gige:{} ({} at {})", found.id, found.model, found.address);
+    format!("cameras that answer: {}", found.iter().map(one).collect::<Vec<_>>().join(", "))
+}

@@ -1,0 +1,76 @@
+//! The camera's clock against ours.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use crate::clock::Moment;
+
+/// How far back arrivals are compared; a crystal's drift over that time is some tens of microseconds.
+const WINDOW: Duration = Duration::from_secs(4);
+
+/// Maps a camera's time stamps to the monotonic clock.
+///
+/// The first packet of a frame leaves the camera when its exposure has ended, and is then delayed by a varying time. The
+/// least difference between arrival and stamp over the last seconds is therefore that of a frame that was hardly
+/// delayed, and a stamp plus that difference is the end of its exposure without the jitter of network and machine.
+#[derive(Debug, Default)]
+pub struct Timestamps {
+    /// Stamp's arrival and difference, differences rising: the front is the least of the window.
+    differences: VecDeque<(Moment, i128)>,
+}
+
+impl Timestamps {
+    /// The moment that `stamp` (nanoseconds of the camera's clock) stands for, its frame having begun to arrive at
+    /// `arrived`. Never later than `arrived`; a camera without a clock gets `arrived`.
+    pub fn moment(&mut self, stamp: u64, arrived: Moment) -> Moment {
+        if stamp == 0 {
+            return arrived;
+        }
+        let difference = i128::from(arrived.as_nanos()) - i128::from(stamp);
+        while self.differences.back().is_some_and(|&(_, other)| other >= difference) {
+            self.differences.pop_back();
+        }
+        self.differences.push_back((arrived, difference));
+        while self.differences.front().is_some_and(|&(seen, _)| arrived.since(seen) > WINDOW) {
+            self.differences.pop_front();
+        }
+        let least = self.differences.front().map_or(difference, |&(_, least)| least);
+        Moment::from_nanos(u64::try_from(i128::from(stamp) + least).unwrap_or(0)).min(arrived)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MILLI: u64 = 1_000_000;
+
+    fn at(micros: u64) -> Moment {
+        Moment::from_nanos(micros * 1000)
+    }
+
+    #[test]
+    fn jitter_of_arrival_is_taken_out() {
+        let mut map = Timestamps::default();
+        // The camera's clock began 7 s before ours; packets take 0.1 ms, some 3 ms more.
+        let delays = [100, 3100, 100, 900, 2000, 100];
+        for (frame, delay) in (0_u64..).zip(delays) {
+            let stamp = 7000 * MILLI + frame * 20 * MILLI;
+            let seen = map.moment(stamp, at(frame * 20_000 + delay));
+            assert_eq!(seen, at(frame * 20_000 + 100), "frame {frame}");
+        }
+    }
+
+    #[test]
+    fn a_camera_clock_that_was_set_back_is_followed_within_the_window() {
+        let mut map = Timestamps::default();
+        map.moment(9000 * MILLI, at(1_000_000));
+        assert_eq!(map.moment(1000 * MILLI, at(1_020_000)), at(0), "at first the old difference rules");
+        assert_eq!(map.moment(5000 * MILLI, at(5_020_000)), at(5_020_000));
+    }
+
+    #[test]
+    fn without_a_clock_the_arrival_counts() {
+        assert_eq!(Timestamps::default().moment(0, at(5)), at(5));
+    }
+}

@@ -1,0 +1,294 @@
+//! The camera's thread: unpacks frames, counts those lost, changes settings, finds a lost camera again.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use ::aravis::Buffer;
+
+use super::device::{Arrival, Device, Wanted};
+use super::timestamps::Timestamps;
+use crate::camera::{CameraError, CameraHealth, Controls, Frame, FrameImage, MosaicPool};
+use crate::clock::{Clock, Moment};
+use crate::imaging::MosaicFrame;
+
+/// The thread looks at requests at least this often.
+const LOOK: Duration = Duration::from_millis(50);
+/// A camera that sends nothing for this long, beyond its exposure, is lost.
+const SILENCE: Duration = Duration::from_millis(1500);
+/// Between two attempts to find a lost camera.
+const RETRY: Duration = Duration::from_millis(300);
+/// GigE Vision counts frames from 1 to this, and then again from 1.
+const LAST_NUMBER: u64 = 65_535;
+
+/// What the thread and the caller share.
+pub struct Shared {
+    clock: Arc<dyn Clock>,
+    /// Settings.
+    pub controls: Controls,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+struct State {
+    frame: Option<Frame>,
+    name: Arc<str>,
+    fake: bool,
+    /// What is the case, in words; an error is trouble.
+    condition: Result<Arc<str>, Arc<str>>,
+    delivered: VecDeque<Moment>,
+    lost: u64,
+    stop: bool,
+}
+
+impl Shared {
+    /// For a camera that was just opened.
+    pub fn new(clock: Arc<dyn Clock>, device: &Device) -> Self {
+        let state = State {
+            frame: None,
+            name: Arc::from(device.name.as_str()),
+            fake: device.fake,
+            condition: Ok(words(device)),
+            delivered: VecDeque::new(),
+            lost: 0,
+            stop: false,
+        };
+        Self { clock, controls: Controls::default(), state: Mutex::new(state), changed: Condvar::new() }
+    }
+
+    /// Takes the latest frame, waiting for it at most `timeout`.
+    pub fn next_frame(&self, timeout: Duration) -> Result<Frame, CameraError> {
+        let (mut state, _) = self
+            .changed
+            .wait_timeout_while(self.state(), timeout, |state| state.frame.is_none())
+            .unwrap_or_else(PoisonError::into_inner);
+        match (state.frame.take(), &state.condition) {
+            (Some(frame), _) => Ok(frame),
+            (None, Ok(_)) => Err(CameraError::Timeout(timeout)),
+            (None, Err(trouble)) => Err(CameraError::Failed(trouble.to_string())),
+        }
+    }
+
+    /// How the camera does.
+    #[allow(clippy::cast_precision_loss, reason = "some hundred frames")]
+    pub fn health(&self) -> CameraHealth {
+        let now = self.clock.now();
+        let state = self.state();
+        let recent = state.delivered.iter().filter(|at| now.since(**at) < Duration::from_secs(1)).count();
+        let message = match &state.condition {
+            Ok(words) => words.clone(),
+            Err(trouble) => Arc::from(format!("{trouble}; looking for it again")),
+        };
+        CameraHealth {
+            name: state.name.clone(),
+            simulated: state.fake,
+            working: state.condition.is_ok(),
+            message,
+            fps: recent as f64,
+            lost: state.lost,
+        }
+    }
+
+    /// Tells the thread to end; whether it is busy with a camera.
+    pub fn stop(&self) -> bool {
+        let mut state = self.state();
+        state.stop = true;
+        self.changed.notify_all();
+        state.condition.is_ok()
+    }
+
+    fn stopping(&self) -> bool {
+        self.state().stop
+    }
+
+    /// Puts a frame up for taking; one that nobody took counts as lost.
+    fn deliver(&self, frame: Frame) {
+        let now = self.clock.now();
+        let mut state = self.state();
+        state.lost += u64::from(state.frame.replace(frame).is_some());
+        state.delivered.push_back(now);
+        while state.delivered.front().is_some_and(|&at| now.since(at) > Duration::from_secs(1)) {
+            state.delivered.pop_front();
+        }
+        self.changed.notify_all();
+    }
+
+    fn lose(&self, frames: u64) {
+        self.state().lost += frames;
+    }
+
+    fn set_condition(&self, condition: Result<Arc<str>, Arc<str>>) {
+        let mut state = self.state();
+        if let Err(trouble) = &condition
+            && state.condition.is_ok()
+        {
+            tracing::warn!(%trouble, "the camera is lost");
+        }
+        state.condition = condition;
+    }
+
+    /// Waits `time`, or until the thread is to end; whether it is.
+    fn stop_within(&self, time: Duration) -> bool {
+        let (state, _) = self
+            .changed
+            .wait_timeout_while(self.state(), time, |state| !state.stop)
+            .unwrap_or_else(PoisonError::into_inner);
+        state.stop
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Streams from `device`, and from the same camera opened anew when it is lost, until told to stop.
+pub fn run(shared: &Shared, wanted: &Wanted, device: Device) {
+    let mut number = 0;
+    let mut connected = Some(device);
+    while !shared.stopping() {
+        let trouble = match connected.take().map_or_else(|| Device::open(wanted), Ok) {
+            Ok(device) => {
+                shared.set_condition(Ok(words(&device)));
+                Session::new(shared, device, &mut number).stream()
+            }
+            Err(error) => error.to_string(),
+        };
+        shared.controls.offer(Vec::new());
+        shared.set_condition(Err(trouble.into()));
+        if shared.stop_within(RETRY) {
+            return;
+        }
+    }
+}
+
+fn words(device: &Device) -> Arc<str> {
+    let Device { width, height, format, packet, .. } = device;
+    let packets = packet.map_or(String::new(), |bytes| format!(", packets of {bytes} bytes"));
+    Arc::from(format!("{width}x{height} {}{packets}", format.name()))
+}
+
+/// A camera's streaming from one loss to the next.
+struct Session<'a> {
+    shared: &'a Shared,
+    device: Device,
+    /// Our number of the latest frame.
+    number: &'a mut u64,
+    /// The camera's number of the latest frame.
+    seen: Option<u64>,
+    pool: MosaicPool,
+    timestamps: Timestamps,
+}
+
+impl<'a> Session<'a> {
+    fn new(shared: &'a Shared, device: Device, number: &'a mut u64) -> Self {
+        let pool = MosaicPool::new(device.width, device.height);
+        shared.controls.offer(device.offers());
+        Self { shared, device, number, seen: None, pool, timestamps: Timestamps::default() }
+    }
+
+    /// Streams until the camera is lost or the thread is to end; says why.
+    fn stream(mut self) -> String {
+        let mut last = self.shared.clock.now();
+        while !self.shared.stopping() {
+            self.change_settings();
+            match self.device.wait(LOOK) {
+                Arrival::Whole(buffer) => {
+                    last = self.shared.clock.now();
+                    self.deliver(&buffer);
+                    self.device.give_back(buffer);
+                }
+                Arrival::Incomplete(number) => {
+                    last = self.shared.clock.now();
+                    self.count(number);
+                    self.shared.lose(1);
+                }
+                Arrival::Nothing if self.shared.clock.now().since(last) > SILENCE => {
+                    return "no frames come from the camera: check its power, cable and trigger".into();
+                }
+                Arrival::Nothing => {}
+            }
+            if self.device.is_lost() {
+                return "the camera went away: check its power and cable".into();
+            }
+        }
+        "closed".into()
+    }
+
+    fn deliver(&mut self, buffer: &Buffer) {
+        let now = self.shared.clock.now();
+        self.count(buffer.frame_id());
+        let exposed_at = self.timestamps.moment(buffer.timestamp(), arrival(buffer, self.shared.clock.as_ref(), now));
+        match self.mosaic(&buffer.image_data()) {
+            Some(mosaic) => {
+                let image = FrameImage::Mosaic(mosaic);
+                self.shared.deliver(Frame { number: *self.number, exposed_at, image, truth: None });
+            }
+            None => self.shared.lose(1),
+        }
+    }
+
+    /// The mosaic of a frame's `bytes`; nothing if there are too few.
+    fn mosaic(&mut self, bytes: &[u8]) -> Option<Arc<MosaicFrame>> {
+        let Device { width, height, format, .. } = self.device;
+        let bytes = bytes.get(..format.bytes(width * height))?;
+        let mut samples = self.pool.blank();
+        format.unpack(bytes, &mut samples);
+        self.pool.frame(samples).ok()
+    }
+
+    /// Moves our number on as the camera's went, gaps being frames lost.
+    fn count(&mut self, camera_number: u64) {
+        let steps = steps(self.seen, camera_number);
+        *self.number += steps;
+        self.shared.lose(steps - 1);
+        self.seen = Some(camera_number);
+    }
+
+    fn change_settings(&self) {
+        let wanted = self.shared.controls.take();
+        if wanted.is_empty() {
+            return;
+        }
+        for (setting, value) in wanted {
+            if let Err(error) = self.device.change(setting, value) {
+                tracing::warn!(?setting, value, %error, "the camera refused a setting");
+            }
+        }
+        self.shared.controls.offer(self.device.offers());
+    }
+}
+
+/// Frames from the camera's number `seen` to `now`; 1 where its counting was broken off.
+const fn steps(seen: Option<u64>, now: u64) -> u64 {
+    match seen {
+        Some(seen) if now > seen => now - seen,
+        // Rolled over, unless that would be an absurd gap.
+        Some(seen) if seen <= LAST_NUMBER && now + LAST_NUMBER - seen < 1000 => now + LAST_NUMBER - seen,
+        _ => 1,
+    }
+}
+
+/// When the frame began to arrive. Aravis notes it on the wall's clock.
+fn arrival(buffer: &Buffer, clock: &dyn Clock, now: Moment) -> Moment {
+    let wall = u64::try_from(clock.wall().as_nanosecond()).unwrap_or_default();
+    let age = wall.saturating_sub(buffer.system_timestamp());
+    // A wall clock that was set meanwhile makes nonsense of it.
+    let age = if age > 1_000_000_000 { 0 } else { age };
+    Moment::from_nanos(now.as_nanos().saturating_sub(age))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cameras_numbers_roll_over_and_leave_gaps() {
+        assert_eq!(steps(None, 17), 1);
+        assert_eq!(steps(Some(17), 18), 1);
+        assert_eq!(steps(Some(17), 20), 3);
+        assert_eq!(steps(Some(65_535), 1), 1);
+        assert_eq!(steps(Some(65_534), 2), 3);
+        assert_eq!(steps(Some(5000), 1), 1, "the camera restarted");
+        assert_eq!(steps(Some(1 << 40), 3), 1);
+    }
+}

@@ -1,0 +1,225 @@
+//! GigE Vision cameras against Aravis's fake camera, a real peer on the loopback (Debian's package `aravis-tools`).
+
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use parfocal::camera::gige::{GigeCamera, list};
+use parfocal::camera::{Camera, CameraError, CameraSettings, Controls, Frame, FrameImage, Setting};
+use parfocal::clock::{Clock, SystemClock};
+use parfocal::lens::Lens;
+use parfocal::lens::SimulatedLens;
+
+const PROGRAM: &str = "arv-fake-gv-camera-0.8";
+const SECOND: Duration = Duration::from_secs(1);
+
+/// A fake camera, which has the port to itself: tests take turns.
+struct Fake {
+    process: Child,
+    options: Vec<String>,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Fake {
+    /// Starts it; nothing where the program is not installed.
+    fn start(options: &[&str]) -> Option<Self> {
+        static TURN: Mutex<()> = Mutex::new(());
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
+        let Ok(process) = Self::spawn(&options) else {
+            println!("skipped: {PROGRAM} is not installed (Debian package aravis-tools)");
+            return None;
+        };
+        let fake = Self { process, options, _turn: turn };
+        fake.wait_until_it_answers();
+        Some(fake)
+    }
+
+    fn spawn(options: &[String]) -> std::io::Result<Child> {
+        let mut command = Command::new(PROGRAM);
+        command.args(["-i", "127.0.0.1", "-s", "TEST"]).args(options).stdout(Stdio::null()).stderr(Stdio::null());
+        command.spawn()
+    }
+
+    fn wait_until_it_answers(&self) {
+        let begun = SystemClock.now();
+        while !list().iter().any(|found| found.id.contains("TEST")) {
+            assert!(SystemClock.now().since(begun) < 20 * SECOND, "the fake camera never answers");
+        }
+    }
+
+    fn kill(&mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+
+    fn restart(&mut self) {
+        self.process = Self::spawn(&self.options).unwrap();
+    }
+}
+
+impl Drop for Fake {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn settings(fps: f64) -> CameraSettings {
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+    CameraSettings { fps, seed: 0, optics: SimulatedLens::new(clock.clone()).optics(), clock }
+}
+
+fn open(options: &str, fps: f64) -> Result<GigeCamera, CameraError> {
+    GigeCamera::open(&format!("Aravis-Fake-TEST{options}"), settings(fps))
+}
+
+fn refused(options: &str) -> String {
+    open(options, 10.0).err().expect("it must not open").to_string()
+}
+
+/// Frames of the next `time`, and how often none came in time.
+fn watch(camera: &mut GigeCamera, time: Duration) -> (Vec<Frame>, usize) {
+    let (mut frames, mut failures) = (Vec::new(), 0);
+    let begun = SystemClock.now();
+    while SystemClock.now().since(begun) < time {
+        match camera.next_frame(Duration::from_millis(200)) {
+            Ok(frame) => frames.push(Frame { image: shrunk(&frame.image), ..frame }),
+            Err(_) => failures += 1,
+        }
+    }
+    (frames, failures)
+}
+
+/// Lets go of the big picture, as the loop does.
+fn shrunk(image: &FrameImage) -> FrameImage {
+    match image {
+        FrameImage::Mosaic(_) => FrameImage::Rgb(Arc::default()),
+        FrameImage::Rgb(image) => FrameImage::Rgb(image.clone()),
+    }
+}
+
+fn until(what: &str, mut condition: impl FnMut() -> bool) -> Duration {
+    let begun = SystemClock.now();
+    while !condition() {
+        assert!(SystemClock.now().since(begun) < 30 * SECOND, "never: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    SystemClock.now().since(begun)
+}
+
+#[test]
+fn delivers_whole_mosaics_with_rising_numbers_and_times() {
+    let Some(_fake) = Fake::start(&[]) else { return };
+    let mut camera = open("?format=Mono16", 25.0).unwrap();
+    let frame = camera.next_frame(5 * SECOND).unwrap();
+    let FrameImage::Mosaic(mosaic) = &frame.image else { panic!("a mosaic") };
+    assert_eq!((mosaic.width(), mosaic.height()), (2048, 1088));
+    assert!(mosaic.samples().iter().all(|&sample| sample < 1024));
+    // The fake camera shows a diagonal ramp: each step right or down is one grey level more.
+    let differing = mosaic.samples().windows(2).filter(|pair| pair[0] != pair[1]).count();
+    assert!(differing > 2048, "{differing}");
+
+    let (frames, _) = watch(&mut camera, 2 * SECOND);
+    assert!(frames.len() > 20, "{} frames, {:?}", frames.len(), camera.health());
+    for pair in frames.windows(2) {
+        assert!(pair[0].number < pair[1].number && pair[0].exposed_at < pair[1].exposed_at);
+    }
+    let health = camera.health();
+    assert!(health.working && health.simulated, "{health:?}");
+    assert!(health.message.starts_with("2048x1088 Mono16, packets of "), "{}", health.message);
+}
+
+#[test]
+fn killed_in_mid_stream_it_is_found_again() {
+    let Some(mut fake) = Fake::start(&[]) else { return };
+    let mut camera = open("?format=Mono8&width=512&height=512", 25.0).unwrap();
+    let before = camera.next_frame(5 * SECOND).unwrap();
+    fake.kill();
+    until("the loss is noticed", || {
+        let _ = camera.next_frame(Duration::from_millis(50));
+        !camera.health().working
+    });
+    assert!(camera.health().message.ends_with("looking for it again"), "{}", camera.health().message);
+    assert!(matches!(camera.next_frame(Duration::from_millis(50)), Err(CameraError::Failed(_))));
+    fake.restart();
+    let mut after = None;
+    let found = until("a frame comes again", || {
+        after = camera.next_frame(Duration::from_millis(50)).ok();
+        after.is_some()
+    });
+    println!("found again after {found:?}");
+    assert!(after.unwrap().number > before.number);
+    assert!(camera.health().working);
+}
+
+#[test]
+fn frames_with_lost_packets_are_counted_and_skipped() {
+    let Some(_fake) = Fake::start(&["-r", "2"]) else { return };
+    let mut camera = open("?format=Mono8&width=512&height=512&packet=1400", 25.0).unwrap();
+    let (frames, _) = watch(&mut camera, 3 * SECOND);
+    let health = camera.health();
+    println!("{} frames came, {} were lost", frames.len(), health.lost);
+    let span = frames.last().unwrap().number - frames[0].number + 1;
+    assert!(frames.len() > 5 && health.working, "{health:?}");
+    assert!(health.lost > 0, "of 187 packets a frame, each lost with probability 0.002");
+    assert!(span <= frames.len() as u64 + health.lost, "every gap is counted");
+}
+
+#[test]
+fn exposure_gain_and_rate_can_be_changed_within_the_cameras_bounds() {
+    let Some(_fake) = Fake::start(&[]) else { return };
+    let mut camera = open("?width=512&height=512", 10.0).unwrap();
+    camera.next_frame(5 * SECOND).unwrap();
+    let controls = camera.controls().unwrap();
+    let value = |controls: &Controls, setting| {
+        controls.available().into_iter().find(|one| one.setting == setting).map(|one| one.value)
+    };
+    let mut change = |setting, to: f64| {
+        controls.ask(setting, to).unwrap();
+        until("the change is made", || {
+            let _ = camera.next_frame(Duration::from_millis(200));
+            value(&controls, setting).is_some_and(|value| (value - to).abs() < 0.5)
+        });
+    };
+    change(Setting::Exposure, 12_000.0);
+    change(Setting::FrameRate, 20.0);
+    change(Setting::Gain, 6.0);
+    assert!(controls.ask(Setting::Exposure, -1.0).is_err());
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_the_reason() {
+    let Some(_fake) = Fake::start(&[]) else { return };
+    assert!(
+        refused("?format=Mono12").contains("does not offer Mono12; it offers BayerBG8"),
+        "{}",
+        refused("?format=Mono12")
+    );
+    assert!(refused("?format=RGB8").contains("choose from Mono10p"));
+    assert!(refused("?width=30").contains("multiples of 4"), "{}", refused("?width=30"));
+    let missing = GigeCamera::open("No-Such", settings(10.0)).err().unwrap().to_string();
+    assert!(missing.contains("cameras that answer: gige:Aravis-Fake-TEST"), "{missing}");
+    let listed = GigeCamera::open("list", settings(10.0)).err().unwrap().to_string();
+    assert!(listed.starts_with("cameras that answer: gige:Aravis-Fake-TEST (Aravis Fake"), "{listed}");
+}
+
+/// A minute at the paper's size. A measurement, not a test:
+/// `cargo test --release --features aravis --test gige -- --ignored --nocapture`.
+#[test]
+#[ignore = "measures"]
+fn measure_a_minute_of_mono16_at_25_fps() {
+    let Some(_fake) = Fake::start(&[]) else { return };
+    let mut camera = open("?format=Mono16", 25.0).unwrap();
+    camera.next_frame(5 * SECOND).unwrap();
+    let before = camera.health().lost;
+    let (frames, timeouts) = watch(&mut camera, 60 * SECOND);
+    let health = camera.health();
+    let span = frames.last().unwrap().number - frames[0].number + 1;
+    println!(
+        "{} of {span} frames in a minute, {} lost, {timeouts} timeouts: {}",
+        frames.len(),
+        health.lost - before,
+        health.message
+    );
+}
