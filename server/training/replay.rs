@@ -198,7 +198,8 @@ mod tests {
             let (mut metrics, mut steps) = (Vec::new(), Vec::new());
             replay.read(window, 4, &mut Vec::new(), &mut metrics, &mut steps);
             assert!(steps.windows(2).all(|pair| pair[1].age == pair[0].age + 1));
-            assert!(steps.iter().zip(&metrics).all(|(step, metric)| f32::from(step.age) == *metric));
+            let mut pairs = steps.iter().zip(&metrics);
+            assert!(pairs.all(|(step, metric)| (f32::from(step.age) - *metric).abs() < f32::EPSILON));
             oldest = oldest.min(steps[0].age);
         }
         assert_eq!(oldest, 27);

@@ -82,7 +82,7 @@ fn complementary_error(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Expected values: `scipy.stats.wilcoxon(a, b, method="approx", correction=False)`, SciPy 1.17.1.
+    /// Expected values: `scipy.stats.wilcoxon(a, b, method="approx", correction=False)` of `SciPy` 1.17.1.
     #[test]
     #[allow(clippy::approx_constant, reason = "a measurement that happens to be 3.14")]
     fn wilcoxon_agrees_with_scipy() {
