@@ -103,7 +103,7 @@ impl<'a> Theatre<'a> {
 
     /// The surgeon answers the questions after a setting and goes on.
     pub async fn answer_questions(&self, point: u8) {
-        self.surgeon.sees("#panel h2", "before the next one").await;
+        self.surgeon.sees("#panel h2", "a few questions").await;
         self.choose("sharpness", point).await;
         self.surgeon.sees("[data-question=sharpness] > .state", "Saved").await;
         self.surgeon.click(".questions .done button").await;

@@ -84,7 +84,7 @@ async fn first_setting_typed_comments(theatre: &Theatre<'_>) {
     theatre.operator.sees("#phase", "Setting 1 of 6: inspecting").await;
     shoot(&theatre.operator, "operator-3-inspecting").await;
     surgeon.click("#finish").await;
-    surgeon.sees("#panel h2", "before the next one").await;
+    surgeon.sees("#panel h2", "a few questions").await;
     surgeon.click(".questions .done button").await;
     surgeon.sees("#missing", "One question is still open").await;
     theatre.choose("sharpness", 3).await;
@@ -116,10 +116,10 @@ async fn third_setting_reload_and_second_tab(theatre: &Theatre<'_>) {
     let first = surgeon.new_tab(&format!("http://{}/surgeon", theatre.proxy.address)).await;
     surgeon.sees("#setting", "Setting 3 of 6").await;
     surgeon.click("#finish").await;
-    surgeon.sees("#panel h2", "Setting 3: before the next one").await;
+    surgeon.sees("#panel h2", "Setting 3: a few questions").await;
     surgeon.close_tab(&first).await;
     // The stale tab follows by itself, and its draft is still about setting 3.
-    surgeon.sees("#panel h2", "Setting 3: before the next one").await;
+    surgeon.sees("#panel h2", "Setting 3: a few questions").await;
     assert_eq!(theatre.comment_box().await, "Half a thought");
     theatre.say(", whole", 5).await;
     theatre.answer_questions(6).await;
@@ -225,6 +225,7 @@ async fn researcher(theatre: &Theatre<'_>) -> String {
             == true
     })
     .await;
+    page.run("scrollTo(0, 0)", json!([])).await;
     shoot(page, "researcher-4-unblinded").await;
     assert_eq!(fetched(page, &format!("{session}/export.zip?unblinded=true")).await, "200 PK");
     page.open(&theatre.server.url("/researcher/dictionary")).await;

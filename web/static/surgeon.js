@@ -95,9 +95,11 @@ function followStatus({ camera_simulated: camera, lens_simulated: lens, notice }
 
 let drawn = "";
 
+const ended = () => state?.phase === "completed" || state?.phase === "aborted";
+
 function drawPanel() {
   const panel = byId("panel");
-  const key = JSON.stringify(state && [state.session, state.phase, state.paused, state.segment, state.questions]);
+  const key = JSON.stringify(state && [state.session, state.phase, state.paused, state.segment, state.questions, ended() && kept()]);
   if (key === drawn) return;
   drawn = key;
   const content = panelContent();
@@ -117,21 +119,26 @@ function card(className, heading, text, ...more) {
 function panelContent() {
   if (!known) return null;
   if (!state) return card("aside", "No trial is under way", "The view is live. A trial begins here by itself when the operator starts one.");
-  if (state.paused && state.phase !== "completed" && state.phase !== "aborted") return paused();
+  if (state.paused && !ended()) return paused();
   switch (state.phase) {
     case "ready":
       return card("aside", state.title, `${state.settings === 1 ? "One setting" : `${state.settings} settings`} to look at, one after another. Waiting for the operator to start.`);
     case "questions":
-      return questions(`Setting ${state.setting}: before the next one`);
+      return questions(`Setting ${state.setting}: a few questions`);
     case "closing":
       return questions("To finish");
     case "completed":
-      return card("centred", "Thank you", "The trial is complete, and everything you said is saved.");
+      return card("centred", "Thank you", `The trial is complete. ${kept()}`);
     case "aborted":
-      return card("centred", "The session was ended", "There is nothing more to do. Everything you said until then is saved.");
+      return card("centred", "The session was ended", `There is nothing more to do. ${kept()}`);
     default:
       return null;
   }
+}
+
+/** Whether all is saved, said only when it is so. */
+function kept() {
+  return outbox.waiting.length === 0 ? "Everything you said is saved." : "Please leave this page open: some of what you said is still being saved.";
 }
 
 function paused() {
@@ -156,7 +163,10 @@ function questions(heading) {
     answers,
     settings: state.settings,
     draft: (question) => new Draft(`answer.${slot(question)}`),
-    give: (question, value) => outbox.add(ANSWERS, { session, segment, question: question.id, value }, slot(question)),
+    give(question, value) {
+      outbox.add(ANSWERS, { session, segment, question: question.id, value }, slot(question));
+      settle(question);
+    },
   });
   const done = make("button", { type: "button", className: "primary", onclick: () => finishQuestions(segment) }, phase === "closing" ? "Finish" : "Continue");
   const missing = make("p", { id: "missing", className: "message", role: "alert" });
@@ -181,12 +191,19 @@ async function finishQuestions(segment) {
   if (byId("missing")) setText(byId("missing"), byId("trouble").textContent);
 }
 
+/** Takes back that `question` is still open. */
+function settle({ id }) {
+  byId("panel").querySelector(`[data-question="${CSS.escape(id)}"]`)?.classList.remove("wanting");
+  if (byId("missing") && !byId("panel").querySelector(".wanting")) setText(byId("missing"), "");
+}
+
 function unanswered(box) {
   const question = state.questions.find(({ id }) => id === box.dataset.question);
   return question && !question.optional && !/saving|saved|waiting/.test(box.querySelector(".state").className);
 }
 
 outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }) => {
+  if (ended()) drawPanel();
   if (entry.path !== ANSWERS) return;
   if (state && reached === "saved" && entry.body.session === state.session) state.answers[entry.body.question] = entry.body.value;
   const box = byId("panel").querySelector(`[data-question="${CSS.escape(entry.body.question)}"] > .state`);
