@@ -5,7 +5,7 @@
 BIND ?= 127.0.0.1:8080
 ARGS ?=
 
-.PHONY: run test check lint unit bench fuzz
+.PHONY: run test check lint unit readme bench fuzz
 
 run:
 	@.ci/setup build
@@ -17,7 +17,7 @@ test:
 	@$(MAKE) --no-print-directory check
 
 # The checks alone, on a machine that is already set up.
-check: lint unit
+check: lint unit readme
 
 lint:
 	cargo fmt --check
@@ -26,6 +26,9 @@ lint:
 
 unit:
 	cargo test --locked
+
+readme:
+	.ci/readme
 
 # Speed: each figure that the README states comes from here.
 bench:

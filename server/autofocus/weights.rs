@@ -45,11 +45,12 @@ pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
     Ok(())
 }
 
-/// The variables of `store` as safetensors, with `notes` in the file's metadata.
+/// The variables of `store` as safetensors; the file's metadata say in one entry how they were `made`. One, because the
+/// entries' order in the file is random, and the same training must give the same file.
 ///
 /// # Errors
 /// When the tensors cannot be laid out, which no network of this program gives cause for.
-pub fn save(store: &nn::VarStore, notes: &BTreeMap<String, String>) -> Result<Vec<u8>, WeightsError> {
+pub fn save(store: &nn::VarStore, made: &str) -> Result<Vec<u8>, WeightsError> {
     let data: BTreeMap<String, (Vec<usize>, Vec<u8>)> =
         store.variables().into_iter().map(|(name, tensor)| (name, raw(&tensor))).collect();
     let mut views = Vec::with_capacity(data.len());
@@ -58,7 +59,7 @@ pub fn save(store: &nn::VarStore, notes: &BTreeMap<String, String>) -> Result<Ve
             .map_err(|error| WeightsError::Damaged(error.to_string()))?;
         views.push((name.as_str(), view));
     }
-    let notes: HashMap<String, String> = notes.clone().into_iter().collect();
+    let notes = HashMap::from([("made".to_owned(), made.to_owned())]);
     safetensors::serialize(views, Some(notes)).map_err(|error| WeightsError::Damaged(error.to_string()))
 }
 
@@ -84,13 +85,13 @@ mod tests {
     #[test]
     fn weights_survive_the_way_out_and_in() {
         let (from, to) = (store(3), store(3));
-        load(&to, &save(&from, &BTreeMap::new()).unwrap()).unwrap();
+        load(&to, &save(&from, "a test").unwrap()).unwrap();
         assert_eq!(from.variables()["layer.weight"], to.variables()["layer.weight"]);
     }
 
     #[test]
     fn damaged_and_foreign_weights_are_refused() {
-        let bytes = save(&store(3), &BTreeMap::new()).unwrap();
+        let bytes = save(&store(3), "a test").unwrap();
         assert!(matches!(load(&store(3), &bytes[..bytes.len() - 1]), Err(WeightsError::Damaged(_))));
         assert!(matches!(load(&store(3), b"not weights"), Err(WeightsError::Damaged(_))));
         assert!(matches!(load(&store(4), &bytes), Err(WeightsError::Mismatch(_))));

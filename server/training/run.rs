@@ -2,7 +2,6 @@
 //! folder.
 #![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "curves need single precision")]
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -199,13 +198,14 @@ impl Run {
             Learner::Dqn(dqn) => &dqn.store,
             Learner::Belief(belief) => &belief.store,
         };
-        let notes = BTreeMap::from([
-            ("policy".to_owned(), self.recipe.policy.clone()),
-            ("seed".to_owned(), self.seed.to_string()),
-            ("updates".to_owned(), self.updates().to_string()),
-            ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-        ]);
-        weights::save(store, &notes).map_err(|error| TrainError::Diverged(error.to_string()))
+        let made = format!(
+            "{}, seed {}, {} updates, parfocal {}",
+            self.recipe.policy,
+            self.seed,
+            self.updates(),
+            env!("CARGO_PKG_VERSION")
+        );
+        weights::save(store, &made).map_err(|error| TrainError::Diverged(error.to_string()))
     }
 
     /// Runs the present weights on the validation scans; keeps them if they are the best so far.
