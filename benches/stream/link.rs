@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use socket2::SockRef;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, copy};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::time::{Instant, sleep_until};
 
 /// Bytes handed on at a time, about a packet.
@@ -24,9 +24,12 @@ pub async fn slow(server: SocketAddr, bits: u64) -> SocketAddr {
 }
 
 async fn carry(client: TcpStream, server: SocketAddr, bits: u64) {
-    let upstream = TcpStream::connect(server).await.expect("the server");
-    // The queue is to stand where it would: in the server's kernel.
-    SockRef::from(&upstream).set_recv_buffer_size(PACKET * 2).expect("a small buffer");
+    let socket = TcpSocket::new_v4().expect("a socket");
+    // Before connecting, when both are agreed on. Segments as on a network: loopback's own, of 64 KB, never fit the small
+    // buffer, and would leave only when a timer ran out. The queue is to stand where it would: in the server's kernel.
+    SockRef::from(&socket).set_tcp_mss(PACKET as u32).expect("small segments");
+    SockRef::from(&socket).set_recv_buffer_size(PACKET * 8).expect("a small buffer");
+    let upstream = socket.connect(server).await.expect("the server");
     client.set_nodelay(true).expect("no delay");
     upstream.set_nodelay(true).expect("no delay");
     let (mut from_client, mut to_client) = client.into_split();
