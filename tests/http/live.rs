@@ -86,13 +86,13 @@ impl Page {
         texts.collect()
     }
 
-    /// Waits for a state message that is `wanted`.
+    /// Waits for a state message that is `wanted`, drawing the frames that come meanwhile.
     pub async fn until(&mut self, wanted: impl Fn(&Value) -> bool) {
         loop {
-            if let Message::Text(text) = self.message().await
-                && wanted(&serde_json::from_str(&text).unwrap())
-            {
-                return;
+            match self.message().await {
+                Message::Text(text) if wanted(&serde_json::from_str(&text).unwrap()) => return,
+                Message::Binary(frame) => self.drawn(&unpack(&frame)).await,
+                _ => {}
             }
         }
     }
