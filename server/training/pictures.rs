@@ -38,12 +38,13 @@ impl Split {
 /// # Errors
 /// None in practice: the pictures are large enough.
 pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
-    (0..count).map(|index| Clip::still(phantom(split.first_seed() + index)).map(Arc::new)).collect()
+    (0..count).map(|index| Clip::still(sharp_phantom(split, index)).map(Arc::new)).collect()
 }
 
-/// The middle of the brain phantom of `seed`, sharp.
-fn phantom(seed: u64) -> GrayImage {
-    Scene::new(seed).sharp_gray(SIDE, SIDE)
+/// The middle of brain phantom `index` of `split`, sharp.
+#[must_use]
+pub fn sharp_phantom(split: Split, index: u64) -> GrayImage {
+    Scene::new(split.first_seed() + index).sharp_gray(SIDE, SIDE)
 }
 
 /// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds, half of all with a
@@ -55,7 +56,7 @@ pub fn varied(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
     (0..count)
         .map(|index| {
             let seed = split.first_seed() + index;
-            let mut picture = if index % 3 == 0 { phantom(seed) } else { texture(seed, SIDE) };
+            let mut picture = if index % 3 == 0 { sharp_phantom(split, index) } else { texture(seed, SIDE) };
             if index % 2 == 0 {
                 vary_contrast(&mut picture, 0.2 + 0.2 * (index / 2 % 5) as f32, seed);
             }
