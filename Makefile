@@ -5,6 +5,9 @@
 BIND ?= 127.0.0.1:8080
 ARGS ?=
 
+# GigE Vision and USB3 Vision are checked wherever their library is. Everything is built once, with it or without.
+FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
+
 .PHONY: run test check lint unit readme bench fuzz
 
 run:
@@ -21,11 +24,11 @@ check: lint unit readme
 
 lint:
 	cargo fmt --check
-	cargo clippy --all-targets --locked -- --deny warnings
+	cargo clippy --all-targets --locked $(FEATURES) -- --deny warnings
 	cargo deny --locked check licenses bans sources
 
 unit:
-	cargo test --locked
+	cargo test --locked $(FEATURES)
 
 readme:
 	.ci/readme

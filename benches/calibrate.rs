@@ -62,8 +62,7 @@ fn main() {
         let outcomes = evaluate(&registry, &policies, &benchmark, &|_| ()).unwrap();
         let rows: Vec<_> = outcomes.iter().skip(1).map(Outcome::row).collect();
         let deviation = rows.iter().zip(PAPER).map(|(row, (_, mae))| (row.mae / mae - 1.0).abs()).fold(0.0, f64::max);
-        let figures: Vec<_> =
-            rows.iter().map(|row| format!("{:.3} {:.1} %", row.mae, 100.0 * row.in_focus)).collect();
+        let figures: Vec<_> = rows.iter().map(|row| format!("{:.3} {:.1} %", row.mae, 100.0 * row.in_focus)).collect();
         println!("{:5.1} %  {}  {name}", 100.0 * deviation, figures.join("  "));
     }
 }

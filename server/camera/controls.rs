@@ -3,9 +3,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// A setting of a camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Setting {
     /// Exposure time, microseconds.
@@ -19,10 +20,20 @@ pub enum Setting {
 impl Setting {
     /// Every setting.
     pub const ALL: [Self; 3] = [Self::Exposure, Self::Gain, Self::FrameRate];
+
+    /// Name at the start of a sentence.
+    #[must_use]
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Exposure => "Exposure",
+            Self::Gain => "Gain",
+            Self::FrameRate => "Frame rate",
+        }
+    }
 }
 
 /// A setting's value and the bounds that the camera gives for it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Adjustable {
     /// Which.
     pub setting: Setting,
@@ -34,13 +45,22 @@ pub struct Adjustable {
     pub max: f64,
 }
 
+/// What can be changed, and what became of the last change.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct CameraOffer {
+    /// Every setting that the camera offers now.
+    pub settings: Vec<Adjustable>,
+    /// Why the camera did not make the last change, if it did not.
+    pub trouble: Option<String>,
+}
+
 /// A camera's settings, shared between the operator and the camera's thread. Clone freely; never blocks.
 #[derive(Debug, Clone, Default)]
 pub struct Controls(Arc<Mutex<Inner>>);
 
 #[derive(Debug, Default)]
 struct Inner {
-    available: Vec<Adjustable>,
+    offer: CameraOffer,
     wanted: Vec<(Setting, f64)>,
 }
 
@@ -61,10 +81,10 @@ pub enum ControlError {
 }
 
 impl Controls {
-    /// Every setting that the camera offers now.
+    /// What the camera offers now.
     #[must_use]
-    pub fn available(&self) -> Vec<Adjustable> {
-        self.inner().available.clone()
+    pub fn offered(&self) -> CameraOffer {
+        self.inner().offer.clone()
     }
 
     /// Asks for `setting` to become `value`; the camera's thread does it before the next frame.
@@ -73,11 +93,12 @@ impl Controls {
     /// When the camera does not offer the setting, or not that value.
     pub fn ask(&self, setting: Setting, value: f64) -> Result<(), ControlError> {
         let mut inner = self.inner();
-        let offered = inner.available.iter().find(|one| one.setting == setting);
+        let offered = inner.offer.settings.iter().find(|one| one.setting == setting);
         let &Adjustable { min, max, .. } = offered.ok_or(ControlError::NotOffered)?;
         if !(min..=max).contains(&value) {
             return Err(ControlError::OutOfBounds { min, max });
         }
+        inner.offer.trouble = None;
         inner.wanted.retain(|(other, _)| *other != setting);
         inner.wanted.push((setting, value));
         Ok(())
@@ -85,7 +106,12 @@ impl Controls {
 
     /// The camera's side: what it offers now.
     pub fn offer(&self, available: Vec<Adjustable>) {
-        self.inner().available = available;
+        self.inner().offer.settings = available;
+    }
+
+    /// The camera's side: it did not change `setting`, and says `why`.
+    pub fn refuse(&self, setting: Setting, why: &str) {
+        self.inner().offer.trouble = Some(format!("{} was not changed: the camera says: {why}", setting.label()));
     }
 
     /// The camera's side: takes what was asked for.
@@ -114,5 +140,9 @@ mod tests {
         controls.ask(Setting::Gain, 6.0).unwrap();
         assert_eq!(controls.take(), [(Setting::Gain, 6.0)]);
         assert!(controls.take().is_empty());
+        controls.refuse(Setting::Gain, "busy");
+        assert_eq!(controls.offered().trouble.unwrap(), "Gain was not changed: the camera says: busy");
+        controls.ask(Setting::Gain, 2.0).unwrap();
+        assert_eq!(controls.offered().trouble, None, "told of the last change alone");
     }
 }

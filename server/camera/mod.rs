@@ -11,7 +11,7 @@ mod pool;
 mod spec;
 pub mod walk;
 
-pub use controls::{Adjustable, ControlError, Controls, Setting};
+pub use controls::{Adjustable, CameraOffer, ControlError, Controls, Setting};
 pub use pace::Pace;
 pub use pool::MosaicPool;
 pub use spec::{CameraSettings, open};
@@ -39,6 +39,11 @@ pub trait Camera: Send {
 
     /// What the camera is, and how it does.
     fn health(&self) -> CameraHealth;
+
+    /// Width and height in samples of the mosaics that it delivers; none from a camera that delivers colour pictures.
+    fn mosaic_size(&self) -> Option<(usize, usize)> {
+        None
+    }
 
     /// Its settings, where an operator can change any.
     fn controls(&self) -> Option<Controls> {

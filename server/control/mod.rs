@@ -26,7 +26,7 @@ use serde::Serialize;
 use tokio::sync::{mpsc, watch};
 
 use crate::autofocus::PolicyName;
-use crate::camera::{CameraHealth, Frame};
+use crate::camera::{CameraHealth, CameraOffer, Controls, Frame};
 use crate::clock::Moment;
 use crate::imaging::{ContentArea, PatchArea};
 use crate::lens::{FocalPower, LensHealth};
@@ -144,6 +144,8 @@ pub struct ControlledFrame {
 pub struct ControlStatus {
     /// The camera.
     pub camera: CameraHealth,
+    /// What can be changed on it while it runs.
+    pub camera_offer: CameraOffer,
     /// The lens.
     pub lens: LensHealth,
     /// Policy in charge, if one is.
@@ -175,6 +177,8 @@ pub struct ControlHandle {
     pub status: watch::Receiver<Arc<ControlStatus>>,
     /// The latest frame out, for the imaging thread.
     pub frames: Arc<LatestSlot<ControlledFrame>>,
+    /// The camera's settings, where it has any.
+    pub camera: Option<Controls>,
 }
 
 impl ControlHandle {

@@ -16,7 +16,7 @@ use super::stepper::Stepper;
 use super::window::LatencyWindow;
 use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Hold, LatestSlot, StepRecord};
 use crate::autofocus::Registry;
-use crate::camera::{Camera, Frame};
+use crate::camera::{Camera, CameraOffer, Controls, Frame};
 use crate::clock::{Clock, Moment};
 use crate::imaging::Reconstructor;
 use crate::lens::Lens;
@@ -68,13 +68,15 @@ impl ControlLoop {
     pub fn spawn(settings: Settings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
         let Rig { camera, lens, reconstructor, registry, clock } = rig;
         let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period);
+        let controls = camera.controls();
         let source = Source::start(camera)?;
         let (telemetry, telemetry_out) = mpsc::channel(settings.telemetry_capacity.max(1));
         let (commands_in, commands) = mpsc::unbounded_channel();
         let frames = Arc::new(LatestSlot::default());
         let stop = Arc::new(AtomicBool::new(false));
-        let worker = Worker::new(stepper, source, clock, telemetry, frames.clone());
-        let handle = ControlHandle { commands: commands_in, status: worker.status.subscribe(), frames };
+        let worker = Worker::new(stepper, source, clock, telemetry, frames.clone(), controls.clone());
+        let status = worker.status.subscribe();
+        let handle = ControlHandle { commands: commands_in, status, frames, camera: controls };
         let stopping = stop.clone();
         let thread = thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &stopping))?;
         Ok((Self { stop, thread: Some(thread) }, handle, telemetry_out))
@@ -104,6 +106,8 @@ struct Worker {
     clock: Arc<dyn Clock>,
     telemetry: mpsc::Sender<StepRecord>,
     frames: Arc<LatestSlot<ControlledFrame>>,
+    /// Looked at for the status alone.
+    controls: Option<Controls>,
     status: watch::Sender<Arc<ControlStatus>>,
     published_at: Moment,
     last_frame_at: Moment,
@@ -121,10 +125,12 @@ impl Worker {
         clock: Arc<dyn Clock>,
         telemetry: mpsc::Sender<StepRecord>,
         frames: Arc<LatestSlot<ControlledFrame>>,
+        controls: Option<Controls>,
     ) -> Self {
         let now = clock.now();
         let first = ControlStatus {
             camera: source.health(),
+            camera_offer: CameraOffer::default(),
             lens: stepper.lens_health(),
             policy: None,
             focal_power: stepper.focal_power(),
@@ -142,6 +148,7 @@ impl Worker {
             clock,
             telemetry,
             frames,
+            controls,
             status: watch::Sender::new(Arc::new(first)),
             published_at: now,
             last_frame_at: now,
@@ -220,6 +227,7 @@ impl Worker {
         camera.working &= held != Some(Hold::CameraFailed);
         self.status.send_replace(Arc::new(ControlStatus {
             camera,
+            camera_offer: self.controls.as_ref().map(Controls::offered).unwrap_or_default(),
             lens: self.stepper.lens_health(),
             policy: self.stepper.policy().cloned(),
             focal_power: self.stepper.focal_power(),

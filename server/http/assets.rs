@@ -27,6 +27,7 @@ macro_rules! assets {
 /// Every file of `web/static/`, by name.
 static ASSETS: &[Asset] = &assets![
     "api.js",
+    "camera.js",
     "canvas.js",
     "change.js",
     "compose.js",

@@ -1,6 +1,7 @@
 //! HTTP: routes, pages, streams, roles. Holds no trial rule.
 
 pub mod assets;
+mod camera;
 mod connections;
 pub mod error;
 mod export;
@@ -53,6 +54,7 @@ pub fn router(app: AppState) -> Router {
         .merge(roles::routes())
         .merge(surgeon::routes())
         .merge(operator::routes())
+        .merge(camera::routes())
         .merge(researcher::routes())
         .merge(export::routes())
         .merge(live::routes())

@@ -164,3 +164,14 @@ async fn counters_are_told_to_prometheus_without_naming_a_policy() {
     }
     assert!(!text.contains("policy") && !text.contains("climber"));
 }
+
+#[tokio::test]
+async fn a_camera_without_settings_offers_none() {
+    let server = Server::start();
+    let offer: Value = server.get("/api/operator/camera").send().await.unwrap().json().await.unwrap();
+    assert_eq!(offer["settings"], serde_json::json!([]));
+    let change = serde_json::json!({"setting": "gain", "value": 3});
+    let answer = client().post(server.url("/api/operator/camera")).json(&change).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::CONFLICT);
+    assert!(answer.text().await.unwrap().contains("does not offer this setting"));
+}

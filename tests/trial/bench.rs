@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::camera::CameraHealth;
+use parfocal::camera::{CameraHealth, CameraOffer};
 use parfocal::clock::{Clock, ManualClock};
 use parfocal::conductor::{ConductError, Conductor, Library, Parts};
 use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot};
@@ -190,6 +190,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
             fps: 50.0,
             lost: 0,
         },
+        camera_offer: CameraOffer::default(),
         lens: LensHealth { name: "none".into(), simulated: true, working: true, message: "none".into() },
         policy: None,
         focal_power: FocalPower::MIDDLE,
@@ -203,5 +204,5 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
     };
     let (commands, received) = mpsc::unbounded_channel();
     let status = watch::channel(Arc::new(status)).1;
-    (ControlHandle { commands, status, frames: Arc::new(LatestSlot::default()) }, received)
+    (ControlHandle { commands, status, frames: Arc::new(LatestSlot::default()), camera: None }, received)
 }

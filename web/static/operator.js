@@ -1,6 +1,7 @@
 // The operator's page: the devices, who focuses, and the session from preparing it to its end.
 
 import { get, inWords, post } from "./api.js";
+import { drawCamera } from "./camera.js";
 import { askIn, askReason } from "./dialogs.js";
 import { byId, clockText, make, redraw, setText } from "./dom.js";
 import { drawDevices, drawWarnings } from "./devices.js";
@@ -21,6 +22,7 @@ function followStatus(next) {
   status = next;
   drawDevices(byId("devices"), status);
   drawWarnings(byId("warnings"), status);
+  drawCamera(status.camera_offer);
   drawFocus();
 }
 

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ::aravis::prelude::*;
-use ::aravis::{AcquisitionMode, Auto, Buffer, BufferStatus, Stream, glib};
+use ::aravis::{AcquisitionMode, Auto, Buffer, BufferStatus, GvDevice, Stream, glib};
+
+use gio::prelude::*;
 
 use super::pixels::PixelFormat;
 use crate::camera::{Adjustable, CameraError, Setting};
@@ -16,6 +18,8 @@ use crate::options::{BadOptions, Options};
 const SENSOR: (i32, i32) = (2048, 1088);
 /// Frames that may be under way between camera and thread.
 const BUFFERS: usize = 8;
+/// Aravis's fake camera cannot negotiate, and the loopback that it sits on takes packets of any size.
+const FAKE_PACKET: i32 = 16_000;
 
 /// Which camera, and how it is to be set up.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +32,10 @@ pub struct Wanted {
     height: Option<i32>,
     /// Bytes of a GigE Vision packet, if they are not to be negotiated.
     packet: Option<i32>,
+    /// Microseconds.
+    exposure: Option<f64>,
+    /// In the camera's own units.
+    gain: Option<f64>,
     fps: f64,
 }
 
@@ -42,6 +50,8 @@ impl Wanted {
             width: options.take("width").map_err(bad)?,
             height: options.take("height").map_err(bad)?,
             packet: options.take("packet").map_err(bad)?,
+            exposure: options.take("exposure").map_err(bad)?,
+            gain: options.take("gain").map_err(bad)?,
             fps,
         };
         options.finish().map_err(bad)?;
@@ -92,16 +102,23 @@ pub enum Arrival {
 impl Device {
     /// Connects to the camera that is wanted, sets it up and starts it.
     pub fn open(wanted: &Wanted) -> Result<Self, DeviceError> {
-        let camera = ::aravis::Camera::new(Some(&wanted.id))?;
+        let camera = connect(&wanted.id)?;
         let (vendor, model) = (camera.vendor_name()?, camera.model_name()?);
+        let fake = vendor == "Aravis";
         let format = choose_format(&camera, wanted.format)?;
         let (width, height) = set_region(&camera, wanted)?;
         camera.set_acquisition_mode(AcquisitionMode::Continuous)?;
         // A camera that cannot do one of these runs as it is: exposure and rate can still be set by hand.
         let _ = camera.set_exposure_time_auto(Auto::Off);
         let _ = camera.set_gain_auto(Auto::Off);
+        if let Some(exposure) = wanted.exposure {
+            camera.set_exposure_time(exposure)?;
+        }
+        if let Some(gain) = wanted.gain {
+            camera.set_gain(gain)?;
+        }
         set_frame_rate(&camera, wanted.fps);
-        let packet = negotiate_packet(&camera, wanted.packet)?;
+        let packet = negotiate_packet(&camera, wanted.packet.or(fake.then_some(FAKE_PACKET)))?;
         let stream = camera.create_stream()?;
         let payload = usize::try_from(camera.payload()?).unwrap_or_default();
         for _ in 0..BUFFERS {
@@ -113,7 +130,7 @@ impl Device {
             device.connect_control_lost(move |_| noted.store(true, Ordering::Relaxed));
         }
         camera.start_acquisition()?;
-        let (name, fake) = (format!("{vendor} {model}"), vendor == "Aravis");
+        let name = format!("{vendor} {model}");
         Ok(Self { camera, stream, lost, name, fake, width, height, format, packet })
     }
 
@@ -167,6 +184,25 @@ impl Drop for Device {
     fn drop(&mut self) {
         let _ = self.camera.stop_acquisition();
     }
+}
+
+/// The camera `id`. One on this very machine answers on every network interface, and its packets are then waited for on
+/// the wrong one; by its address it is found on the loopback.
+fn connect(id: &str) -> Result<::aravis::Camera, glib::Error> {
+    let camera = ::aravis::Camera::new(Some(id))?;
+    let device = camera.device().and_then(|device| device.downcast::<GvDevice>().ok());
+    let ends = device.map(|device| [device.device_address(), device.interface_address()].map(loopback));
+    if ends != Some([true, false]) {
+        return Ok(camera);
+    }
+    // It has one controller at a time.
+    drop(camera);
+    ::aravis::Camera::new(Some("127.0.0.1"))
+}
+
+fn loopback(address: Option<gio::SocketAddress>) -> bool {
+    let inet = address.and_then(|address| address.downcast::<gio::InetSocketAddress>().ok());
+    inet.is_some_and(|inet| inet.address().is_loopback())
 }
 
 fn choose_format(camera: &::aravis::Camera, wanted: Option<PixelFormat>) -> Result<PixelFormat, DeviceError> {

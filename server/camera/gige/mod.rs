@@ -20,13 +20,15 @@ use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
 
 /// A machine vision camera.
 pub struct GigeCamera {
+    size: (usize, usize),
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl GigeCamera {
     /// Connects to the camera `source`: an identity as [`list`] gives it, or an address; with options `format` (a pixel
-    /// format), `width`, `height`, `packet` (bytes, instead of negotiating). `list` says which cameras there are.
+    /// format), `width`, `height`, `packet` (bytes, instead of negotiating), `exposure` (microseconds), `gain`. `list` says
+    /// which cameras there are.
     ///
     /// # Errors
     /// [`CameraError::BadSource`] when it cannot be used right now; says why. Later failures heal by themselves.
@@ -37,13 +39,14 @@ impl GigeCamera {
         }
         let device = Device::open(&wanted)
             .map_err(|error| CameraError::BadSource(format!("{}: {error}; {}", wanted.id, listing())))?;
+        let size = (device.width, device.height);
         let shared = Arc::new(Shared::new(settings.clock, &device));
         let theirs = shared.clone();
         let thread = std::thread::Builder::new()
             .name("gige".into())
             .spawn(move || worker::run(&theirs, &wanted, device))
             .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
-        Ok(Self { shared, thread: Some(thread) })
+        Ok(Self { size, shared, thread: Some(thread) })
     }
 }
 
@@ -54,6 +57,10 @@ impl Camera for GigeCamera {
 
     fn health(&self) -> CameraHealth {
         self.shared.health()
+    }
+
+    fn mosaic_size(&self) -> Option<(usize, usize)> {
+        Some(self.size)
     }
 
     fn controls(&self) -> Option<Controls> {

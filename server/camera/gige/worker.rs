@@ -8,7 +8,7 @@ use ::aravis::Buffer;
 
 use super::device::{Arrival, Device, Wanted};
 use super::timestamps::Timestamps;
-use crate::camera::{CameraError, CameraHealth, Controls, Frame, FrameImage, MosaicPool};
+use crate::camera::{CameraError, CameraHealth, Controls, Frame, FrameImage, MosaicPool, Setting};
 use crate::clock::{Clock, Moment};
 use crate::imaging::MosaicFrame;
 
@@ -175,6 +175,8 @@ struct Session<'a> {
     number: &'a mut u64,
     /// The camera's number of the latest frame.
     seen: Option<u64>,
+    /// As the camera has it; zero where it does not tell.
+    exposure: Duration,
     pool: MosaicPool,
     timestamps: Timestamps,
 }
@@ -182,8 +184,10 @@ struct Session<'a> {
 impl<'a> Session<'a> {
     fn new(shared: &'a Shared, device: Device, number: &'a mut u64) -> Self {
         let pool = MosaicPool::new(device.width, device.height);
-        shared.controls.offer(device.offers());
-        Self { shared, device, number, seen: None, pool, timestamps: Timestamps::default() }
+        let timestamps = Timestamps::default();
+        let mut session = Self { shared, device, number, seen: None, exposure: Duration::ZERO, pool, timestamps };
+        session.offer();
+        session
     }
 
     /// Streams until the camera is lost or the thread is to end; says why.
@@ -202,7 +206,7 @@ impl<'a> Session<'a> {
                     self.count(number);
                     self.shared.lose(1);
                 }
-                Arrival::Nothing if self.shared.clock.now().since(last) > SILENCE => {
+                Arrival::Nothing if self.shared.clock.now().since(last) > SILENCE + self.exposure => {
                     return "no frames come from the camera: check its power, cable and trigger".into();
                 }
                 Arrival::Nothing => {}
@@ -221,7 +225,13 @@ impl<'a> Session<'a> {
         match self.mosaic(&buffer.image_data()) {
             Some(mosaic) => {
                 let image = FrameImage::Mosaic(mosaic);
-                self.shared.deliver(Frame { number: *self.number, exposed_at, image, truth: None });
+                self.shared.deliver(Frame {
+                    number: *self.number,
+                    exposed_at,
+                    exposure: self.exposure,
+                    image,
+                    truth: None,
+                });
             }
             None => self.shared.lose(1),
         }
@@ -244,7 +254,7 @@ impl<'a> Session<'a> {
         self.seen = Some(camera_number);
     }
 
-    fn change_settings(&self) {
+    fn change_settings(&mut self) {
         let wanted = self.shared.controls.take();
         if wanted.is_empty() {
             return;
@@ -252,9 +262,18 @@ impl<'a> Session<'a> {
         for (setting, value) in wanted {
             if let Err(error) = self.device.change(setting, value) {
                 tracing::warn!(?setting, value, %error, "the camera refused a setting");
+                self.shared.controls.refuse(setting, &error.to_string());
             }
         }
-        self.shared.controls.offer(self.device.offers());
+        self.offer();
+    }
+
+    /// Says what can be changed, and notes how long the camera exposes.
+    fn offer(&mut self) {
+        let offers = self.device.offers();
+        let exposure = offers.iter().find(|one| one.setting == Setting::Exposure);
+        self.exposure = exposure.map_or(Duration::ZERO, |one| Duration::from_secs_f64(one.value.clamp(0.0, 1e9) / 1e6));
+        self.shared.controls.offer(offers);
     }
 }
 

@@ -59,6 +59,10 @@ impl Camera for PhantomCamera {
         })
     }
 
+    fn mosaic_size(&self) -> Option<(usize, usize)> {
+        Some((SENSOR_WIDTH, SENSOR_HEIGHT))
+    }
+
     fn health(&self) -> CameraHealth {
         CameraHealth {
             name: Arc::from("brain phantom (simulated)"),

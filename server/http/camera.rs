@@ -1,0 +1,58 @@
+//! What an operator may change on a camera while it runs: exposure, gain, frame rate.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use serde::Deserialize;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::error::{Error, ErrorBody};
+use super::roles::Operator;
+use super::{App, AppState};
+use crate::camera::{CameraOffer, ControlError, Setting};
+use crate::store::DeviceEvent;
+
+/// What can be changed now, with the camera's own bounds. Empty for a camera that has nothing to change, or is away.
+#[utoipa::path(get, path = "/api/operator/camera", tag = "operator", responses((status = 200, body = CameraOffer)))]
+async fn offer(_: Operator, State(app): State<AppState>) -> Json<CameraOffer> {
+    Json(app.control.camera.as_ref().map(crate::camera::Controls::offered).unwrap_or_default())
+}
+
+/// A setting to be changed.
+#[derive(Debug, Deserialize, ToSchema)]
+struct Change {
+    /// Which.
+    setting: Setting,
+    /// To what: microseconds, the camera's unit of gain, or frames a second.
+    value: f64,
+}
+
+/// Changes a setting, before the next frame. What the camera makes of it is in `/api/operator/camera` and the live status.
+#[utoipa::path(post, path = "/api/operator/camera", tag = "operator", request_body = Change, responses(
+    (status = 204, description = "The camera was asked"),
+    (status = 409, description = "The camera does not offer this setting now", body = ErrorBody),
+    (status = 422, description = "Outside the camera's bounds", body = ErrorBody)))]
+async fn change(_: Operator, State(app): State<AppState>, Json(change): Json<Change>) -> Result<StatusCode, Error> {
+    let Change { setting, value } = change;
+    let asked = app.control.camera.as_ref().map_or(Err(ControlError::NotOffered), |camera| camera.ask(setting, value));
+    asked.map_err(|error| match error {
+        ControlError::NotOffered => Error::Conflict("The camera does not offer this setting now.".into()),
+        ControlError::OutOfBounds { .. } => Error::Invalid(format!("{} {error}.", setting.label())),
+    })?;
+    record(&app, format!("the operator asked for {} {value:.6}", setting.label().to_lowercase())).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// A picture that changed must be explicable later.
+async fn record(app: &App, message: String) -> Result<(), Error> {
+    let working = app.control.status.borrow().camera.working;
+    let (wall, at) = (app.clock.wall(), app.clock.now());
+    let event = DeviceEvent { wall, at, device: "camera".into(), working, message };
+    app.store.device_event(&event).await.map_err(|error| Error::Storage(error.to_string()))
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(offer)).routes(routes!(change))
+}
