@@ -12,34 +12,37 @@ fn encode(linear: f64) -> f64 {
 /// The transfer function as a table. An entry every 1/4095 is fine enough to be at most one 8-bit step off, also where
 /// it is steepest.
 #[derive(Debug, Clone)]
-pub(crate) struct Encoder([u8; Encoder::ENTRIES]);
+pub(crate) struct Encoder(Box<[u8; 1 << 16]>);
 
 impl Encoder {
-    /// Entries of the table, a power of two so that an index can be masked into range.
-    const ENTRIES: usize = 4096;
-
     /// What a linear component of 1 is multiplied by to become an index.
-    #[allow(clippy::cast_precision_loss, reason = "4095 is exact")]
-    pub(crate) const SCALE: f32 = (Self::ENTRIES - 1) as f32;
+    pub(crate) const SCALE: f32 = 4095.0;
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "0..=255 fits u8, 4095 is exact"
-    )]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=255 fits u8")]
+    #[allow(clippy::large_stack_arrays, reason = "64 KiB, once, on its way to the heap")]
     pub(crate) fn new() -> Self {
-        let top = (Self::ENTRIES - 1) as f64;
-        Self(std::array::from_fn(|index| (255.0 * encode(index as f64 / top)).round() as u8))
+        let mut table = Box::new([255; 1 << 16]);
+        for (index, value) in (0..=4095_u16).zip(table.iter_mut()) {
+            *value = (255.0 * encode(f64::from(index) / 4095.0)).round() as u8;
+        }
+        Self(table)
     }
 
-    /// The encoded value of a linear component times [`Self::SCALE`]; anything below 0 or above 1 is as 0 or 1.
+    /// The encoded value of a linear component times [`Self::SCALE`], rounded; anything above is as 1. The table has an
+    /// entry for any index, so that none need be checked.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
-    pub(crate) fn at(&self, scaled: f32) -> u8 {
+    pub(crate) fn at(&self, index: u16) -> u8 {
+        self.0[usize::from(index)]
+    }
+
+    /// The index of a linear component times [`Self::SCALE`]; what is out of range is brought into it.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
+    #[allow(clippy::cast_possible_truncation, reason = "the lowest 16 bits are wanted")]
+    pub(crate) fn index(scaled: f32) -> u16 {
         // Adding 2^23 leaves the number, rounded, in the lowest bits: cheaper than a cast, which must mind NaN.
-        let index = (scaled.clamp(0.0, Self::SCALE) + 8_388_608.0).to_bits();
-        self.0[index as usize % Self::ENTRIES]
+        (scaled.clamp(0.0, Self::SCALE) + 8_388_608.0).to_bits() as u16
     }
 }
 
@@ -61,7 +64,7 @@ mod tests {
         let encoder = Encoder::new();
         for step in 0..=100_000 {
             let linear = f64::from(step) / 100_000.0;
-            let found = encoder.at(linear as f32 * Encoder::SCALE);
+            let found = encoder.at(Encoder::index(linear as f32 * Encoder::SCALE));
             assert!((f64::from(found) - 255.0 * encode(linear)).abs() <= 1.0, "{linear}");
         }
     }
@@ -69,7 +72,8 @@ mod tests {
     #[test]
     fn what_is_out_of_range_is_cut() {
         let encoder = Encoder::new();
-        assert_eq!((encoder.at(-5.0), encoder.at(1e9), encoder.at(f32::NEG_INFINITY)), (0, 255, 0));
+        let at = |scaled| encoder.at(Encoder::index(scaled));
+        assert_eq!((at(-5.0), at(1e9), at(f32::NEG_INFINITY), encoder.at(u16::MAX)), (0, 255, 0, 255));
     }
 
     #[test]

@@ -1,9 +1,18 @@
-//! White balance by references per pixel.
+//! White balance by references per pixel, in whole numbers: [`DARK`] for dark, [`WHITE`] for white.
+#![allow(clippy::cast_possible_truncation, reason = "the lowest 16 bits are wanted")]
 
 use crate::imaging::calibration::{BANDS, Calibration, Reference};
 use crate::imaging::frame::{CELL, MosaicFrame};
 
-/// Gain and offset of every pixel of the sensor, so that dark becomes 0 and white 1.
+/// What a sample as dark as the dark reference becomes; above 0, so that noise below dark is kept.
+pub(super) const DARK: f32 = 2048.0;
+/// What a sample as bright as the white reference becomes; there is room for highlights three times as bright.
+pub(super) const WHITE: f32 = DARK + 16_384.0;
+
+/// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper than a cast.
+const LOW_BITS: f32 = 8_388_608.0;
+
+/// Gain and offset of every pixel of the sensor, so that dark becomes [`DARK`] and white [`WHITE`].
 #[derive(Debug, Clone)]
 pub(super) struct PixelBalance {
     width: usize,
@@ -35,7 +44,8 @@ impl PixelBalance {
                 // A dead pixel, which sees no white, is balanced as its band is.
                 let band = band(index, width);
                 let span = if white > dark { white - dark } else { mean_white[band] - mean_dark[band] };
-                (1.0 / span, -dark / span)
+                let gain = (WHITE - DARK) / span;
+                (gain, DARK - dark * gain)
             })
             .unzip();
         Some(Self { width, height, gains, offsets })
@@ -50,14 +60,14 @@ impl PixelBalance {
     /// after another.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
-    pub(super) fn apply(&self, rows: [&[u16]; CELL], x: usize, y: usize, balanced: &mut [f32]) {
+    pub(super) fn apply(&self, rows: [&[u16]; CELL], x: usize, y: usize, balanced: &mut [u16]) {
         let length = rows[0].len();
         for (row, (samples, balanced)) in rows.into_iter().zip(balanced.chunks_exact_mut(length)).enumerate() {
             let start = (CELL * y + row) * self.width + x;
             let places = start..start + length;
             let correction = self.gains[places.clone()].iter().zip(&self.offsets[places]);
             for ((balanced, &sample), (gain, offset)) in balanced.iter_mut().zip(samples).zip(correction) {
-                *balanced = f32::from(sample) * gain + offset;
+                *balanced = ((f32::from(sample) * gain + offset).clamp(0.0, 65_535.0) + LOW_BITS).to_bits() as u16;
             }
         }
     }

@@ -11,19 +11,15 @@ const LANES: usize = 8;
 /// Makes `K` values from the 16 samples of a cell: a weighted sum each, plus an offset.
 #[derive(Debug, Clone)]
 pub(super) struct Mix<const K: usize> {
-    weights: [[f32; BANDS]; K],
-    offsets: [f32; K],
+    pub(super) weights: [[f32; BANDS]; K],
+    pub(super) offsets: [f32; K],
 }
 
 impl<const K: usize> Mix<K> {
-    /// Sums weighted by the rows of `weights`, with no offset.
-    pub(super) const fn new(weights: [[f32; BANDS]; K]) -> Self {
-        Self { weights, offsets: [0.0; K] }
-    }
-
-    /// The same values from counts, where this mix makes them from white-balanced samples.
-    pub(super) fn of_counts(&self, dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
-        let weights = self.weights.map(|row| std::array::from_fn(|band| row[band] / (white[band] - dark[band])));
+    /// Sums weighted by the rows of `weights` where samples are 0 for dark and 1 for white, from samples that are `dark`
+    /// and `white`.
+    pub(super) fn new(weights: [[f32; BANDS]; K], dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
+        let weights = weights.map(|row| std::array::from_fn(|band| row[band] / (white[band] - dark[band])));
         let offsets =
             weights.map(|row: [f32; BANDS]| -row.iter().zip(dark).map(|(weight, dark)| weight * dark).sum::<f32>());
         Self { weights, offsets }
@@ -31,26 +27,21 @@ impl<const K: usize> Mix<K> {
 
     /// Mixes one row of cells, given as its four rows of samples, into `K` rows of one value a cell.
     #[inline(always)]
-    pub(super) fn apply<T: Copy + Into<f32>>(&self, rows: [&[T]; CELL], mut mixed: [&mut [f32]; K]) {
+    pub(super) fn apply(&self, rows: [&[u16]; CELL], mut mixed: [&mut [f32]; K]) {
         let cells = rows.map(|row| row.as_chunks::<CELL>().0);
         let count = cells[0].len();
         let whole = count - count % LANES;
         for first in (0..whole).step_by(LANES) {
-            self.block::<T, LANES>(cells, first, &mut mixed);
+            self.block::<LANES>(cells, first, &mut mixed);
         }
         for first in whole..count {
-            self.block::<T, 1>(cells, first, &mut mixed);
+            self.block::<1>(cells, first, &mut mixed);
         }
     }
 
     /// Mixes the `L` cells from `first` on.
     #[inline(always)]
-    fn block<T: Copy + Into<f32>, const L: usize>(
-        &self,
-        cells: [&[[T; CELL]]; CELL],
-        first: usize,
-        mixed: &mut [&mut [f32]; K],
-    ) {
+    fn block<const L: usize>(&self, cells: [&[[u16; CELL]]; CELL], first: usize, mixed: &mut [&mut [f32]; K]) {
         let mut sums = self.offsets.map(|offset| [offset; L]);
         for (row, cells) in cells.iter().enumerate() {
             let cells = &cells[first..first + L];
