@@ -78,7 +78,7 @@ fn latency(_: &mut Criterion) {
     let camera = camera::open("phantom", settings).expect("is there");
     let mut reconstructor = Reconstructor::new(&Calibration::default());
     let rig = Rig { camera, lens, reconstructor: reconstructor.clone(), registry: Registry::standard(), clock };
-    let settings = Settings { frame_period: Duration::from_millis(20), telemetry_capacity: 256 };
+    let settings = Settings { frame_period: Duration::from_millis(20), telemetry_capacity: 256, dynamics: None };
     let (control, handle, mut telemetry) = ControlLoop::spawn(settings, rig).expect("starts");
     handle.send(Command::Drive {
         drive: Drive::Policy { name: PolicyName::new("mgm-hill-climber"), start: None },

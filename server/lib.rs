@@ -16,6 +16,7 @@ pub mod control;
 pub mod training;
 pub mod trial;
 
+pub mod bench;
 pub mod store;
 
 pub mod conductor;

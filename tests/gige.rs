@@ -238,6 +238,31 @@ async fn the_operator_changes_them_through_the_server() {
     assert!(said.contains("Exposure must be from"), "{said}");
 }
 
+/// `parfocal calibrate` with the fake camera: whether it worked, and what it said.
+fn calibrate(which: &str, options: &str, out: &std::path::Path) -> (bool, String) {
+    let camera = format!("gige:Aravis-Fake-TEST?width=512&height=512{options}");
+    let output = Command::new(env!("CARGO_BIN_EXE_parfocal"))
+        .args(["calibrate", which, "--camera", &camera, "--frames", "4", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn references_are_taken_or_refused() {
+    let Some(_fake) = Fake::start(&[]) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    // Its diagonal ramp is as dark as the exposure is short, and never even.
+    let (taken, said) = calibrate("dark", "&exposure=10000", folder.path());
+    assert!(!taken && said.contains("this is not dark"), "{said}");
+    let (taken, said) = calibrate("dark", "&exposure=100", folder.path());
+    assert!(taken, "{said}");
+    assert!(folder.path().join("dark-1.tiff").exists());
+    let (taken, said) = calibrate("white", "&exposure=10000", folder.path());
+    assert!(!taken && said.contains("uneven"), "{said}");
+}
+
 /// Streams the paper's size and rate for `time`: under 1 % of the frames may be lost on the way.
 fn hardly_a_frame_is_lost_in(time: Duration) {
     let Some(_fake) = Fake::start(&[]) else { return };

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::footage::FootageCamera;
-use super::phantom::PhantomCamera;
+use super::phantom::{Before, PhantomCamera};
 use super::{Camera, CameraError};
 use crate::clock::Clock;
 use crate::lens::Optics;
@@ -22,13 +22,17 @@ pub struct CameraSettings {
     pub clock: Arc<dyn Clock>,
 }
 
-/// Opens the camera that `spec` names: `phantom`, or `footage:PATH` with a video, an image or a folder of images.
+/// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a white tile),
+/// `phantom:dark` (with its lens cap on), or `footage:PATH` with a video, an image or a folder of images.
 ///
 /// # Errors
 /// [`CameraError::BadSource`] when there is no such camera, or its source cannot be used.
 pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
     match spec.split_once(':') {
         None if spec == "phantom" => Ok(Box::new(PhantomCamera::new(settings))),
+        Some(("phantom", name)) if Before::named(name).is_some() => {
+            Ok(Box::new(PhantomCamera::looking(Before::named(name).unwrap_or(Before::Hand), settings)))
+        }
         Some(("footage", path)) if !path.is_empty() => match FootageCamera::open(Path::new(path), settings) {
             Ok(camera) => Ok(Box::new(camera)),
             Err(error) => Err(CameraError::BadSource(error.to_string())),
@@ -42,7 +46,8 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
                 .into(),
         )),
         _ => Err(CameraError::BadSource(format!(
-            "there is no camera `{spec}`; choose `phantom` (a simulated brain), `footage:PATH` (a video, an image or a \
+            "there is no camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and `phantom:dark` \
+             to try the bench's commands), `footage:PATH` (a video, an image or a \
              folder of images) or `gige:ID` (`gige:list` says which there are)"
         ))),
     }

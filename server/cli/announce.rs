@@ -10,16 +10,24 @@ use qrcode::render::unicode::Dense1x2;
 use crate::control::ControlStatus;
 use crate::http::error::role_name;
 use crate::http::keys::{Keys, ROLES};
+use crate::imaging::Calibration;
 use crate::trial::view::Role;
 
 /// The announcement for people, of a server that others reach at `host`; `terminal`, whether it goes to a terminal, which
 /// knows colours.
-pub fn announcement(host: SocketAddr, keys: &Keys, status: &ControlStatus, terminal: bool) -> String {
+pub fn announcement(
+    host: SocketAddr,
+    keys: &Keys,
+    status: &ControlStatus,
+    calibration: &Calibration,
+    terminal: bool,
+) -> String {
     let link = |role| format!("http://{host}/enter?key={}", keys.of(role));
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ =
         writeln!(text, "parfocal {} with {} and {}", env!("CARGO_PKG_VERSION"), status.camera.name, status.lens.name);
+    let _ = writeln!(text, "calibration: {}", calibration.title());
     if let Some(warning) = simulated(status) {
         let _ = writeln!(text, "\n*** {warning} ***");
     }

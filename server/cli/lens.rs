@@ -1,6 +1,7 @@
 //! `parfocal lens`: what a lens is, moving it by hand, sweeping it, and a lens driver that is not there.
 
 mod emulate;
+mod measure;
 mod sweep;
 
 use std::io::Write;
@@ -37,6 +38,8 @@ enum Action {
     },
     /// Step through the range and tabulate what was asked against what the lens reads back.
     Sweep(sweep::Arguments),
+    /// Step it and watch it settle with a camera: delay, settling time and hysteresis.
+    Measure(measure::Arguments),
     /// Start an emulated Optotune Lens Driver 4, print its port and serve it until Ctrl-C.
     Emulate(emulate::Arguments),
 }
@@ -74,6 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Action::Info { which } => info(which),
         Action::Set { focal_power, which } => set(*focal_power, which),
         Action::Sweep(arguments) => sweep::run(arguments),
+        Action::Measure(arguments) => measure::run(arguments),
         Action::Emulate(arguments) => emulate::run(arguments),
     }
 }

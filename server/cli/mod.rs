@@ -1,6 +1,8 @@
 //! The command line: one file a command; wires the rooms together.
 
 mod announce;
+mod calibrate;
+mod calibration;
 mod devices;
 mod evaluate;
 mod export;
@@ -8,6 +10,7 @@ mod inspect;
 mod lens;
 mod policies;
 mod serve;
+mod tables;
 mod train;
 mod verify;
 
@@ -25,6 +28,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Take a sensor's dark and white references, or import its maker's tables.
+    Calibrate(calibrate::Arguments),
     /// Write a session's data as a folder of CSV and JSON.
     Export(export::Arguments),
     /// Show what is made of pictures and mosaics: content area, patch, focus metrics.
@@ -61,6 +66,7 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Failure> {
     match command {
+        Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Lens(arguments) => lens::run(&arguments),

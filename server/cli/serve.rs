@@ -18,7 +18,7 @@ use tracing_subscriber::EnvFilter;
 
 use super::Failure;
 use super::announce::{announcement, reachable};
-use super::devices;
+use super::{calibration, devices};
 use crate::autofocus::Registry;
 use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
@@ -27,6 +27,7 @@ use crate::control::{ControlLoop, Rig, Settings};
 use crate::http::keys::Keys;
 use crate::http::{self, App};
 use crate::imaging::{Calibration, Reconstructor};
+use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
 use crate::store::{self, Store, telemetry};
 use crate::{lens, live};
 
@@ -54,9 +55,12 @@ pub struct Arguments {
     /// Folder of trial protocols beside those that ship.
     #[arg(long, value_name = "DIR")]
     protocols: Option<PathBuf>,
-    /// Calibration of the sensor (TOML); without it, that of a typical unit.
-    #[arg(long, value_name = "FILE")]
+    /// Calibration of the sensor, a TOML file or a folder of `parfocal calibrate`; without it, that of a typical unit.
+    #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
+    /// How the lens was measured to move, the dynamics.toml of `parfocal lens measure`; without it, what is usual.
+    #[arg(long, value_name = "FILE")]
+    lens_dynamics: Option<PathBuf>,
 }
 
 /// Telemetry that may wait for the disk: a quarter of a minute at 50 frames a second.
@@ -84,16 +88,19 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
     let address = listener.local_addr()?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
-    let store = open_store(arguments, clock.as_ref()).await?;
+    let calibration = calibration::read_or_default(arguments.calibration.as_deref())?;
+    let store = open_store(arguments, &calibration, clock.as_ref()).await?;
     let keys = Keys::load_or_create(&arguments.data_dir)?;
     let mut random = random(arguments)?;
     let registry = Registry::standard();
     let library = protocols(arguments, &registry)?;
-    let reconstructor = Reconstructor::new(&calibration(arguments)?);
-    let rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), random.random())?;
+    let reconstructor = Reconstructor::new(&calibration);
+    let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), random.random())?;
+    calibration::check_size(&calibration, "the camera's picture", rig.camera.mosaic_size())?;
+    let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
     let (control_loop, control, records) =
-        ControlLoop::spawn(Settings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY }, rig)?;
+        ControlLoop::spawn(Settings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY, dynamics }, rig)?;
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
     tokio::spawn(devices::record(store.clone(), Arc::clone(&clock), control.status.clone()));
     let (live, imaging) = live::start(control.clone(), reconstructor)?;
@@ -125,7 +132,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     });
     let host = app.address;
     let server = tokio::spawn(http::run(listener, app));
-    let announcement = announcement(host, &keys, &control.status.borrow(), std::io::stdout().is_terminal());
+    let announcement =
+        announcement(host, &keys, &control.status.borrow(), &calibration, std::io::stdout().is_terminal());
     // The server serves whether or not anyone reads this.
     let _ = std::io::stdout().write_all(announcement.as_bytes());
     signals.any().await;
@@ -138,12 +146,13 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-async fn open_store(arguments: &Arguments, clock: &dyn Clock) -> Result<Store, Failure> {
+async fn open_store(arguments: &Arguments, calibration: &Calibration, clock: &dyn Clock) -> Result<Store, Failure> {
     let run = store::Run {
         wall: clock.wall(),
         at: clock.now(),
         camera: arguments.camera.clone(),
         lens: arguments.lens.clone(),
+        calibration: calibration.title(),
         seed: arguments.seed,
     };
     Ok(Store::open(&arguments.data_dir, &run).await?)
@@ -164,13 +173,6 @@ fn protocols(arguments: &Arguments, registry: &Registry) -> Result<Library, Fail
     Ok(Library::load(folder, &known)?)
 }
 
-/// The calibration file's, or a typical sensor's.
-fn calibration(arguments: &Arguments) -> Result<Calibration, Failure> {
-    let Some(path) = &arguments.calibration else { return Ok(Calibration::default()) };
-    let text = std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    Ok(Calibration::from_toml(&text).map_err(|error| format!("{}: {error}", path.display()))?)
-}
-
 /// Opens lens and camera.
 fn rig(
     arguments: &Arguments,
@@ -184,6 +186,19 @@ fn rig(
     let settings = CameraSettings { fps: arguments.fps.into(), seed, optics: lens.optics(), clock: Arc::clone(&clock) };
     let camera = camera::open(&arguments.camera, settings)?;
     Ok(Rig { camera, lens, reconstructor, registry, clock })
+}
+
+/// The dynamics measured of this very lens.
+fn dynamics(path: &Path, lens: &mut dyn Lens) -> Result<LensDynamics, Failure> {
+    let named = |problem: String| format!("lens dynamics {}: {problem}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
+    let measured = MeasuredDynamics::from_toml(&text).map_err(named)?;
+    let info = lens.info()?;
+    if measured.serial != info.serial {
+        let problem = format!("they are of the lens {}, but this one is {}", measured.serial, info.serial);
+        return Err(named(format!("{problem}; measure it with `parfocal lens measure`")).into());
+    }
+    Ok(measured.dynamics())
 }
 
 fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {

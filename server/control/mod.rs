@@ -74,7 +74,7 @@ pub struct StepRecord {
     pub policy: Option<PolicyName>,
     /// Focal power asked of the lens after this frame.
     pub asked: FocalPower,
-    /// Focal power that the frame was exposed at, as far as the lens knows.
+    /// Focal power at the middle of the frame's exposure, by the lens's dynamics; none while the lens is away.
     pub measured: Option<FocalPower>,
     /// The policy's focus metric.
     pub metric: Option<f64>,

@@ -19,7 +19,7 @@ use crate::autofocus::Registry;
 use crate::camera::{Camera, CameraOffer, Controls, Frame};
 use crate::clock::{Clock, Moment};
 use crate::imaging::Reconstructor;
-use crate::lens::Lens;
+use crate::lens::{Lens, LensDynamics};
 
 /// Longest wait for a frame before commands are looked at.
 const TICK: Duration = Duration::from_millis(20);
@@ -51,6 +51,8 @@ pub struct Settings {
     pub frame_period: Duration,
     /// Telemetry records that may wait for their writer before further ones are dropped.
     pub telemetry_capacity: usize,
+    /// How the lens was measured to move, if it was; else what its driver supposes.
+    pub dynamics: Option<LensDynamics>,
 }
 
 /// The running loop. Dropping it ends the loop without waiting.
@@ -67,7 +69,9 @@ impl ControlLoop {
     /// When the system has no thread left.
     pub fn spawn(settings: Settings, rig: Rig) -> io::Result<(Self, ControlHandle, mpsc::Receiver<StepRecord>)> {
         let Rig { camera, lens, reconstructor, registry, clock } = rig;
-        let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period);
+        let dynamics = settings.dynamics.unwrap_or(lens.dynamics());
+        let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period)
+            .moving(dynamics);
         let controls = camera.controls();
         let source = Source::start(camera)?;
         let (telemetry, telemetry_out) = mpsc::channel(settings.telemetry_capacity.max(1));

@@ -13,7 +13,7 @@ use crate::camera::Frame;
 use crate::clock::Clock;
 use crate::ids::SegmentId;
 use crate::imaging::{ContentArea, Patch};
-use crate::lens::{FocalPower, Lens, LensError, LensHealth};
+use crate::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth};
 
 /// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation faster than time.
 pub struct Stepper {
@@ -73,6 +73,13 @@ impl Stepper {
         }
     }
 
+    /// The same with a lens that was measured to move like this.
+    #[must_use]
+    pub fn moving(mut self, dynamics: LensDynamics) -> Self {
+        self.attribution = Attribution::new(dynamics, self.asked);
+        self
+    }
+
     /// Obeys. Drive and segment change together, between two frames.
     pub fn obey(&mut self, command: Command) {
         match command {
@@ -108,7 +115,8 @@ impl Stepper {
     /// # Errors
     /// When the picture holds no patch; the step is then not taken.
     pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
-        let measured = self.lens.measured();
+        // A lens that is away may be anywhere.
+        let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
         let (area, patch) = self.eye.look(&frame.image, self.content_area.as_ref())?;
         let Choice { policy, outcome } = self.choose(&frame, &patch);
         let advice = self.act(outcome);

@@ -28,10 +28,14 @@ pub enum Reference {
 /// How one sensor's counts become reflectances and colours. Band = 4 * row + column of the mosaic cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// Which unit it belongs to.
+    /// What it is of.
     pub name: String,
-    /// Which calibration of that unit it is; exports name it.
+    /// Serial number of the sensor's unit, if it is known.
+    pub unit: Option<String>,
+    /// Which calibration of that unit it is; counts up with every change.
     pub version: String,
+    /// When it was changed last, if it is known.
+    pub date: Option<String>,
     /// Significant bits of a sample, 1..=16.
     pub bit_depth: u8,
     /// What the bands sense.
@@ -70,7 +74,9 @@ impl Default for Calibration {
     fn default() -> Self {
         Self {
             name: "CMV2K-SSM4X4-VIS 460-600 nm".to_owned(),
+            unit: None,
             version: "default".to_owned(),
+            date: None,
             bit_depth: 10,
             bands: DEFAULT_BANDS.map(|(centre_nm, fwhm_nm)| Band { centre_nm, fwhm_nm }),
             dark: Reference::PerBand([0.0; BANDS]),
@@ -87,6 +93,23 @@ impl Calibration {
         [&self.dark, &self.white].into_iter().all(|reference| match reference {
             Reference::PerBand(_) => true,
             Reference::PerPixel(frame) => frame.width() == width && frame.height() == height,
+        })
+    }
+
+    /// What exports and reports call it: name, unit, version and date.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let unit = self.unit.as_ref().map_or(String::new(), |unit| format!(", unit {unit}"));
+        let date = self.date.as_ref().map_or(String::new(), |date| format!(" of {date}"));
+        format!("{}{unit}, version {}{date}", self.name, self.version)
+    }
+
+    /// Size of its references per pixel, width and height in samples, if it has any.
+    #[must_use]
+    pub fn size(&self) -> Option<(usize, usize)> {
+        [&self.dark, &self.white].into_iter().find_map(|reference| match reference {
+            Reference::PerBand(_) => None,
+            Reference::PerPixel(frame) => Some((frame.width(), frame.height())),
         })
     }
 

@@ -1,4 +1,5 @@
-//! Reading a calibration from TOML text. Keys that are left out keep the default's value.
+//! Reading a calibration from TOML text. Keys that are left out keep the default's value. References per pixel stand in
+//! pictures beside it, which the caller reads.
 
 use std::collections::BTreeMap;
 
@@ -6,6 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::{Spanned, Value};
 
 use super::calibration::{BANDS, Band, Calibration, Reference, full_scale};
+use super::frame::MosaicFrame;
 
 /// Why a calibration could not be read. The caller knows the file and says its name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,20 +36,35 @@ impl Calibration {
     /// Reads a calibration:
     ///
     /// ```toml
-    /// name = "unit 12"
-    /// version = "2026-03-01"
+    /// name = "CMV2K-SSM4X4-VIS"
+    /// unit = "12"
+    /// version = "3"
+    /// date = "2026-03-01"
     /// bit_depth = 10
     /// centre_nm = [570.5, 576.9, 586.9, 594.9, 532.0, 544.4, 550.8, 560.0,
     ///              496.0, 503.0, 513.3, 524.1, 460.1, 468.5, 475.4, 484.5]
     /// fwhm_nm = [12.5, 16.3, 17.9, 16.3, 12.5, 17.4, 10.9, 16.6, 15.9, 18.3, 13.8, 17.4, 10.9, 9.2, 17.0, 10.1]
     /// dark = 32          # counts: one for all bands, or a list of 16
-    /// white = 900        # the same
+    /// white = "white-3.tiff"        # the same, or the name of a 16-bit picture with a count a pixel
     /// # spectral_correction = 16 rows of 16
     /// ```
     ///
     /// # Errors
     /// For text that is not TOML, an unknown key, or a value that cannot be; it names the line and the key.
     pub fn from_toml(text: &str) -> Result<Self, CalibrationError> {
+        let no_pictures =
+            "a count, or a list of 16; a picture's name stands only in a calibration that is read from a file";
+        Self::from_toml_with(text, |_| Err(format!("must be {no_pictures}")))
+    }
+
+    /// The same; `picture` reads the reference picture of a name, or says what is wrong with it.
+    ///
+    /// # Errors
+    /// As [`Calibration::from_toml`], and when a picture cannot be read or does not fit.
+    pub fn from_toml_with(
+        text: &str,
+        picture: impl Fn(&str) -> Result<MosaicFrame, String>,
+    ) -> Result<Self, CalibrationError> {
         let mut keys = Keys::parse(text)?;
         let mut calibration = Self::default();
         if let Some(name) = keys.text("name")? {
@@ -56,6 +73,7 @@ impl Calibration {
         if let Some(version) = keys.text("version")? {
             calibration.version = version;
         }
+        (calibration.unit, calibration.date) = (keys.text("unit")?, keys.text("date")?);
         if let Some(bit_depth) =
             keys.take::<u8>("bit_depth", "a whole number", |&bits| check((8..=16).contains(&bits), "must be 8 to 16"))?
         {
@@ -63,7 +81,7 @@ impl Calibration {
             calibration.white = Reference::PerBand([full_scale(bit_depth); BANDS]);
         }
         keys.bands(&mut calibration.bands)?;
-        keys.references(&mut calibration)?;
+        keys.references(&mut calibration, &picture)?;
         if let Some(rows) = keys.take("spectral_correction", "16 rows of 16 numbers", |rows: &Rows| {
             check(rows.iter().flatten().all(|value| value.is_finite()), "must be 16 rows of 16 finite numbers")
         })? {
@@ -134,23 +152,62 @@ impl<'a> Keys<'a> {
         Ok(())
     }
 
-    fn references(&mut self, calibration: &mut Calibration) -> Result<(), CalibrationError> {
+    fn references(
+        &mut self,
+        calibration: &mut Calibration,
+        picture: &impl Fn(&str) -> Result<MosaicFrame, String>,
+    ) -> Result<(), CalibrationError> {
         let most = calibration.full_scale();
+        let places = ["dark", "white"].map(|key| self.values.get(key).map_or(0, |value| value.span().start));
         // White must be a count above dark at least: a smaller span would blow noise up without bound.
-        let dark = self.counts("dark", |dark| {
-            let holds = dark.iter().all(|count| (0.0..=most - 1.0).contains(count));
-            check(holds, &format!("every count must be between 0 and {}", most - 1.0))
-        })?;
-        let dark = dark.unwrap_or(calibration.dark.band_means());
-        let white = self.counts("white", |white| {
-            let holds = white.iter().zip(&dark).all(|(white, dark)| (dark + 1.0..=most).contains(white));
-            check(holds, &format!("every count must be above that band's dark by 1 or more, and at most {most}"))
-        })?;
-        calibration.dark = Reference::PerBand(dark);
+        let dark = match self.picture("dark", most, picture)? {
+            Some(dark) => Some(dark),
+            None => self.counts("dark", |dark| {
+                let holds = dark.iter().all(|count| (0.0..=most - 1.0).contains(count));
+                check(holds, &format!("every count must be between 0 and {}", most - 1.0))
+            })?,
+        };
+        let above_dark = format!("every count must be above that band's dark by 1 or more, and at most {most}");
+        let white = match self.picture("white", most, picture)? {
+            Some(white) => Some(white),
+            None => self.counts("white", |white| {
+                let holds = white.iter().all(|count| (0.0..=most).contains(count));
+                check(holds, &above_dark)
+            })?,
+        };
+        calibration.dark = dark.unwrap_or(Reference::PerBand(calibration.dark.band_means()));
         if let Some(white) = white {
-            calibration.white = Reference::PerBand(white);
+            calibration.white = white;
         }
-        Ok(())
+        let (dark_means, white_means) = (calibration.dark.band_means(), calibration.white.band_means());
+        if !white_means.iter().zip(&dark_means).all(|(white, dark)| *white >= dark + 1.0) {
+            return Err(self.error("white", places[1], above_dark));
+        }
+        match calibration.size() {
+            Some((width, height)) if !calibration.fits(width, height) => {
+                Err(self.error("white", places[1], "must be a picture of the size of the dark one".to_owned()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The reference picture that `key` names, if it is text.
+    fn picture(
+        &mut self,
+        key: &str,
+        most: f32,
+        read: &impl Fn(&str) -> Result<MosaicFrame, String>,
+    ) -> Result<Option<Reference>, CalibrationError> {
+        if !self.values.get(key).is_some_and(|value| value.get_ref().is_str()) {
+            return Ok(None);
+        }
+        let at = self.values.get(key).map_or(0, |value| value.span().start);
+        let name = self.text(key)?.unwrap_or_default();
+        let frame = read(&name).map_err(|problem| self.error(key, at, problem))?;
+        if frame.samples().iter().any(|&sample| f32::from(sample) > most) {
+            return Err(self.error(key, at, format!("{name} has counts above {most}, the most of the bit depth")));
+        }
+        Ok(Some(Reference::PerPixel(frame)))
     }
 
     /// One count for all bands, or a list of 16.
@@ -158,7 +215,7 @@ impl<'a> Keys<'a> {
         &mut self,
         key: &str,
         check: impl FnOnce(&[f32; BANDS]) -> Result<(), String>,
-    ) -> Result<Option<[f32; BANDS]>, CalibrationError> {
+    ) -> Result<Option<Reference>, CalibrationError> {
         let single = self.values.get(key).and_then(|value| match value.get_ref() {
             Value::Integer(_) | Value::Float(_) => Some(value.get_ref().clone()),
             _ => None,
@@ -166,12 +223,12 @@ impl<'a> Keys<'a> {
         if let (Some(single), Some(value)) = (single, self.values.get_mut(key)) {
             *value.get_mut() = Value::Array(vec![single; BANDS]);
         }
-        self.take(key, "a count, or a list of 16", check)
+        Ok(self.take(key, "a count, or a list of 16", check)?.map(Reference::PerBand))
     }
 
     fn none_left(&self) -> Result<(), CalibrationError> {
         let Some((key, value)) = self.values.first_key_value() else { return Ok(()) };
-        let known = "name, version, bit_depth, centre_nm, fwhm_nm, dark, white, spectral_correction";
+        let known = "name, unit, version, date, bit_depth, centre_nm, fwhm_nm, dark, white, spectral_correction";
         Err(self.error(key, value.span().start, format!("is not a key of a calibration; there are: {known}")))
     }
 }
@@ -229,6 +286,7 @@ mod tests {
                 .starts_with("line 2, key 'white': every count must be above that band's dark")
         );
         assert!(message("dark = 100\nwhite = 100.0001").contains("by 1 or more"));
+        assert!(message("white = 'white.tiff'").contains("read from a file"));
         assert!(message("white = 2000").ends_with("by 1 or more, and at most 1023"));
         assert!(message("name = 'a'\nwhtie = 1").starts_with("line 2, key 'whtie': is not a key"));
         assert!(message("centre_nm = [nan]").contains("key 'centre_nm'"));

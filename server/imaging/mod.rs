@@ -3,6 +3,7 @@
 mod blur;
 mod calibration;
 mod calibration_toml;
+mod calibration_write;
 mod colour;
 pub mod content_area;
 mod decode;
@@ -11,6 +12,7 @@ mod geometry;
 mod jpeg;
 mod luma;
 mod reconstruct;
+mod references;
 
 pub use blur::gaussian_blur;
 pub use calibration::{BANDS, Band, Calibration, Reference};
@@ -21,3 +23,4 @@ pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
 pub use jpeg::{JpegEncoder, JpegError};
 pub use luma::{rgb_patch, rgb_to_gray};
 pub use reconstruct::Reconstructor;
+pub use references::{Average, BadReference};

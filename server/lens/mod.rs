@@ -1,5 +1,6 @@
 //! Lenses: focal power, and what drives it. Knows no image.
 
+mod dynamics;
 pub mod emulator;
 mod focal_power;
 pub mod optotune;
@@ -7,6 +8,7 @@ mod response;
 mod simulated;
 mod spec;
 
+pub use dynamics::MeasuredDynamics;
 pub use focal_power::{FocalPower, OutOfRange};
 pub use response::Response;
 pub use simulated::{SimulatedFault, SimulatedFaults, SimulatedLens};

@@ -25,6 +25,7 @@ const DIOPTRES: (f64, f64) = (5.0, 10.0);
 /// A lens that is not there.
 pub struct SimulatedLens {
     clock: Arc<dyn Clock>,
+    dynamics: LensDynamics,
     /// What the light sees.
     glass: Arc<Response>,
     /// What a driver can know: it cannot sense the glass, so hysteresis is not in it.
@@ -99,20 +100,32 @@ impl SimulatedLens {
     /// A lens at rest in the middle of its range.
     #[must_use]
     pub fn new(clock: Arc<dyn Clock>) -> Self {
+        Self::moving(DYNAMICS, clock)
+    }
+
+    /// The same with dynamics of its own.
+    #[must_use]
+    pub fn moving(dynamics: LensDynamics, clock: Arc<dyn Clock>) -> Self {
         Self {
             clock,
-            glass: Arc::new(Response::new(DYNAMICS, PLAY, FocalPower::MIDDLE)),
-            known: Response::new(DYNAMICS, 0.0, FocalPower::MIDDLE),
+            dynamics,
+            glass: Arc::new(Response::new(dynamics, PLAY, FocalPower::MIDDLE)),
+            known: Response::new(dynamics, 0.0, FocalPower::MIDDLE),
             faults: SimulatedFaults::default(),
             name: Arc::from("simulated lens"),
         }
     }
 
-    /// The lens of a specification's `options`: `fault`, the fault it starts with.
+    /// The lens of a specification's `options`: `fault`, the fault it starts with; `delay` and `settling`, milliseconds.
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let fault = options.take::<SimulatedFault>("fault")?;
+        let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
+        let dynamics = LensDynamics {
+            delay: millis(options.take("delay")?, DYNAMICS.delay),
+            settling: millis(options.take("settling")?, DYNAMICS.settling),
+        };
         options.finish()?;
-        let lens = Self::new(clock);
+        let lens = Self::moving(dynamics, clock);
         lens.faults.set(fault.unwrap_or_default());
         Ok(lens)
     }
@@ -173,7 +186,7 @@ impl Lens for SimulatedLens {
     }
 
     fn dynamics(&self) -> LensDynamics {
-        DYNAMICS
+        self.dynamics
     }
 
     fn optics(&self) -> Arc<dyn Optics> {

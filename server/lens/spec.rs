@@ -8,7 +8,8 @@ use super::{Lens, LensError};
 use crate::clock::Clock;
 use crate::options::Options;
 
-/// Opens the lens that `spec` names: `simulated` (option `fault`, see [`super::SimulatedFault`]), `optotune:auto` or
+/// Opens the lens that `spec` names: `simulated` (options `fault`, see [`super::SimulatedFault`], `delay` and
+/// `settling`, milliseconds), `optotune:auto` or
 /// `optotune:/dev/...` (options `min` and `max`, the dioptres to use, `low` and `high`, the temperature limits in °C).
 ///
 /// # Errors
@@ -39,12 +40,14 @@ mod tests {
         let fault = |spec| open(spec, Arc::new(SystemClock)).unwrap().faults().unwrap().get();
         assert_eq!(fault("simulated"), SimulatedFault::None);
         assert_eq!(fault("simulated?fault=stalls"), SimulatedFault::Stalls);
+        let slow = open("simulated?delay=20&settling=60", Arc::new(SystemClock)).unwrap().dynamics();
+        assert_eq!((slow.delay.as_millis(), slow.settling.as_millis()), (20, 60));
     }
 
     #[test]
     fn a_bad_specification_says_what_is_wrong_with_it() {
         assert!(message("magic").contains("'simulated', 'optotune:auto' or 'optotune:/dev/...'"));
         assert!(message("simulated?fault=fire").contains("choose from none, drops"));
-        assert!(message("simulated?size=3").contains("no option 'size'; there are: fault"));
+        assert!(message("simulated?size=3").contains("no option 'size'; there are: fault, delay, settling"));
     }
 }

@@ -12,7 +12,7 @@ impl Reader {
     /// The starts of the server that `session` has records of.
     pub(super) async fn export_runs(&self, session: SessionId) -> Result<Vec<Vec<Value>>, StoreError> {
         let rows = sqlx::query(
-            "SELECT run, wall, monotonic_ns, version, camera, lens FROM runs WHERE run IN (
+            "SELECT run, wall, monotonic_ns, version, camera, lens, calibration FROM runs WHERE run IN (
                  SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
                  UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1)
              ORDER BY run",
@@ -28,6 +28,7 @@ impl Reader {
                 string(row, "version")?,
                 string(row, "camera")?,
                 string(row, "lens")?,
+                string(row, "calibration")?,
             ])
         };
         rows.iter().map(row).collect()

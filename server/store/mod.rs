@@ -53,6 +53,8 @@ pub struct Run {
     pub camera: String,
     /// The lens, described.
     pub lens: String,
+    /// The sensor's calibration, by its title.
+    pub calibration: String,
     /// The seed given on the command line.
     pub seed: Option<u64>,
 }
@@ -196,16 +198,18 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
 }
 
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
-    let done =
-        sqlx::query("INSERT INTO runs (wall, monotonic_ns, version, camera, lens, seed) VALUES (?, ?, ?, ?, ?, ?)")
-            .bind(run.wall.to_string())
-            .bind(nanoseconds(run.at))
-            .bind(env!("CARGO_PKG_VERSION"))
-            .bind(&run.camera)
-            .bind(&run.lens)
-            .bind(run.seed.map(u64::cast_signed))
-            .execute(trial)
-            .await?;
+    let done = sqlx::query(
+        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, seed) VALUES (?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(run.wall.to_string())
+    .bind(nanoseconds(run.at))
+    .bind(env!("CARGO_PKG_VERSION"))
+    .bind(&run.camera)
+    .bind(&run.lens)
+    .bind(&run.calibration)
+    .bind(run.seed.map(u64::cast_signed))
+    .execute(trial)
+    .await?;
     Ok(done.last_insert_rowid())
 }
 

@@ -33,7 +33,14 @@ pub struct Bench {
 }
 
 pub fn a_run(clock: &ManualClock) -> Run {
-    Run { wall: clock.wall(), at: clock.now(), camera: "phantom".into(), lens: "simulated".into(), seed: None }
+    Run {
+        wall: clock.wall(),
+        at: clock.now(),
+        camera: "phantom".into(),
+        lens: "simulated".into(),
+        calibration: "typical".into(),
+        seed: None,
+    }
 }
 
 pub fn a_clock() -> ManualClock {

@@ -13,7 +13,7 @@ mod vessels;
 mod view;
 
 pub use hand::{Hand, Pose};
-pub use live::PhantomCamera;
+pub use live::{Before, PhantomCamera};
 pub use scene::{SIDE, Scene};
 
 use crate::imaging::{CELL, Calibration, ContentArea, PATCH_SIDE};
@@ -79,6 +79,19 @@ impl Phantom {
                 self.bands.expose(expected, lines, row, columns, self.exposure.gain());
                 self.sensor.read_row(out, CELL * y + row, CELL * columns.0, expected, noise[CELL * y + row]);
             }
+        }
+    }
+
+    /// Takes one exposure of a white tile under even light that brings `level` of full scale to the content area's centre:
+    /// 0 with the lens cap on.
+    pub fn expose_tile(&mut self, level: f32, samples: &mut [u16]) {
+        let noise = self.sensor.fresh_noise();
+        for (y, row) in samples.chunks_exact_mut(SENSOR_WIDTH).enumerate().take(SENSOR_HEIGHT) {
+            let (first, last) = self.optics.span(y / CELL);
+            let columns = if first <= last { first..last + 1 } else { 0..0 };
+            let light = columns.clone().map(|x| level * sensor::FULL_SCALE * self.optics.light(x, y / CELL));
+            let expected: Vec<f32> = light.flat_map(|counts| [counts; CELL]).collect();
+            self.sensor.read_row(row, y, CELL * columns.start, &expected, noise[y]);
         }
     }
 

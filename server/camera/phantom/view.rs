@@ -79,6 +79,11 @@ impl Optics {
         ContentArea { x, y, radius: f64::from(RADIUS), confidence: 1.0 }
     }
 
+    /// Light that reaches a pixel, 0..1.
+    pub(super) fn light(&self, x: usize, y: usize) -> f32 {
+        self.light[y * WIDTH + x]
+    }
+
     /// First and last lit column of a row; empty (`first > last`) in the dark.
     pub(super) fn span(&self, y: usize) -> (usize, usize) {
         self.spans[y]

@@ -9,7 +9,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::Failure;
+use super::{Failure, calibration};
 use crate::autofocus::{mgm, mlr};
 use crate::imaging::{
     Calibration, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode,
@@ -33,8 +33,9 @@ pub struct Arguments {
     /// Take 16-bit gray pictures of any size as mosaics
     #[arg(long)]
     mosaic: bool,
-    /// Calibration of the sensor that took the mosaics (TOML); without it, that of a typical unit
-    #[arg(long, value_name = "FILE")]
+    /// Calibration of the sensor that took the mosaics, a TOML file or a folder of `parfocal calibrate`; without it, that
+    /// of a typical unit
+    #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
 }
 
@@ -58,6 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     std::io::stdout().write_all(report::table(&reports).as_bytes())?;
+    if let Some(title) = inspector.titled.filter(|_| !arguments.json) {
+        writeln!(std::io::stdout(), "mosaics by the calibration {title}")?;
+    }
     if failed > 0 {
         return Err(format!("{failed} of {} files could not be inspected", arguments.paths.len()).into());
     }
@@ -69,8 +73,9 @@ struct Inspector<'a> {
     mosaic: bool,
     out: Option<&'a Path>,
     reconstructor: Reconstructor,
-    /// Largest count of a sample.
-    full_scale: f32,
+    calibration: Calibration,
+    /// Its title, where it was asked for.
+    titled: Option<String>,
     /// Names already given to overlays.
     taken: HashSet<OsString>,
 }
@@ -84,8 +89,7 @@ struct Seen {
 
 impl<'a> Inspector<'a> {
     fn new(arguments: &'a Arguments) -> Result<Self, Failure> {
-        let calibration =
-            arguments.calibration.as_deref().map_or_else(|| Ok(Calibration::default()), read_calibration)?;
+        let calibration = calibration::read_or_default(arguments.calibration.as_deref())?;
         if let Some(out) = &arguments.out {
             fs::create_dir_all(out).map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
         }
@@ -93,7 +97,8 @@ impl<'a> Inspector<'a> {
             mosaic: arguments.mosaic,
             out: arguments.out.as_deref(),
             reconstructor: Reconstructor::new(&calibration),
-            full_scale: calibration.full_scale(),
+            titled: arguments.calibration.is_some().then(|| calibration.title()),
+            calibration,
             taken: HashSet::new(),
         })
     }
@@ -114,6 +119,7 @@ impl<'a> Inspector<'a> {
             patch: area,
             mgm: mgm(&cut_out),
             mlr: mlr(&cut_out),
+            calibration: self.titled.clone().filter(|_| matches!(seen.kind, Kind::Mosaic)),
         };
         if let Some(out) = self.out {
             let target = out.join(self.overlay_name(path));
@@ -134,9 +140,11 @@ impl<'a> Inspector<'a> {
             Picture::Rgb(rgb, gray) => Seen { kind: Kind::Rgb, rgb, gray },
             Picture::Gray(gray) => Seen { kind: Kind::Gray, rgb: overlay::from_gray(&gray), gray },
             Picture::Mosaic(frame) => {
+                let size = (frame.width(), frame.height());
+                calibration::check_size(&self.calibration, &path.display().to_string(), Some(size))?;
                 let most = frame.samples().iter().copied().max().unwrap_or(0);
-                if f32::from(most) > self.full_scale {
-                    let limit = self.full_scale;
+                if f32::from(most) > self.calibration.full_scale() {
+                    let limit = self.calibration.full_scale();
                     eprintln!(
                         "parfocal: {}",
                         named(&format_args!(
@@ -162,12 +170,6 @@ impl<'a> Inspector<'a> {
         let mut names = (1..).map(numbered);
         names.find(|name| self.taken.insert(name.clone())).unwrap_or_default()
     }
-}
-
-fn read_calibration(path: &Path) -> Result<Calibration, Failure> {
-    let text =
-        fs::read_to_string(path).map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
-    Ok(Calibration::from_toml(&text).map_err(|error| format!("calibration {}, {error}", path.display()))?)
 }
 
 /// The patch of `gray` at `area`, which lies inside it.

@@ -26,6 +26,9 @@ pub(super) struct Report {
     pub patch: PatchArea,
     pub mgm: f64,
     pub mlr: f64,
+    /// The calibration of a mosaic, where one was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
 }
 
 impl fmt::Display for Kind {

@@ -12,6 +12,9 @@ pub(super) const WHITE: f32 = DARK + 16_384.0;
 /// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper than a cast.
 const LOW_BITS: f32 = 8_388_608.0;
 
+/// A pixel that sees less of white than this share of its band's mean has no balance of its own: it would show noise.
+const LEAST_SPAN: f32 = 0.1;
+
 /// Gain and offset of every pixel of the sensor, so that dark becomes [`DARK`] and white [`WHITE`].
 #[derive(Debug, Clone)]
 pub(super) struct PixelBalance {
@@ -24,11 +27,7 @@ pub(super) struct PixelBalance {
 impl PixelBalance {
     /// The balance by the references of `calibration`, if one of them is per pixel and they are of one size.
     pub(super) fn new(calibration: &Calibration) -> Option<Self> {
-        let (width, height) =
-            [&calibration.dark, &calibration.white].into_iter().find_map(|reference| match reference {
-                Reference::PerPixel(frame) => Some((frame.width(), frame.height())),
-                Reference::PerBand(_) => None,
-            })?;
+        let (width, height) = calibration.size()?;
         if !calibration.fits(width, height) {
             return None;
         }
@@ -41,9 +40,10 @@ impl PixelBalance {
             .map(|index| {
                 let dark = counts(&calibration.dark, &mean_dark, index);
                 let white = counts(&calibration.white, &mean_white, index);
-                // A dead pixel, which sees no white, is balanced as its band is.
+                // A dead pixel, or one outside the content area, sees next to no white: it is balanced as its band is.
                 let band = band(index, width);
-                let span = if white > dark { white - dark } else { mean_white[band] - mean_dark[band] };
+                let of_band = mean_white[band] - mean_dark[band];
+                let span = if white - dark > LEAST_SPAN * of_band { white - dark } else { of_band };
                 let gain = (WHITE - DARK) / span;
                 (gain, DARK - dark * gain)
             })

@@ -4,8 +4,10 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::unit::{Fault, Model};
+use super::wire::{REQUESTS, checksum_of, framed};
 use crate::clock::Moment;
-use crate::lens::{FocalPower, LensDynamics, Response};
+use crate::lens::{FocalPower, Response};
 
 /// Focal power that the emulated lens can reach at all, in dioptres.
 const LENS_DIOPTRES: (f64, f64) = (5.0, 10.0);
@@ -16,92 +18,9 @@ const NARROWING: f64 = 0.02;
 const IMAX_HUNDREDTHS: u16 = 29_284;
 /// A request whose rest does not come within this time is forgotten.
 const PATIENCE: Duration = Duration::from_millis(50);
-const GLASS: LensDynamics = LensDynamics { delay: Duration::from_millis(1), settling: Duration::from_millis(15) };
 const PLAY: f64 = 0.004;
 /// Focal power commands remembered for whoever wants to look.
 const REMEMBERED: usize = 8192;
-
-/// Every request but the greeting: its name, and the bytes between name and checksum.
-const REQUESTS: [(&[u8], usize); 17] = [
-    (b"H", 0),
-    (b"V", 1),
-    (b"X", 0),
-    (b"CrMA", 2),
-    (b"Aw", 2),
-    (b"Ar", 2),
-    (b"MwDA", 0),
-    (b"MwCA", 0),
-    (b"MMA", 0),
-    (b"PwTA", 4),
-    (b"PwDA", 4),
-    (b"PwUA", 4),
-    (b"PwLA", 4),
-    (b"PwFA", 4),
-    (b"PrDA", 4),
-    (b"TCA", 0),
-    (b"Sr", 0),
-];
-
-/// What is wrong with the emulated driver.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Fault {
-    /// Nothing.
-    #[default]
-    None,
-    /// Every reply is noise.
-    Garbage,
-    /// Every reply has a wrong checksum.
-    WrongChecksum,
-    /// Nothing is answered and nothing done.
-    Silent,
-    /// Every request is answered with an error, and not carried out.
-    Errors,
-    /// Focal power commands are ignored.
-    DropsCommands,
-    /// Some other device that says what it likes.
-    Stranger,
-}
-
-impl std::str::FromStr for Fault {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        match name {
-            "none" => Ok(Self::None),
-            "garbage" => Ok(Self::Garbage),
-            "wrong-checksum" => Ok(Self::WrongChecksum),
-            "silent" => Ok(Self::Silent),
-            "errors" => Ok(Self::Errors),
-            "drops-commands" => Ok(Self::DropsCommands),
-            "stranger" => Ok(Self::Stranger),
-            _ => Err(format!(
-                "there is no fault '{name}': choose from none, garbage, wrong-checksum, silent, errors, \
-                 drops-commands, stranger"
-            )),
-        }
-    }
-}
-
-/// What makes one unit differ from another.
-#[derive(Debug, Clone)]
-pub struct Model {
-    /// Serial number, eight characters.
-    pub serial: [u8; 8],
-    /// Type of firmware, `A` to `F`.
-    pub firmware: u8,
-    /// Time to answer a request.
-    pub latency: Duration,
-    /// Whether error numbers are sent as digits rather than bytes.
-    pub ascii_errors: bool,
-    /// Whether a wrong checksum is answered with `N` as old firmware does.
-    pub old: bool,
-}
-
-impl Default for Model {
-    fn default() -> Self {
-        Self { serial: *b"EMUL0001", firmware: b'A', latency: Duration::from_millis(1), ascii_errors: true, old: false }
-    }
-}
 
 /// A driver with its lens.
 pub struct Firmware {
@@ -130,12 +49,12 @@ impl Firmware {
     /// A unit that has just got power.
     pub fn new(model: Model) -> Self {
         Self {
+            glass: Arc::new(Response::new(model.glass, PLAY, FocalPower::MIN)),
             model,
             fault: Fault::None,
             temperature: 25.5,
             lens_present: true,
             commands: VecDeque::new(),
-            glass: Arc::new(Response::new(GLASS, PLAY, FocalPower::MIN)),
             mode: 1,
             limits: None,
             focal_power: 0,
@@ -333,22 +252,6 @@ impl Firmware {
         }
         answer
     }
-}
-
-fn framed(payload: &[u8]) -> Vec<u8> {
-    [payload, &checksum_of(payload), b"\r\n"].concat()
-}
-
-/// CRC-16/ARC bit by bit, low byte first.
-fn checksum_of(payload: &[u8]) -> [u8; 2] {
-    let mut crc = 0_u16;
-    for &byte in payload {
-        crc ^= u16::from(byte);
-        for _ in 0..8 {
-            crc = if crc & 1 == 1 { (crc >> 1) ^ 0xA001 } else { crc >> 1 };
-        }
-    }
-    crc.to_le_bytes()
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "a lens's temperature")]

@@ -7,12 +7,14 @@
 
 mod firmware;
 mod pty;
+mod unit;
+mod wire;
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-pub use firmware::{Fault, Model};
+pub use unit::{Fault, Model};
 
 use super::Response;
 use crate::clock::{Clock, Moment};

@@ -30,6 +30,7 @@ pub const RUNS: Table = Table {
         column("version", String, "", "Version of parfocal"),
         column("camera", String, "", "The camera"),
         column("lens", String, "", "The lens"),
+        column("calibration", String, "", "The sensor's calibration: name, unit, version and date"),
     ],
     key: &["run"],
 };
@@ -168,7 +169,7 @@ pub const TELEMETRY: Table = Table {
             "measured",
             Number,
             "focal power, 0..1",
-            "Focal power that the frame was exposed at, as far as the lens knows",
+            "Focal power at the middle of the frame's exposure, by the lens's dynamics; empty while the lens was away",
         ),
         column("held", Boolean, "", "Whether the lens was held, by a pause or the watchdog"),
         column("optimal", Number, "focal power, 0..1", "The optimum, where camera and lens are simulated"),

@@ -1,0 +1,52 @@
+//! Bench: what is measured once, before the first session: how a lens answers a step, as a camera sees it. Knows no web,
+//! no trial and no policy.
+
+mod curve;
+mod fit;
+mod plot;
+mod steps;
+mod view;
+
+pub use fit::Fit;
+pub use plot::plot;
+pub use steps::{Measurement, Plan, Sample, measure};
+pub use view::View;
+
+use crate::camera::CameraError;
+use crate::control::HoldReason;
+use crate::lens::LensError;
+
+/// Why a lens could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The lens.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// The camera.
+    #[error("no frames to measure with: {0}")]
+    Camera(#[from] CameraError),
+    /// The camera's picture is of no use.
+    #[error("{0}")]
+    Picture(String),
+    /// The lens moves and nothing is seen of it.
+    #[error(
+        "the picture hardly changes with the focal power ({:.0} %): put something with fine texture under the optics, in \
+         focus somewhere within the lens's range, and light it well", 100.0 * .0
+    )]
+    Flat(f64),
+    /// Steps do not look alike.
+    #[error(
+        "the steps do not look alike (they scatter by {:.0} %): camera and object must stand still, and the light must not \
+         flicker", 100.0 * .0
+    )]
+    Unsteady(f64),
+    /// It was not watched for long enough.
+    #[error("the lens had not settled after {0:.0} ms: watch for longer, with --watch")]
+    TooSlow(f64),
+}
+
+impl From<HoldReason> for BenchError {
+    fn from(reason: HoldReason) -> Self {
+        Self::Picture(reason.message.to_string())
+    }
+}

@@ -1,0 +1,183 @@
+//! `parfocal calibrate`: a sensor's own calibration, from its maker's tables and from dark and white references.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::{Failure, calibration, tables};
+use crate::camera::{self, CameraSettings, FrameImage};
+use crate::clock::{Clock, SystemClock};
+use crate::imaging::{Average, Calibration, Reference};
+use crate::lens::{Lens, SimulatedLens};
+
+/// Frames let pass before the first that counts: settings take effect, automatics settle.
+const WARM_UP: u32 = 10;
+/// Longest wait for a frame.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Arguments of `parfocal calibrate`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Take the dark reference: with the lens cap on, at the exposure and gain that will be used.
+    Dark(Capture),
+    /// Take the white reference: an even white target that fills the picture, out of focus, in the light that will be used.
+    White(Capture),
+    /// Import what the maker measured of this unit: band centres and widths, responses, spectral correction.
+    Import(Import),
+}
+
+#[derive(Debug, clap::Args)]
+struct Capture {
+    /// Camera, for example `gige:ID?exposure=8000&gain=0`; `phantom:dark` and `phantom:white` to try it.
+    #[arg(long, value_name = "SPEC")]
+    camera: String,
+    #[command(flatten)]
+    to: Destination,
+    /// Frames to average.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    frames: u32,
+    /// Frames a second to ask of the camera.
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    fps: u32,
+}
+
+#[derive(Debug, clap::Args)]
+struct Import {
+    /// A calibration as TOML: any of name, unit, `bit_depth`, `centre_nm`, `fwhm_nm`, dark, white, `spectral_correction`.
+    #[arg(value_name = "FILE")]
+    from: Option<PathBuf>,
+    /// The bands' responses as CSV: a line a wavelength, in nm, followed by 16 responses.
+    #[arg(long, value_name = "CSV")]
+    responses: Option<PathBuf>,
+    /// The spectral correction as CSV: 16 lines of 16.
+    #[arg(long, value_name = "CSV")]
+    correction: Option<PathBuf>,
+    #[command(flatten)]
+    to: Destination,
+}
+
+#[derive(Debug, clap::Args)]
+struct Destination {
+    /// Folder of the calibration; what is there already is built upon.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// What the calibration is to be called.
+    #[arg(long)]
+    name: Option<String>,
+    /// Serial number of the sensor's unit.
+    #[arg(long)]
+    unit: Option<String>,
+}
+
+/// Does what the arguments say.
+///
+/// # Errors
+/// When the camera fails, a reference is no use, or a file cannot be read or written.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.action {
+        Action::Dark(capture) => dark(capture),
+        Action::White(capture) => white(capture),
+        Action::Import(arguments) => import(arguments),
+    }
+}
+
+fn dark(capture: &Capture) -> Result<(), Failure> {
+    let mut calibration = capture.to.begun()?;
+    let dark = take(capture, &calibration)?.dark().map_err(|error| refused("dark", &error))?;
+    let size = (dark.width(), dark.height());
+    if calibration.size().is_some_and(|before| before != size) {
+        // The white reference of another size is of no use any more.
+        calibration.white = Reference::PerBand(calibration.white.band_means());
+    }
+    calibration.dark = Reference::PerPixel(dark);
+    capture.to.save(calibration, &["dark"])
+}
+
+fn white(capture: &Capture) -> Result<(), Failure> {
+    let mut calibration = capture.to.begun()?;
+    let Reference::PerPixel(dark) = &calibration.dark else {
+        return Err(format!(
+            "there is no dark reference in {} yet: put the lens cap on and run `parfocal calibrate dark` first",
+            capture.to.out.display()
+        )
+        .into());
+    };
+    let white = take(capture, &calibration)?.white(dark).map_err(|error| refused("white", &error))?;
+    calibration.white = Reference::PerPixel(white);
+    capture.to.save(calibration, &["white"])
+}
+
+fn refused(which: &str, error: &dyn std::fmt::Display) -> Failure {
+    format!("this is no {which} reference, and nothing was kept: {error}").into()
+}
+
+/// Adds up frames of the camera.
+fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure> {
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+    let optics = SimulatedLens::new(Arc::clone(&clock)).optics();
+    let mut camera = camera::open(&capture.camera, CameraSettings { fps: capture.fps.into(), seed: 0, optics, clock })?;
+    let mut average = Average::new(calibration.full_scale());
+    for number in 0..WARM_UP + capture.frames {
+        let frame = camera.next_frame(PATIENCE)?;
+        match frame.image {
+            FrameImage::Mosaic(mosaic) if number >= WARM_UP => average.add(&mosaic)?,
+            FrameImage::Mosaic(_) => {}
+            FrameImage::Rgb(_) => {
+                return Err(format!(
+                    "the camera {} delivers colour pictures: there is nothing to calibrate",
+                    capture.camera
+                )
+                .into());
+            }
+        }
+    }
+    Ok(average)
+}
+
+fn import(arguments: &Import) -> Result<(), Failure> {
+    if arguments.from.is_none() && arguments.responses.is_none() && arguments.correction.is_none() {
+        return Err("there is nothing to import: name a TOML file, --responses or --correction".into());
+    }
+    let mut calibration = arguments.to.begun()?;
+    let mut changed = Vec::new();
+    if let Some(path) = &arguments.from {
+        calibration = Calibration { version: calibration.version, ..calibration::read(path)? };
+        changed = vec!["dark", "white"];
+    }
+    if let Some(path) = &arguments.responses {
+        calibration.bands = tables::bands(path)?;
+    }
+    if let Some(path) = &arguments.correction {
+        calibration.correction = tables::correction(path)?;
+    }
+    arguments.to.save(calibration, &changed)
+}
+
+impl Destination {
+    /// The calibration that is there, or a typical unit's to begin with.
+    fn begun(&self) -> Result<Calibration, Failure> {
+        calibration::read_or_default(Some(self.out.as_path()).filter(|folder| folder.join("calibration.toml").exists()))
+    }
+
+    /// Keeps `calibration` as the next version, of today.
+    fn save(&self, mut calibration: Calibration, changed: &[&str]) -> Result<(), Failure> {
+        let before = calibration.version.parse::<u32>().unwrap_or(0);
+        calibration.version = (before + 1).to_string();
+        calibration.date = Some(SystemClock.wall().strftime("%Y-%m-%d").to_string());
+        if let Some(name) = &self.name {
+            calibration.name.clone_from(name);
+        }
+        if self.unit.is_some() {
+            calibration.unit.clone_from(&self.unit);
+        }
+        let path = calibration::save(Path::new(&self.out), &calibration, changed)?;
+        println!("{}\nkept in {}", calibration.title(), path.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,97 @@
+//! Calibrations in files: TOML, with pictures of 16 bit beside it for references per pixel.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::{ImageBuffer, ImageFormat, Luma};
+
+use super::Failure;
+use crate::imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
+
+/// Name of the current calibration in its folder. Earlier ones stay beside it, by their version.
+const CURRENT: &str = "calibration.toml";
+
+/// Reads the calibration in the file `path`, or the current one of the folder `path`.
+pub fn read(path: &Path) -> Result<Calibration, Failure> {
+    let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
+    let text = fs::read_to_string(&path)
+        .map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let calibration = Calibration::from_toml_with(&text, |name| picture(folder, name));
+    Ok(calibration.map_err(|error| format!("calibration {}, {error}", path.display()))?)
+}
+
+/// The calibration of `path` if one is given, else that of a typical unit.
+pub fn read_or_default(path: Option<&Path>) -> Result<Calibration, Failure> {
+    path.map_or_else(|| Ok(Calibration::default()), read)
+}
+
+/// Refuses a calibration whose references per pixel do not fit frames of `size`.
+pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Result<(), Failure> {
+    match (calibration.size(), size) {
+        (Some(taken), Some(size)) if taken != size => Err(format!(
+            "the calibration {} was taken at {}x{}, but {of} is {}x{}: take the references afresh with `parfocal calibrate`, \
+             or set the camera to the size that they were taken at",
+            calibration.title(),
+            taken.0,
+            taken.1,
+            size.0,
+            size.1
+        )
+        .into()),
+        _ => Ok(()),
+    }
+}
+
+fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
+    let path = folder.join(name);
+    let bytes = fs::read(&path).map_err(|error| format!("cannot read the picture {}: {error}", path.display()))?;
+    match decode(&bytes, true) {
+        Ok(Picture::Mosaic(frame)) => Ok(frame),
+        Ok(_) => Err(format!("{name} is no 16-bit gray picture")),
+        Err(error) => Err(format!("{name}: {error}")),
+    }
+}
+
+/// Keeps `calibration` in `folder` as the current one; the one before stays there under its version's name. `changed`
+/// names the references that are new. Returns the file's name.
+pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, Failure> {
+    let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
+    fs::create_dir_all(folder).map_err(failed)?;
+    let current = folder.join(CURRENT);
+    let before = fs::read_to_string(&current).unwrap_or_default();
+    let mut names = ["dark", "white"].map(|key| named(&before, key));
+    let references = [("dark", &calibration.dark), ("white", &calibration.white)];
+    for ((key, reference), name) in references.into_iter().zip(&mut names) {
+        if let Reference::PerPixel(frame) = reference
+            && (changed.contains(&key) || name.is_empty())
+        {
+            *name = format!("{key}-{}.tiff", calibration.version);
+            write_picture(&folder.join(name.as_str()), frame)?;
+        }
+    }
+    let text = calibration.to_toml(&names[0], &names[1]);
+    if !before.is_empty() {
+        let version = named(&before, "version");
+        fs::rename(&current, folder.join(format!("calibration-{version}.toml"))).map_err(failed)?;
+    }
+    // Renamed into place: whoever reads finds a whole one.
+    let fresh = folder.join(format!("{CURRENT}.new"));
+    fs::write(&fresh, text).and_then(|()| fs::rename(&fresh, &current)).map_err(failed)?;
+    Ok(current)
+}
+
+/// The text that `key` has in a calibration's TOML; empty if it has none.
+fn named(toml: &str, key: &str) -> String {
+    let table: toml::Table = toml::from_str(toml).unwrap_or_default();
+    table.get(key).and_then(toml::Value::as_str).unwrap_or_default().to_owned()
+}
+
+fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), Failure> {
+    let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
+    let size = |side: usize| u32::try_from(side).map_err(|_| failed(&"it is too large"));
+    let picture: Option<ImageBuffer<Luma<u16>, _>> =
+        ImageBuffer::from_raw(size(frame.width())?, size(frame.height())?, frame.samples());
+    let picture = picture.ok_or_else(|| failed(&"its size is wrong"))?;
+    Ok(picture.save_with_format(path, ImageFormat::Tiff).map_err(|error| failed(&error))?)
+}

@@ -1,0 +1,68 @@
+//! What every reply has around its payload, and the replies that are errors.
+
+use crc::{CRC_16_ARC, Crc, Table};
+
+pub(super) const CHECKSUM: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_ARC);
+
+/// What firmware before error codes answers to a damaged request.
+const OLD_CRC_ERROR: &[u8] = b"N\r\n";
+/// Bytes of checksum and line end behind a reply's payload.
+pub(super) const TRAILER: usize = 4;
+/// Bytes of an error reply: `E`, its number, trailer.
+const ERROR_LENGTH: usize = 2 + TRAILER;
+
+/// Why bytes are no reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum WireError {
+    /// The checksum does not fit.
+    #[error("a reply's checksum is wrong")]
+    Checksum,
+    /// It has not the form of a reply to this request.
+    #[error("a reply is unreadable")]
+    Garbage,
+    /// The driver answered with an error.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+}
+
+/// An error that the driver itself reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum DeviceError {
+    /// Error 1, or `N` from old firmware.
+    #[error("the driver says that a command reached it damaged")]
+    Checksum,
+    /// Error 2.
+    #[error("the driver says that its firmware does not have this command: update it")]
+    NotInFirmware,
+    /// Error 3.
+    #[error("the driver says that it does not know this command")]
+    Unknown,
+    /// Error 4.
+    #[error("the driver says that the lens does not fit: plug a compatible lens in")]
+    LensIncompatible,
+    /// Any other.
+    #[error("the driver reports error {0}")]
+    Other(u8),
+}
+
+/// The error reply at the start of `bytes`, if there is one. The error's number comes as a digit or as a byte.
+#[must_use]
+pub fn error_reply(bytes: &[u8]) -> Option<DeviceError> {
+    if bytes.starts_with(OLD_CRC_ERROR) {
+        return Some(DeviceError::Checksum);
+    }
+    let &[b'E', number] = checked(bytes.get(..ERROR_LENGTH)?)? else { return None };
+    Some(match number.checked_sub(b'0').unwrap_or(number) {
+        1 => DeviceError::Checksum,
+        2 => DeviceError::NotInFirmware,
+        3 => DeviceError::Unknown,
+        4 => DeviceError::LensIncompatible,
+        other => DeviceError::Other(other),
+    })
+}
+
+/// The payload of a whole reply, if line end and checksum are right.
+pub(super) fn checked(reply: &[u8]) -> Option<&[u8]> {
+    let (payload, checksum) = reply.strip_suffix(b"\r\n")?.split_last_chunk::<2>()?;
+    (CHECKSUM.checksum(payload) == u16::from_le_bytes(*checksum)).then_some(payload)
+}

@@ -1,0 +1,111 @@
+//! `parfocal calibrate`: references taken with the phantom, what is refused, and what the rest of the program makes of it.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn parfocal(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap()
+}
+
+fn done(arguments: &[&str]) -> String {
+    let output = parfocal(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refused(arguments: &[&str]) -> String {
+    let output = parfocal(arguments);
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn capture<'a>(which: &'a str, camera: &'a str, out: &'a Path) -> [&'a str; 8] {
+    ["calibrate", which, "--camera", camera, "--frames", "4", "--out", out.to_str().unwrap()]
+}
+
+#[test]
+fn dark_and_white_make_a_calibration_that_names_itself_and_flattens_the_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("unit");
+    let calibration = out.to_str().unwrap();
+    assert!(refused(&capture("white", "phantom:white", &out)).contains("run `parfocal calibrate dark` first"));
+    done(&[&capture("dark", "phantom:dark", &out)[..], &["--unit", "7", "--name", "theatre 2"]].concat());
+    // Each mistaken for the other, and colour where bands are needed.
+    let said = refused(&capture("white", "phantom:dark", &out));
+    assert!(said.contains("nothing was kept: nothing is seen") && said.contains("`calibrate dark`"), "{said}");
+    assert!(refused(&capture("dark", "phantom:white", &out)).contains("`calibrate white`"));
+    let said = done(&capture("white", "phantom:white", &out));
+    assert!(said.starts_with("theatre 2, unit 7, version 2 of 20"), "{said}");
+
+    let toml = fs::read_to_string(out.join("calibration.toml")).unwrap();
+    assert!(toml.contains("dark = \"dark-1.tiff\"") && toml.contains("white = \"white-2.tiff\""), "{toml}");
+    assert!(out.join("calibration-1.toml").exists(), "the version before is kept");
+
+    // The white reference itself, seen by its calibration, is even: its focus metric is that of nothing.
+    let white = out.join("white-2.tiff");
+    let inspect = |extra: &[&str]| -> serde_json::Value {
+        let line = done(&[&["inspect", "--json", white.to_str().unwrap()][..], extra].concat());
+        serde_json::from_str(&line).unwrap()
+    };
+    let (plain, flat) = (inspect(&[]), inspect(&["--calibration", calibration]));
+    assert!(flat["mgm"].as_f64().unwrap() < 0.01, "{flat}");
+    assert!(plain["mgm"].as_f64().unwrap() > 0.5, "{plain}");
+    assert!(flat["calibration"].as_str().unwrap().starts_with("theatre 2, unit 7, version 2"));
+    assert!(plain.get("calibration").is_none());
+}
+
+#[test]
+fn references_of_another_size_are_refused_when_the_camera_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    let reference = image::ImageBuffer::from_pixel(8, 8, image::Luma([40_u16]));
+    reference.save(folder.path().join("dark.tiff")).unwrap();
+    let file = folder.path().join("small.toml");
+    fs::write(&file, "name = 'small'\ndark = 'dark.tiff'\n").unwrap();
+    let data = folder.path().join("data");
+    let file = file.to_str().unwrap();
+    let serve = ["serve", "--bind", "127.0.0.1:0", "--data-dir", data.to_str().unwrap(), "--calibration", file];
+    let said = refused(&serve);
+    assert!(said.contains("small, version default was taken at 8x8, but the camera's picture is 2048x1088"), "{said}");
+    fs::write(file, "dark = 'missing.tiff'").unwrap();
+    assert!(refused(&serve).contains("key 'dark': cannot read the picture"), "the file and the key are named");
+    fs::write(file, "white = 'dark.tiff'\ndark = 90").unwrap();
+    assert!(refused(&serve).contains("key 'white': every count must be above"));
+}
+
+#[test]
+fn a_makers_tables_are_imported() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    // Band b: a triangle of half width 10 nm about 460 + 8 b.
+    let line = |nm: u32| {
+        let of = |band: u32| (1.0 - (f64::from(nm) - f64::from(460 + 8 * band)).abs() / 10.0).max(0.0).to_string();
+        format!("{nm},{}\n", (0..16).map(of).collect::<Vec<_>>().join(","))
+    };
+    let heading = format!("nm,{}\n", ["band"; 16].join(","));
+    fs::write(path("responses.csv"), heading + &(440..=600).map(line).collect::<String>()).unwrap();
+    let row = |row: usize| (0..16).map(|at| if at == row { "0.5" } else { "0" }).collect::<Vec<_>>().join(", ") + "\n";
+    fs::write(path("correction.csv"), (0..16).map(row).collect::<String>()).unwrap();
+    let out = path("unit");
+    done(&[
+        "calibrate",
+        "import",
+        "--responses",
+        &path("responses.csv"),
+        "--correction",
+        &path("correction.csv"),
+        "--unit",
+        "9",
+        "--out",
+        &out,
+    ]);
+    let toml: toml::Table = toml::from_str(&fs::read_to_string(path("unit/calibration.toml")).unwrap()).unwrap();
+    assert_eq!(toml["unit"].as_str(), Some("9"));
+    let number = |key: &str, at: usize| toml[key][at].as_float().unwrap();
+    assert!((number("centre_nm", 3) - 484.0).abs() < 1e-9 && (number("fwhm_nm", 3) - 10.0).abs() < 1e-9);
+    assert_eq!(toml["spectral_correction"][4][4].as_float(), Some(0.5));
+
+    fs::write(path("correction.csv"), "1,2,3\n").unwrap();
+    let said = refused(&["calibrate", "import", "--correction", &path("correction.csv"), "--out", &out]);
+    assert!(said.contains("line 1 must be 16 numbers"), "{said}");
+}
