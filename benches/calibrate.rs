@@ -34,8 +34,8 @@ fn candidates() -> Vec<Candidate> {
     for strength in [0.3, 0.4, 0.5, 0.6, 0.7] {
         add(format!("tremor, sd {strength} px"), ScanSettings { tremor: strength, ..plain }, 0.0);
     }
-    for strength in [0.4f32, 0.8, 1.2] {
-        for speed in [1.0, 2.0, 4.0] {
+    for strength in [0.4f32, 0.8, 1.0, 1.2] {
+        for speed in [1.0, 2.0, 4.0, 5.0, 6.0] {
             let mut settings = plain;
             settings.crop.speed = speed;
             add(format!("contrast from place to place, sd {strength}, crop {speed} px"), settings, strength);

@@ -31,11 +31,17 @@ pub enum Spot {
 pub struct Defocus {
     source: Box<[f32]>,
     rows: Box<[f32]>,
+    sums: Box<[f32]>,
 }
 
 impl Default for Defocus {
     fn default() -> Self {
-        Self { source: vec![0.0; MAX_SIDE * MAX_SIDE].into(), rows: vec![0.0; MAX_SIDE * PATCH_SIDE].into() }
+        let zeros = |count| vec![0.0; count].into();
+        Self {
+            source: zeros(MAX_SIDE * MAX_SIDE),
+            rows: zeros(MAX_SIDE * PATCH_SIDE),
+            sums: zeros(MAX_SIDE * (MAX_SIDE + 1)),
+        }
     }
 }
 
@@ -55,7 +61,10 @@ impl Defocus {
                 blur_rows(&self.source[..side * side], side, &kernel, &mut self.rows);
                 blur_columns(&self.rows[..side * PATCH_SIDE], &kernel, &mut patch.0);
             }
-            Spot::Disc => disc(&mut self.source[..side * side], side, reach, 2.0 * sigma as f32, &mut patch.0),
+            Spot::Disc => {
+                let source = &self.source[..side * side];
+                disc(source, side, reach, 2.0 * sigma as f32, &mut self.sums, &mut patch.0);
+            }
         }
         patch
     }
@@ -110,41 +119,37 @@ fn blur_columns(rows: &[f32], kernel: &[f32], out: &mut [f32]) {
     }
 }
 
-/// Mean over a disc, its rim weighted by cover along the row: each row's span is a difference of running sums.
-fn disc(source: &mut [f32], side: usize, reach: usize, radius: f32, out: &mut [f32]) {
-    for line in source.chunks_exact_mut(side) {
+/// Mean over a disc, its rim weighted by cover along the row: each row's span is a difference of running sums, and all
+/// columns of a row share how their spans lie to the pixels.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn disc(source: &[f32], side: usize, reach: usize, radius: f32, sums: &mut [f32], out: &mut [f32]) {
+    for (line, sums) in source.chunks_exact(side).zip(sums.chunks_exact_mut(side + 1)) {
+        sums[0] = 0.0;
         let mut sum = 0.0;
-        for value in line {
-            sum += *value;
-            *value = sum;
+        for (value, after) in line.iter().zip(&mut sums[1..]) {
+            sum += value;
+            *after = sum;
         }
     }
-    let spans: Vec<(usize, f32)> = (0..=2 * reach)
-        .filter_map(|row| {
-            let high = row as f32 - reach as f32;
-            let half = (radius * radius - high * high).max(0.0).sqrt();
-            (half > 0.0).then_some((row, half.min(reach as f32)))
-        })
-        .collect();
-    let area: f32 = spans.iter().map(|(_, half)| 2.0 * half).sum();
-    // Sum of a line's values left of the position `at` (pixel i covers i..i + 1).
-    let until = |line: &[f32], at: f32| {
-        let whole = at as usize;
-        let (before, after) = (if whole == 0 { 0.0 } else { line[whole - 1] }, line[whole.min(side - 1)]);
-        before + (after - before) * (at - whole as f32)
-    };
-    for (index, value) in out.iter_mut().enumerate() {
-        let (row, column) = (index / PATCH_SIDE, index % PATCH_SIDE);
-        let centre = (column + reach) as f32 + 0.5;
-        *value = spans
-            .iter()
-            .map(|&(offset, half)| {
-                let line = &source[(row + offset) * side..(row + offset + 1) * side];
-                until(line, centre + half) - until(line, centre - half)
-            })
-            .sum::<f32>()
-            / area;
+    let mut area = 0.0;
+    out.fill(0.0);
+    for offset in 0..=2 * reach {
+        let high = offset as f32 - reach as f32;
+        let half = (radius * radius - high * high).max(0.0).sqrt().min(reach as f32);
+        area += 2.0 * half;
+        let middle = reach as f32 + 0.5;
+        for (edge, sign) in [(middle + half, 1.0f32), (middle - half, -1.0)] {
+            let whole = edge as usize;
+            let (near, far) = (sign * (1.0 - edge.fract()), sign * edge.fract());
+            for (row, out) in out.chunks_exact_mut(PATCH_SIDE).enumerate() {
+                let sums = &sums[(row + offset) * (side + 1) + whole..][..PATCH_SIDE + 1];
+                for (value, pair) in out.iter_mut().zip(sums.windows(2)) {
+                    *value += near * pair[0] + far * pair[1];
+                }
+            }
+        }
     }
+    out.iter_mut().for_each(|value| *value /= area);
 }
 
 #[cfg(test)]

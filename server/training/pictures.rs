@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::scan::{Clip, ClipError};
 use super::texture::{texture, vary_contrast};
 use crate::camera::phantom::Scene;
-use crate::imaging::GrayImage;
+use crate::imaging::{GrayImage, gaussian_blur};
 
 /// Side in pixels of drawn pictures: the height of the paper's clips.
 const SIDE: usize = 480;
@@ -33,12 +33,22 @@ impl Split {
     }
 }
 
-/// The pictures of the reference benchmark's `split`, `0..count`.
+/// How much the contrast of the reference benchmark's pictures varies from place to place; chosen together with
+/// [`super::scan::ScanSettings::reference`].
+const UNEVEN: f32 = 1.0;
+
+/// The pictures of the reference benchmark's `split`, `0..count`: brain phantoms of uneven contrast.
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.
 pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
-    (0..count).map(|index| Clip::still(sharp_phantom(split, index)).map(Arc::new)).collect()
+    (0..count)
+        .map(|index| {
+            let mut picture = sharp_phantom(split, index);
+            vary_contrast(&mut picture, UNEVEN, split.first_seed() + index);
+            Clip::still(picture).map(Arc::new)
+        })
+        .collect()
 }
 
 /// The middle of brain phantom `index` of `split`, sharp.
@@ -47,8 +57,8 @@ pub fn sharp_phantom(split: Split, index: u64) -> GrayImage {
     Scene::new(split.first_seed() + index).sharp_gray(SIDE, SIDE)
 }
 
-/// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds, half of all with a
-/// contrast that varies from place to place.
+/// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds; half of all with a
+/// contrast that varies from place to place, and one in four soft, as optics, demosaicing and compression leave footage.
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.
@@ -58,7 +68,10 @@ pub fn varied(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
             let seed = split.first_seed() + index;
             let mut picture = if index % 3 == 0 { sharp_phantom(split, index) } else { texture(seed, SIDE) };
             if index % 2 == 0 {
-                vary_contrast(&mut picture, 0.2 + 0.2 * (index / 2 % 5) as f32, seed);
+                vary_contrast(&mut picture, 0.2 + 0.2 * (index / 2 % 6) as f32, seed);
+            }
+            if index % 4 == 1 {
+                picture = gaussian_blur(&picture, 0.3 + 0.1 * (index / 4 % 9) as f64);
             }
             Clip::still(picture).map(Arc::new)
         })
