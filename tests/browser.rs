@@ -4,8 +4,12 @@
 #[allow(dead_code, reason = "shared with other tests")]
 mod support;
 
+#[path = "browser/aftermath.rs"]
+mod aftermath;
 #[path = "browser/blinding.rs"]
 mod blinding;
+#[path = "browser/course.rs"]
+mod course;
 #[path = "browser/killed.rs"]
 mod killed;
 #[path = "browser/proxy.rs"]

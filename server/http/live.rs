@@ -46,7 +46,7 @@ pub(super) trait Audience: Send + Sync + 'static {
     type Status: Serialize + PartialEq + Send;
 
     /// What goes with `frame`, which is `age_ms` old.
-    fn header(frame: &EncodedFrame, age_ms: f64) -> Self::Header;
+    fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> Self::Header;
     /// Where the session is followed.
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<Self::Session>>>;
     /// The state of the devices.
@@ -212,7 +212,7 @@ impl<A: Audience> Desk<A> {
             return None;
         };
         let age = self.app.clock.now().since(frame.picture.exposed_at);
-        let message = pack(&A::header(frame, tenth_millis(age)), &frame.picture.jpeg)?;
+        let message = pack(&A::header(frame, tenth_millis(age), &self.app), &frame.picture.jpeg)?;
         self.in_flight = Some(frame.picture.number);
         self.app.metrics.frames_sent.inc();
         self.app.metrics.bytes_sent.inc_by(message.len() as u64);

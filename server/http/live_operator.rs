@@ -1,5 +1,6 @@
 //! What the operator's and the researcher's pages get on `/live`: the surgeon's, and what the loop does. While a session
-//! is under way not even they are told the policy's name.
+//! is under way not even they are told the policy's name, nor what gives it away: the metric, by its scale, and the
+//! belief, which few policies have.
 
 use std::sync::Arc;
 
@@ -26,23 +27,24 @@ pub(super) struct OperatorFrame {
     asked: FocalPower,
     /// Focal power that the frame was exposed at.
     measured: Option<FocalPower>,
-    /// The policy's focus metric.
+    /// The policy's focus metric; not while a session is under way.
     metric: Option<f64>,
     /// Why the lens was held, if it was.
     held: Option<Hold>,
-    /// Probability of each of equally wide slices of 0..=1 to hold the optimum.
+    /// Probability of each of equally wide slices of 0..=1 to hold the optimum, where the policy has a belief; not while a
+    /// session is under way.
     belief: Option<Arc<[f32]>>,
 }
 
 impl OperatorFrame {
-    fn new(picture: SurgeonFrame, insight: &Insight) -> Self {
+    fn new(picture: SurgeonFrame, insight: &Insight, blinded: bool) -> Self {
         Self {
             picture,
             asked: insight.asked,
             measured: insight.measured,
-            metric: insight.metric,
+            metric: insight.metric.filter(|_| !blinded),
             held: insight.held,
-            belief: insight.belief.clone(),
+            belief: insight.belief.clone().filter(|_| !blinded),
         }
     }
 }
@@ -52,8 +54,8 @@ impl Audience for ForOperator {
     type Session = OperatorView;
     type Status = ControlStatus;
 
-    fn header(frame: &EncodedFrame, age_ms: f64) -> OperatorFrame {
-        OperatorFrame::new(SurgeonFrame::new(&frame.picture, age_ms), &frame.insight)
+    fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
+        OperatorFrame::new(SurgeonFrame::new(&frame.picture, age_ms), &frame.insight, app.blinded())
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<OperatorView>>> {

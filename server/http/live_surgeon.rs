@@ -89,7 +89,7 @@ impl Audience for ForSurgeon {
     type Session = SurgeonView;
     type Status = SurgeonStatus;
 
-    fn header(frame: &EncodedFrame, age_ms: f64) -> SurgeonFrame {
+    fn header(frame: &EncodedFrame, age_ms: f64, _: &App) -> SurgeonFrame {
         SurgeonFrame::new(&frame.picture, age_ms)
     }
 

@@ -1,11 +1,14 @@
 //! Comments and answers: kept once each, however often they are sent, and never changed.
 
+use std::collections::HashMap;
+
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use super::sessions::{parsed, stamp};
 use super::{Answer, Comment, Reader, Store, StoreError, nanoseconds};
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
+use crate::trial::answers::on_top_of;
 use crate::trial::view::{AnswerValue, Said};
 
 /// What became of something given.
@@ -103,7 +106,7 @@ impl Reader {
     }
 
     /// The answers of `session`, changed ones included, in the order they were kept, each with the start of the server
-    /// that kept it.
+    /// that kept it. An answer given in parts is told as it stood after each part.
     ///
     /// # Errors
     /// When the database failed.
@@ -112,7 +115,15 @@ impl Reader {
             .bind(session.to_string())
             .fetch_all(self.pool())
             .await?;
-        rows.iter().map(|row| Ok((row.try_get("run")?, answer(row)?))).collect()
+        let mut standing: HashMap<(Option<SegmentId>, String), AnswerValue> = HashMap::new();
+        let mut as_it_stood = |row: &SqliteRow| {
+            let mut answer = answer(row)?;
+            let question = (answer.segment, answer.question.clone());
+            answer.value = on_top_of(standing.get(&question), answer.value);
+            standing.insert(question, answer.value.clone());
+            Ok((row.try_get("run")?, answer))
+        };
+        rows.iter().map(&mut as_it_stood).collect()
     }
 }
 

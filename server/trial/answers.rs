@@ -1,4 +1,5 @@
-//! Questionnaires: whether an answer fits its question, and the System Usability Scale's score.
+//! Questionnaires: whether an answer fits its question, how an answer in parts adds up, and the System Usability
+//! Scale's score.
 
 use super::view::{AnswerValue, Question, QuestionKind};
 
@@ -38,11 +39,11 @@ pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Resul
             return Ok(());
         }
         (QuestionKind::Ranking, AnswerValue::Points(order)) if is_ranking(order, settings) => return Ok(()),
-        (QuestionKind::Sus, AnswerValue::Points(items)) if sus_score(items).is_some() => return Ok(()),
+        (QuestionKind::Sus, AnswerValue::Points(items)) if is_part_of_sus(items) => return Ok(()),
         (QuestionKind::Text, _) => "text".to_owned(),
         (QuestionKind::Likert { points, .. }, _) => format!("a point from 1 to {points}"),
         (QuestionKind::Ranking, _) => format!("each of the settings 1 to {settings} once, best first"),
-        (QuestionKind::Sus, _) => format!("{SUS_ITEMS} points from 1 to 5"),
+        (QuestionKind::Sus, _) => format!("{SUS_ITEMS} points from 1 to 5, 0 for an item that it leaves as it was"),
     };
     Err(Misfit::Kind { question: question.id.clone(), expected })
 }
@@ -60,6 +61,31 @@ fn is_ranking(order: &[u8], settings: usize) -> bool {
     sorted.sort_unstable();
     sorted.len() == settings
         && sorted.iter().zip(1_usize..).all(|(&setting, expected)| usize::from(setting) == expected)
+}
+
+fn is_part_of_sus(items: &[u8]) -> bool {
+    items.len() == SUS_ITEMS && items.iter().all(|item| *item <= 5) && items.iter().any(|item| *item > 0)
+}
+
+/// What stands once `given` has come on top of `earlier`: a 0 among points gives nothing and leaves what was there, so
+/// that each item of a questionnaire can be given by itself, from whatever device, and none takes another back.
+#[must_use]
+pub fn on_top_of(earlier: Option<&AnswerValue>, given: AnswerValue) -> AnswerValue {
+    match (earlier, given) {
+        (Some(AnswerValue::Points(before)), AnswerValue::Points(mut points)) if before.len() == points.len() => {
+            for (point, before) in points.iter_mut().zip(before).filter(|(point, _)| **point == 0) {
+                *point = *before;
+            }
+            AnswerValue::Points(points)
+        }
+        (_, given) => given,
+    }
+}
+
+/// Whether nothing of `value` is still open.
+#[must_use]
+pub fn is_whole(value: &AnswerValue) -> bool {
+    !matches!(value, AnswerValue::Points(points) if points.contains(&0))
 }
 
 /// The System Usability Scale's score, 0..=100 in steps of 2.5, of ten items from 1 (strongly disagree) to 5 (strongly
@@ -91,6 +117,36 @@ mod tests {
         assert_eq!(sus_score(&[4, 2, 3, 1, 4, 3, 2, 2, 4, 2]), Some(67.5));
         assert_eq!(sus_score(&[3; 9]), None);
         assert_eq!(sus_score(&[0; 10]), None);
+    }
+
+    #[test]
+    fn the_items_of_a_questionnaire_add_up_in_any_order_and_the_latest_of_each_counts() {
+        let sus = question(QuestionKind::Sus);
+        let item = |place: usize, point: u8| {
+            let mut items = vec![0; SUS_ITEMS];
+            items[place] = point;
+            AnswerValue::Points(items)
+        };
+        let mut kept = None;
+        for (place, point) in [(9, 2), (0, 4), (1, 2), (2, 3), (3, 1), (4, 1), (5, 3), (6, 2), (7, 2), (8, 4), (4, 4)] {
+            assert!(!kept.as_ref().is_some_and(is_whole) || place == 4);
+            let given = item(place, point);
+            assert_eq!(check(&sus, &given, 6), Ok(()));
+            kept = Some(on_top_of(kept.as_ref(), given));
+        }
+        let whole = AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]);
+        assert_eq!(kept.as_ref(), Some(&whole));
+        assert!(is_whole(&whole));
+        for nothing in [vec![0; SUS_ITEMS], vec![3; 9], vec![6; SUS_ITEMS]] {
+            assert!(check(&sus, &AnswerValue::Points(nothing), 6).is_err());
+        }
+    }
+
+    #[test]
+    fn a_later_answer_of_one_piece_takes_the_place_of_the_earlier() {
+        let (before, after) = (AnswerValue::Points(vec![1, 2, 3]), AnswerValue::Points(vec![3, 1, 2]));
+        assert_eq!(on_top_of(Some(&before), after.clone()), after);
+        assert_eq!(on_top_of(Some(&AnswerValue::Point(3)), AnswerValue::Point(5)), AnswerValue::Point(5));
     }
 
     #[test]

@@ -105,7 +105,7 @@ pub enum QuestionKind {
 pub enum AnswerValue {
     /// A Likert point.
     Point(u8),
-    /// A ranking of settings (from 1), best first; or the ten SUS items.
+    /// A ranking of settings (from 1), best first; or the ten SUS items, 0 for those that this answer leaves as they were.
     Points(Vec<u8>),
     /// Text.
     Text(String),
@@ -141,7 +141,8 @@ pub enum Said {
     Mark,
 }
 
-/// An answer as a surgeon's browser sends it. The same question again replaces the answer; the old one stays in the log.
+/// An answer as a surgeon's browser sends it. The same question again replaces as much of the answer as it
+/// gives; the old one stays in the log.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 pub struct NewAnswer {
     /// Idempotency key.

@@ -85,10 +85,10 @@ pub struct Seen {
     pub files: BTreeSet<String>,
     /// Pictures, whose headers were searched.
     pub pictures: usize,
-    /// The id of each setting's segment.
-    pub segments: BTreeMap<u64, BTreeSet<String>>,
-    /// What a surgeon is told while inspecting, without what differs from moment to moment.
-    inspecting: BTreeSet<String>,
+    /// The id of each setting's segment, by session and setting.
+    pub segments: BTreeMap<(String, u64), BTreeSet<String>>,
+    /// What a surgeon is told while inspecting, by session, without what differs from moment to moment.
+    inspecting: BTreeMap<String, BTreeSet<String>>,
 }
 
 /// Checks everything on `connections`; panics at what tells.
@@ -112,7 +112,8 @@ pub fn check(connections: &[Connection]) -> Seen {
     let ids: Vec<_> = seen.segments.values().flatten().collect();
     assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), ids.len(), "two settings share an id: {:?}", seen.segments);
     assert!(seen.segments.values().all(|ids| ids.len() == 1), "a setting changed its id: {:?}", seen.segments);
-    assert!(seen.inspecting.len() <= 1, "settings are told differently: {:#?}", seen.inspecting);
+    let same = seen.inspecting.values().all(|forms| forms.len() == 1);
+    assert!(same, "settings are told differently: {:#?}", seen.inspecting);
     seen
 }
 
@@ -150,15 +151,16 @@ fn json(seen: &mut Seen, text: &str) {
     search("JSON", &text.to_ascii_lowercase());
     keys(&value);
     let view = if value.get("view").is_some() { &value["view"] } else { &value };
+    let session = view["session"].as_str().unwrap_or_default().to_owned();
     if let (Some(setting), Some(segment)) = (view["setting"].as_u64(), view["segment"].as_str()) {
-        seen.segments.entry(setting).or_default().insert(segment.to_owned());
+        seen.segments.entry((session.clone(), setting)).or_default().insert(segment.to_owned());
     }
     if view["phase"] == "inspecting" {
         let mut form = view.clone();
         for changing in ["setting", "segment", "remaining_seconds", "comments", "prompt", "paused", "may_resume"] {
             form[changing] = Value::Null;
         }
-        seen.inspecting.insert(form.to_string());
+        seen.inspecting.entry(session).or_default().insert(form.to_string());
     }
 }
 

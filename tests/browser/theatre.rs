@@ -57,10 +57,29 @@ impl<'a> Theatre<'a> {
         Self { server, proxy, surgeon, operator }
     }
 
+    /// The operator prepares a session of `participant`, who is new, by `protocol`, and starts it.
+    pub async fn begin(&self, participant: &str, protocol: &str) {
+        let operator = &self.operator;
+        operator.click("#add-participant").await;
+        operator.type_into("#code", participant).await;
+        operator.click("#participant-dialog [type=submit]").await;
+        operator.sees_no("#participant-dialog").await;
+        operator.select("#protocol", protocol).await;
+        operator.click("#new-session [type=submit]").await;
+        operator.sees("#phase", "Ready to start").await;
+        operator.click("#session-actions .primary").await;
+    }
+
+    /// The operator gives `reason` in the dialog that asks for one, and goes on.
+    pub async fn give_reason(&self, reason: &str) {
+        self.operator.type_into("#reason", reason).await;
+        self.operator.click("#reason-go").await;
+    }
+
     /// The surgeon taps the notice of setting `number`: once it is there, and as often as it takes to be meant.
     pub async fn tap_notice(&self, number: usize) {
-        let title = format!("Setting {number} of 6");
-        self.surgeon.sees("#change-title", &title).await;
+        self.surgeon.sees("#change-title", &format!("Setting {number} of ")).await;
+        let title = self.surgeon.text("#change-title").await;
         until("the notice to take the tap", || async {
             self.surgeon.try_click("#change-tap").await;
             self.surgeon.text("#change-title").await != title

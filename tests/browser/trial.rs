@@ -1,17 +1,14 @@
 //! The whole trial: six settings with everything that happens in a theatre, then the researcher, the database, the
 //! export, and what reached the surgeon's browser.
 
-use std::process::Command;
-
 use serde_json::json;
-use sqlx::Row;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
+use crate::aftermath::{database, export, researcher};
 use crate::blinding;
 use crate::screenshots::shoot;
 use crate::theatre::{Theatre, kill, start_again};
 use crate::wait::until;
-use crate::webdriver::{Browser, Driver};
+use crate::webdriver::Driver;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_surgeon_completes_a_blinded_trial() {
@@ -59,9 +56,7 @@ async fn prepare(theatre: &Theatre<'_>) {
     operator.click("#participant-dialog [type=submit]").await;
     operator.sees_no("#participant-dialog").await;
 
-    let choose =
-        "const s = document.getElementById('protocol'); s.value = 'short'; s.dispatchEvent(new Event('change'))";
-    operator.run(choose, json!([])).await;
+    operator.select("#protocol", "short").await;
     operator.sees("#protocol-summary", "6 settings").await;
     operator.click("#new-session [type=submit]").await;
     operator.sees("#phase", "Ready to start").await;
@@ -69,6 +64,7 @@ async fn prepare(theatre: &Theatre<'_>) {
     shoot(surgeon, "surgeon-2-ready").await;
     operator.click("#session-actions .primary").await;
     surgeon.sees("#change-title", "Setting 1 of 6").await;
+    surgeon.sees("#change-what", "This is the first setting.").await;
     shoot(surgeon, "surgeon-3-notice").await;
 }
 
@@ -186,10 +182,7 @@ async fn closing_questions(theatre: &Theatre<'_>) {
     shoot(surgeon, "surgeon-9-closing").await;
     surgeon.click("[aria-label='Move setting 5 up']").await;
     surgeon.sees("[data-question=preference] > .state", "Saved").await;
-    for (item, point) in [4, 2, 3, 1, 4, 3, 2, 2, 4, 2].into_iter().enumerate() {
-        theatre.choose(&format!("usability-{item}"), point).await;
-    }
-    surgeon.sees("[data-question=usability] > .state", "Saved").await;
+    half_a_questionnaire_on_a_second_tablet(theatre).await;
     surgeon.click("[data-question=closing-remarks] textarea").await;
     surgeon.type_into("[data-question=closing-remarks] textarea", "That it stays still").await;
     surgeon.click(".questions .done button").await;
@@ -199,110 +192,29 @@ async fn closing_questions(theatre: &Theatre<'_>) {
     shoot(&theatre.operator, "operator-5-completed").await;
 }
 
-/// The researcher looks at the session and unblinds it; gives its id.
-async fn researcher(theatre: &Theatre<'_>) -> String {
-    let page = &theatre.operator;
-    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
-    page.sees("tbody", "completed").await;
-    shoot(page, "researcher-1-sessions").await;
-    page.click("td a.button").await;
-    page.sees("#comment-list", "Follows me well 🧠").await;
-    page.sees(".closing", "SUS score 67.5").await;
-    let session = page.run("return document.getElementById('session').dataset.session", json!([])).await;
-    let session = session.as_str().unwrap().to_owned();
-    assert_eq!(fetched(page, &format!("{session}/export.zip")).await, "200 PK");
-    assert_eq!(fetched(page, &format!("{session}/export.zip?unblinded=true")).await, "409 {\"");
-    page.click("#comment-list li:first-child button").await;
-    page.sees("#timeline figcaption", "Follows me well 🧠").await;
-    shoot(page, "researcher-2-blinded").await;
-    page.click("#unblind").await;
-    page.type_into("#reason", "Analysis begins").await;
-    shoot(page, "researcher-3-unblinding").await;
-    page.click("#reason-go").await;
-    page.sees(".unblinded", "mlr-hill-climber").await;
-    until("the focal path", || async {
-        page.run("return document.querySelector('.timeline .path')?.getAttribute('d').length > 100", json!([])).await
-            == true
-    })
-    .await;
-    page.run("scrollTo(0, 0)", json!([])).await;
-    shoot(page, "researcher-4-unblinded").await;
-    assert_eq!(fetched(page, &format!("{session}/export.zip?unblinded=true")).await, "200 PK");
-    page.open(&theatre.server.url("/researcher/dictionary")).await;
-    page.sees("main", "comments.csv").await;
-    shoot(page, "researcher-5-dictionary").await;
-    session
-}
-
-/// Status and first two bytes of what the researcher's page gets at `path`.
-async fn fetched(page: &Browser<'_>, path: &str) -> String {
-    let script =
-        "const answer = new XMLHttpRequest(); answer.open('GET', '/api/researcher/sessions/' + arguments[0], false);
-                  answer.overrideMimeType('text/plain; charset=x-user-defined'); answer.send();
-                  return answer.status + ' ' + answer.responseText.slice(0, 2)";
-    page.run(script, json!([path])).await.as_str().unwrap().to_owned()
-}
-
-/// What is in the database, read by another program than the server.
-async fn database(theatre: &Theatre<'_>, session: &str) {
-    let file = theatre.server.data.path().join("parfocal.db");
-    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
-    let rows = sqlx::query(
-        "SELECT kind, text, setting, frame FROM comments LEFT JOIN segments USING (segment) WHERE comments.session = ? ORDER BY comments.number",
-    );
-    let rows = rows.bind(session).fetch_all(&pool).await.unwrap();
-    let comments: Vec<(String, Option<String>, i64)> =
-        rows.iter().map(|row| (row.get(0), row.get(1), row.get(2))).collect();
-    let expected = [
-        ("text", Some("Follows me well 🧠"), 1),
-        ("text", Some("Loses the fissure"), 1),
-        ("quick", Some("Too slow"), 2),
-        ("mark", None, 2),
-        ("text", Some("Half a thought, whole"), 3),
-        ("text", Some("Shortened"), 4),
-        ("text", Some("Saved before the crash"), 5),
-        ("text", Some("Said while it was away"), 5),
-    ];
-    let expected = expected.map(|(kind, text, setting)| (kind.to_owned(), text.map(str::to_owned), setting));
-    assert_eq!(comments, expected);
-    assert!(rows.iter().all(|row| row.get::<Option<i64>, _>("frame").is_some()), "every comment names its frame");
-
-    let latest = "SELECT value FROM answers LEFT JOIN segments USING (segment) WHERE answers.session = ? AND question = ? ORDER BY setting, answers.number";
-    let values =
-        |question: &'static str| sqlx::query_scalar::<_, String>(latest).bind(session).bind(question).fetch_all(&pool);
-    // The first setting's answer was changed once; both stand.
-    assert_eq!(values("sharpness").await.unwrap(), ["3", "5", "2", "6", "4", "7", "1"]);
-    assert_eq!(values("remarks").await.unwrap(), ["\"Good at rest\""]);
-    assert_eq!(values("preference").await.unwrap(), ["[1,2,3,5,4,6]"]);
-    assert_eq!(values("usability").await.unwrap(), ["[4,2,3,1,4,3,2,2,4,2]"]);
-    assert_eq!(values("closing-remarks").await.unwrap(), ["\"That it stays still\""]);
-
-    let events = "SELECT kind FROM events WHERE session = ? AND kind NOT LIKE 'segment-%' AND kind != 'questions-finished' ORDER BY number";
-    let events: Vec<String> = sqlx::query_scalar(events).bind(session).fetch_all(&pool).await.unwrap();
-    assert_eq!(
-        events,
-        ["created", "started", "server-restarted", "resumed", "paused", "resumed", "completed", "unblinded"]
-    );
-    let steps = "SELECT count(DISTINCT segment) FROM telemetry WHERE segment IS NOT NULL";
-    assert_eq!(sqlx::query_scalar::<_, i64>(steps).fetch_one(&pool).await.unwrap(), 6, "every setting has telemetry");
-    pool.close().await;
-}
-
-/// The command's export is whole by the verifier's word.
-fn export(theatre: &Theatre<'_>, session: &str) {
-    let out = tempfile::tempdir().unwrap();
-    let folder = out.path().join("export");
-    let parfocal = || Command::new(env!("CARGO_BIN_EXE_parfocal"));
-    let exported = parfocal()
-        .args(["export", session, "--unblinded", "--out"])
-        .arg(&folder)
-        .arg("--data-dir")
-        .arg(theatre.server.data.path())
-        .output()
-        .unwrap();
-    assert!(exported.status.success(), "{}", String::from_utf8_lossy(&exported.stderr));
-    let verified = parfocal().arg("verify").arg(&folder).output().unwrap();
-    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
-    let comments = std::fs::read_to_string(folder.join("comments.csv")).unwrap();
-    assert!(comments.contains("Follows me well 🧠") && comments.contains("Said while it was away"), "{comments}");
+/// Each item is kept when it is given: over a reload, and beside what another tablet gives.
+async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre<'_>) {
+    let surgeon = &theatre.surgeon;
+    let give = async |items: std::ops::Range<usize>| {
+        for (item, point) in [4, 2, 3, 1, 4, 3, 2, 2, 4, 2].into_iter().enumerate().take(items.end).skip(items.start) {
+            theatre.choose(&format!("usability-{item}"), point).await;
+        }
+    };
+    let state = "[data-question=usability] > .state";
+    give(0..4).await;
+    surgeon.sees(state, "4 of 10 answered · Saved").await;
+    surgeon.reload().await;
+    surgeon.sees(state, "4 of 10 answered · Saved").await;
+    surgeon.click(".questions .done button").await;
+    surgeon.sees("#missing", "2 questions are still open").await;
+    let first = surgeon.new_tab(&format!("http://{}/surgeon", theatre.proxy.address)).await;
+    surgeon.sees(state, "4 of 10 answered").await;
+    give(4..9).await;
+    surgeon.sees(state, "9 of 10 answered · Saved").await;
+    surgeon.close_tab(&first).await;
+    surgeon.sees(state, "9 of 10 answered").await;
+    give(9..10).await;
+    surgeon.sees(state, "Saved").await;
+    let chosen = "return [...document.querySelectorAll('.sus input:checked')].map((input) => Number(input.value))";
+    assert_eq!(surgeon.run(chosen, json!([])).await, json!([4, 2, 3, 1, 4, 3, 2, 2, 4, 2]));
 }

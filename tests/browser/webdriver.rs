@@ -154,6 +154,14 @@ impl Browser<'_> {
         .await;
     }
 
+    /// Chooses the option `value` of the list that `css` selects.
+    pub async fn select(&self, css: &str, value: &str) {
+        let choose = "const list = document.querySelector(arguments[0]); list.value = arguments[1];
+                      list.dispatchEvent(new Event('change')); return list.value";
+        until(&format!("{css} to offer {value}"), || async { self.run(choose, json!([css, value])).await == value })
+            .await;
+    }
+
     async fn element(&self, css: &str) -> Option<String> {
         let found =
             self.command(Method::POST, "/element", Some(json!({ "using": "css selector", "value": css }))).await;

@@ -136,8 +136,10 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
 async fn during_a_session_the_operator_is_not_told_the_policy_either() {
     let server = Server::start();
     let session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
-    session.operator("/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
     let mut page = Page::open(&server, "operator").await;
+    session.operator("/api/operator/focus", json!({"policy": "parfocal"})).await;
+    page.until_belief().await;
+    session.operator("/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
     page.until(|told| told["policy"] == "mgm-hill-climber").await;
     session.operator("/api/operator/participants", json!({"code": "S01"})).await;
     session.operator("/api/operator/sessions", json!({"participant": "S01", "protocol": "paper"})).await;
@@ -147,6 +149,13 @@ async fn during_a_session_the_operator_is_not_told_the_policy_either() {
     page.watch(5).await;
     let told: Vec<_> = page.heard.iter().map(|message| format!("{message:?}")).collect();
     assert!(told.iter().all(|told| !told.contains("climber")), "{told:?}");
+    let frames = page.heard.iter().filter_map(|heard| match heard {
+        Heard::Frame(header) => Some(header),
+        Heard::Text(_) => None,
+    });
+    for header in frames {
+        assert!(header["asked"].is_number() && header["metric"].is_null() && header["belief"].is_null(), "{header}");
+    }
 }
 
 /// The names of all fields, and whether there is a content area.

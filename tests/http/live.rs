@@ -97,6 +97,17 @@ impl Page {
         }
     }
 
+    /// Waits for a frame that comes with a belief, and gives it.
+    pub async fn until_belief(&mut self) -> Vec<Value> {
+        loop {
+            let frame = self.frame().await;
+            self.drawn(&frame).await;
+            if let Some(belief) = frame.header["belief"].as_array() {
+                return belief.clone();
+            }
+        }
+    }
+
     async fn drawn(&mut self, frame: &Frame) {
         self.say(json!({"type": "drawn", "frame": frame.number()})).await;
     }
@@ -193,6 +204,23 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
     let frame = operator.frame().await;
     for field in ["asked", "measured", "metric", "held", "belief"] {
         assert!(frame.fields().contains(&field), "{field}");
+    }
+}
+
+#[tokio::test]
+async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
+    let server = Server::start();
+    let focus = crate::support::client().post(server.url("/api/operator/focus")).bearer_auth(server.key("operator"));
+    assert!(focus.json(&json!({"policy": "parfocal"})).send().await.unwrap().status().is_success());
+    let mut surgeon = Page::open(&server, "surgeon").await;
+    let mut operator = Page::open(&server, "operator").await;
+    let belief = operator.until_belief().await;
+    // The belief tracker's slices of focal power, as a probability.
+    assert_eq!(belief.len(), 41);
+    assert!((belief.iter().map(|slice| slice.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-3, "{belief:?}");
+    surgeon.watch(5).await;
+    for heard in &surgeon.heard {
+        assert!(!format!("{heard:?}").contains("belief"), "{heard:?}");
     }
 }
 

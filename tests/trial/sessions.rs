@@ -9,7 +9,7 @@ use parfocal::conductor::ConductError;
 use parfocal::control::{Command, Drive};
 use parfocal::lens::FocalPower;
 use parfocal::store::SessionStatus;
-use parfocal::trial::view::{Action, AnswerValue, Phase, Role, Said};
+use parfocal::trial::view::{Action, AnswerValue, NewAnswer, Phase, QuestionKind, Role, Said};
 
 use crate::bench::{Bench, PARTICIPANT};
 
@@ -282,4 +282,50 @@ async fn a_handler_that_is_dropped_midway_leaves_memory_and_disk_the_same() {
     assert_eq!(bench.store.reader().events(session).await.unwrap().len(), 3);
     bench.surgeon(Action::FinishSegment { segment }).await;
     assert_eq!(bench.view().phase, Phase::Questions);
+}
+
+#[tokio::test]
+async fn a_questionnaire_half_filled_is_kept_item_by_item() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let session = bench.begin("paper").await;
+    while bench.view().phase == Phase::Notice {
+        bench.whole_setting().await;
+    }
+    let view = bench.view();
+    let sus = view.questions.iter().find(|question| question.kind == QuestionKind::Sus).unwrap().id.clone();
+    let item = |place: usize, point: u8| {
+        let mut items = vec![0; 10];
+        items[place] = point;
+        AnswerValue::Points(items)
+    };
+    let answer = NewAnswer { key: bench.key(), session, segment: None, question: sus.clone(), value: item(0, 4) };
+    bench.conductor.answer(answer.clone()).await.unwrap();
+    drop(bench);
+    let mut bench = Bench::start(folder.path()).await;
+    bench.conductor.act(Role::Surgeon, session, Action::Resume).await.unwrap();
+    assert_eq!(bench.view().answers[&sus], item(0, 4), "kept over a restart");
+    for (place, point) in [(1, 2), (2, 3), (3, 1), (4, 4), (5, 3), (6, 2), (7, 2), (8, 4)] {
+        bench.answer(&sus, item(place, point)).await.unwrap();
+    }
+    // A tablet that never got the answer sends it again, after all that.
+    bench.conductor.answer(answer).await.unwrap();
+    for question in view.questions.iter().filter(|question| question.id != sus) {
+        let value = match &question.kind {
+            QuestionKind::Ranking => AnswerValue::Points(vec![2, 1, 3, 4, 5, 6]),
+            _ => AnswerValue::Text("fine".to_owned()),
+        };
+        bench.answer(&question.id, value).await.unwrap();
+    }
+    let done = Action::FinishQuestions { segment: None };
+    let refused = bench.conductor.act(Role::Surgeon, session, done.clone()).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("still to be answered")), "{refused}");
+    bench.answer(&sus, item(9, 2)).await.unwrap();
+    bench.surgeon(done).await;
+    let detail = bench.conductor.session_detail(session).await.unwrap();
+    let kept = detail.answers.iter().find(|answer| answer.question == sus).unwrap();
+    assert_eq!(kept.value, AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]));
+    assert_eq!(kept.sus_score, Some(67.5));
+    let answers = bench.store.reader().answers(session).await.unwrap();
+    assert_eq!(answers.iter().filter(|(_, answer)| answer.question == sus).count(), 10, "one for each item");
 }

@@ -228,6 +228,14 @@ for (const box of document.querySelectorAll("[data-overlay]")) {
   apply();
 }
 
+/** Frames without a belief after which the policy has none; the frames of a held lens have none either. */
+const BELIEF_FRAMES = 25;
+let unbelieved = BELIEF_FRAMES;
+viewer.addEventListener("frame", ({ detail }) => {
+  unbelieved = detail.belief ? 0 : unbelieved + 1;
+  byId("belief-choice").hidden = unbelieved >= BELIEF_FRAMES;
+});
+
 async function refresh() {
   try {
     choices = await get("/api/operator/choices");

@@ -54,9 +54,9 @@ export class Outbox extends EventTarget {
     return entry;
   }
 
-  /** The newest entry for `slot`, if it is still unsaved. */
+  /** The unsaved entries for `slot` and for the parts of it (`slot/part`), oldest first. */
   pending(slot) {
-    return this.waiting.findLast((entry) => entry.slot === slot) ?? null;
+    return this.waiting.filter((entry) => entry.slot === slot || entry.slot?.startsWith(`${slot}/`));
   }
 
   /** Tries now rather than at the end of the present wait. */

@@ -20,35 +20,47 @@ const TYPING_PAUSE_MS = 900;
 /**
  * Draws `questions` and returns the form.
  *
- * `context.give(question, value)` sends an answer; `context.draft(question)` keeps parts of an answer that is not whole
- * yet; `context.answers` maps question ids to answers already given; `context.settings` is how many settings there are.
+ * `context.give(question, value, part)` sends an answer, or part `part` of one; `context.draft(question)` keeps a text that
+ * is being written; `context.answers` maps question ids to answers already given; `context.settings` is how many settings
+ * there are. Each question's element has `show(state, reason)`, which tells how far its answer has got, and `take(value)`,
+ * which shows an answer given on another device.
  */
 export function questionForm(questions, context) {
   const draw = { text: textQuestion, likert: likertQuestion, ranking: rankingQuestion, sus: susQuestion };
   return questions.map((question) => {
     const state = make("p", { className: "state", role: "status" });
     const answered = context.answers[question.id];
-    if (answered !== undefined) showState(state, "saved");
-    const body = draw[question.kind](question, answered, {
+    const { nodes, take, open = () => null } = draw[question.kind](question, answered, {
       ...context,
-      give: (value) => {
-        showState(state, "saving");
-        context.give(question, value);
+      give: (value, part) => {
+        box.show("saving");
+        context.give(question, value, part);
       },
       draft: context.draft(question),
       partly: (text) => showState(state, "partly", text),
     });
-    const box = make("fieldset", { className: "question", "data-question": question.id }, ...body, state);
+    const box = make("fieldset", { className: "question", "data-question": question.id }, ...nodes, state);
+    box.show = (reached, reason) => showState(state, reached, reason, open());
+    box.take = (value) => {
+      if (take(value)) box.show("saved");
+    };
+    if (answered !== undefined) box.show("saved");
     return box;
   });
 }
 
+/** What stands once `given` has come on top of `earlier`: a 0 among points leaves what was there, as on the server. */
+export function onTopOf(earlier, given) {
+  return Array.isArray(earlier) && Array.isArray(given) ? given.map((point, index) => point || earlier[index]) : given;
+}
+
 const STATES = { saving: "Saving…", saved: "Saved", waiting: "Kept on this device; will be saved when the connection is back" };
 
-/** Shows how far an answer has got; for a refusal `reason` says why. */
-export function showState(element, state, reason = "") {
-  element.className = `state ${state}`;
-  setText(element, STATES[state] ?? reason);
+/** Shows how far an answer has got; for a refusal `reason` says why, `open` what is still to be answered. */
+function showState(element, state, reason = "", open = null) {
+  element.className = `state ${open && state !== "refused" ? "partly" : state}`;
+  const text = STATES[state] ?? reason;
+  setText(element, open ? `${open} · ${text}` : text);
 }
 
 function asked(question, tag = "legend") {
@@ -75,11 +87,25 @@ function textQuestion(question, answered, context) {
   area.addEventListener("change", given);
   area.give = given;
   if (context.draft.read() !== null) timer = setTimeout(given, TYPING_PAUSE_MS);
-  return [asked(question), area];
+  const take = (value) => {
+    const free = context.draft.read() === null && document.activeElement !== area && area.value.trim() !== value;
+    if (free) area.value = value;
+    return free;
+  };
+  return { nodes: [asked(question), area], take };
 }
 
 function likertQuestion(question, answered, context) {
-  return [asked(question), scale(question.id, question, answered, context.give)];
+  const points = scale(question.id, question, answered, context.give);
+  return { nodes: [asked(question), points], take: (value) => check(points, value) };
+}
+
+/** Checks the button of `value`; whether it was another before. */
+function check(points, value) {
+  const button = points.querySelector(`input[value="${value}"]`);
+  const news = button !== null && !button.checked;
+  if (news) button.checked = true;
+  return news;
 }
 
 /** Radio buttons 1..=points with what the ends mean. */
@@ -96,24 +122,26 @@ function scale(name, { points, low, high }, chosen, give) {
 }
 
 function susQuestion(question, answered, context) {
-  const points = answered ?? context.draft.read() ?? Array(SUS_ITEMS.length).fill(0);
-  const progress = () => points.filter((point) => point > 0).length;
-  const items = SUS_ITEMS.map((text, index) => {
+  const points = [...(answered ?? Array(SUS_ITEMS.length).fill(0))];
+  const open = () => {
+    const given = points.filter((point) => point > 0).length;
+    return given < points.length ? `${given} of ${points.length} answered` : null;
+  };
+  const scales = SUS_ITEMS.map((_, index) => {
     const ends = { points: 5, low: "Strongly disagree", high: "Strongly agree" };
+    // Each item goes by itself, so that it takes back nothing that another device has given.
     const choose = (value) => {
       points[index] = value;
-      if (progress() === points.length) {
-        context.draft.write(null);
-        context.give([...points]);
-      } else {
-        context.draft.write(points);
-        context.partly(`${progress()} of ${points.length} answered`);
-      }
+      context.give(points.map((_, place) => (place === index ? value : 0)), index);
     };
-    return make("fieldset", {}, make("legend", {}, `${index + 1}. ${text}`), scale(`${question.id}-${index}`, ends, points[index], choose));
+    return scale(`${question.id}-${index}`, ends, points[index], choose);
   });
-  if (answered === undefined && progress() > 0) context.partly(`${progress()} of ${points.length} answered`);
-  return [asked(question), make("div", { className: "sus" }, ...items)];
+  const take = (value) => {
+    points.splice(0, points.length, ...value);
+    return scales.map((each, index) => check(each, value[index])).some(Boolean);
+  };
+  const items = SUS_ITEMS.map((text, index) => make("fieldset", {}, make("legend", {}, `${index + 1}. ${text}`), scales[index]));
+  return { nodes: [asked(question), make("div", { className: "sus" }, ...items)], take, open };
 }
 
 function rankingQuestion(question, answered, context) {
@@ -148,7 +176,15 @@ function rankingQuestion(question, answered, context) {
       ),
     );
   draw();
-  return [asked(question), list, heard, confirm];
+  const take = (value) => {
+    const news = !confirm.hidden || value.some((setting, index) => setting !== order[index]);
+    if (!news) return false;
+    confirm.hidden = true;
+    order.splice(0, order.length, ...value);
+    draw();
+    return true;
+  };
+  return { nodes: [asked(question), list, heard, confirm], take };
 }
 
 function place(number) {

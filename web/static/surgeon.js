@@ -5,7 +5,7 @@ import { changeNotice } from "./change.js";
 import { composer } from "./compose.js";
 import { byId, clockText, make, setText } from "./dom.js";
 import { Draft, Outbox } from "./outbox.js";
-import { questionForm, showState } from "./questions.js";
+import { onTopOf, questionForm } from "./questions.js";
 import { mountViewer } from "./viewer.js";
 
 const ANSWERS = "/api/surgeon/answers";
@@ -27,6 +27,7 @@ function follow(next) {
   endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
   drawBar();
   drawPanel();
+  takeAnswers();
   comments.follow(state);
   if (state?.phase === "notice" && !state.paused) change.show(state);
   else change.hide();
@@ -156,15 +157,15 @@ function questions(heading) {
   const segment = phase === "questions" ? state.segment : null;
   const answers = { ...state.answers };
   for (const question of state.questions) {
-    const unsent = outbox.pending(slot(question));
-    if (unsent) answers[question.id] = unsent.body.value;
+    for (const { body } of outbox.pending(slot(question))) answers[question.id] = onTopOf(answers[question.id], body.value);
   }
   const boxes = questionForm(state.questions, {
     answers,
     settings: state.settings,
     draft: (question) => new Draft(`answer.${slot(question)}`),
-    give(question, value) {
-      outbox.add(ANSWERS, { session, segment, question: question.id, value }, slot(question));
+    give(question, value, part = null) {
+      const place = part === null ? slot(question) : `${slot(question)}/${part}`;
+      outbox.add(ANSWERS, { session, segment, question: question.id, value }, place);
       settle(question);
     },
   });
@@ -191,9 +192,19 @@ async function finishQuestions(segment) {
   if (byId("missing")) setText(byId("missing"), byId("trouble").textContent);
 }
 
+const boxOf = (id) => byId("panel").querySelector(`[data-question="${CSS.escape(id)}"]`);
+
+/** Shows what was answered on another device meanwhile. */
+function takeAnswers() {
+  for (const question of state?.questions ?? []) {
+    const answer = state.answers[question.id];
+    if (answer !== undefined && outbox.pending(slot(question)).length === 0) boxOf(question.id)?.take(answer);
+  }
+}
+
 /** Takes back that `question` is still open. */
 function settle({ id }) {
-  byId("panel").querySelector(`[data-question="${CSS.escape(id)}"]`)?.classList.remove("wanting");
+  boxOf(id)?.classList.remove("wanting");
   if (byId("missing") && !byId("panel").querySelector(".wanting")) setText(byId("missing"), "");
 }
 
@@ -205,10 +216,10 @@ function unanswered(box) {
 outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }) => {
   if (ended()) drawPanel();
   if (entry.path !== ANSWERS) return;
-  if (state && reached === "saved" && entry.body.session === state.session) state.answers[entry.body.question] = entry.body.value;
-  const box = byId("panel").querySelector(`[data-question="${CSS.escape(entry.body.question)}"] > .state`);
-  const current = state && entry.slot === slot({ id: entry.body.question });
-  if (box && current && !(reached === "saved" && outbox.pending(entry.slot))) showState(box, reached, reason);
+  const { session, segment, question: id, value } = entry.body;
+  if (!state || session !== state.session || segment !== (state.phase === "questions" ? state.segment : null)) return;
+  if (reached === "saved") state.answers[id] = onTopOf(state.answers[id], value);
+  if (reached !== "saved" || outbox.pending(slot({ id })).length === 0) boxOf(id)?.show(reached, reason);
 });
 
 /* Wiring */

@@ -114,7 +114,7 @@ pub const ANSWERS: Table = Table {
             "value",
             String,
             "",
-            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of 1..5 (sus)",
+            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of 1..5 (sus), 0 for an item still open; as it stood after this revision",
         ),
         column("sus_score", Number, "points", "System Usability Scale score, 0..100"),
         WALL,

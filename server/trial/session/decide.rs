@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::{PauseCause, SessionState};
 use crate::clock::Moment;
 use crate::ids::SegmentId;
+use crate::trial::answers::is_whole;
 use crate::trial::event::EventKind;
 use crate::trial::view::{Action, Phase, Question, Role};
 
@@ -186,7 +187,8 @@ fn unblind(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal
 }
 
 fn answered(state: &SessionState, segment: Option<SegmentId>, questions: &[Question]) -> Result<(), Refusal> {
-    let open = questions.iter().find(|question| !question.optional && state.answer(segment, &question.id).is_none());
+    let whole = |question: &Question| state.answer(segment, &question.id).is_some_and(is_whole);
+    let open = questions.iter().find(|question| !question.optional && !whole(question));
     open.map_or(Ok(()), |question| Err(Refusal::Conflict(format!("still to be answered: {}", question.text))))
 }
 

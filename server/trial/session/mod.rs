@@ -19,6 +19,7 @@ use std::time::Duration;
 
 pub use decide::{Refusal, decide, decide_restart, decide_time};
 
+use super::answers::on_top_of;
 use super::event::{Event, EventKind};
 use super::protocol::Protocol;
 use super::view::{AnswerValue, Phase, Question};
@@ -167,8 +168,9 @@ impl SessionState {
         self.answers.get(&(segment, question.to_owned()))
     }
 
-    /// Takes an answer in; a later one to the same question replaces it.
+    /// Takes an answer in; a later one to the same question replaces as much of it as it gives.
     pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, value: AnswerValue) {
+        let value = on_top_of(self.answer(segment, question), value);
         self.answers.insert((segment, question.to_owned()), value);
     }
 

@@ -1,0 +1,172 @@
+//! Sessions off the regular course: practice, a setting ended by its time limit, an emergency unblinding, an abort; and
+//! what the surgeon is shown of all that.
+
+use serde_json::{Value, json};
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+
+use crate::blinding;
+use crate::screenshots::shoot;
+use crate::theatre::Theatre;
+use crate::webdriver::Driver;
+
+/// What a researcher might write: it names a policy, and so is for the researcher's eyes alone.
+const EMERGENCY: &str = "Bleeding: is it the mgm-hill-climber?";
+
+#[tokio::test(flavor = "multi_thread")]
+async fn practice_a_time_limit_an_emergency_and_an_abort() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    the_belief_of_a_policy_that_has_one(&theatre).await;
+    practice(&theatre).await;
+    time_limit(&theatre).await;
+    let researcher = emergency_unblinding(&theatre).await;
+    abort(&theatre).await;
+    practice_stays_apart(&theatre, &researcher).await;
+    database(&theatre).await;
+    for browser in [&theatre.surgeon, &theatre.operator] {
+        assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
+    }
+    let seen = blinding::check(&theatre.proxy.recorded());
+    assert_eq!(seen.segments.len(), 4);
+    assert!(seen.texts > 40 && seen.pictures > 40, "{} texts, {} pictures", seen.texts, seen.pictures);
+}
+
+async fn the_belief_of_a_policy_that_has_one(theatre: &Theatre<'_>) {
+    let operator = &theatre.operator;
+    operator.sees_no("#belief-choice").await;
+    operator.select("#policy", "parfocal").await;
+    operator.sees("#belief-choice", "Belief").await;
+    operator.click("#belief-choice input").await;
+    shoot(operator, "operator-6-belief").await;
+    operator.select("#policy", "fixed").await;
+    operator.sees_no("#belief-choice").await;
+    operator.select("#policy", "parfocal").await;
+    operator.sees("#belief-choice", "Belief").await;
+}
+
+async fn practice(theatre: &Theatre<'_>) {
+    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    theatre.begin("S-03", "practice").await;
+    // That the policy has a belief would name it.
+    operator.sees_no("#belief-choice").await;
+    operator.sees("#session-badges", "Practice").await;
+    surgeon.sees("#change-practice", "Practice").await;
+    surgeon.sees("#change-what", "This is the first setting.").await;
+    shoot(surgeon, "surgeon-11-practice").await;
+    theatre.tap_notice(1).await;
+    surgeon.sees("#practice", "Practice").await;
+    theatre.say("Only trying", 1).await;
+    theatre.finish_setting(4).await;
+    surgeon.sees("#change-what", "The setting has changed.").await;
+    theatre.tap_notice(2).await;
+    theatre.finish_setting(5).await;
+    surgeon.sees("#panel h2", "To finish").await;
+    surgeon.click(".questions .done button").await;
+    surgeon.sees("#panel h2", "Thank you").await;
+    operator.sees("#session-actions", "Close and prepare the next").await;
+    operator.click("#session-actions .primary").await;
+    surgeon.sees("#panel", "No trial is under way").await;
+}
+
+/// Nobody ends the setting: its five seconds do.
+async fn time_limit(theatre: &Theatre<'_>) {
+    theatre.begin("S-04", "limited").await;
+    theatre.tap_notice(1).await;
+    theatre.write("Cut off in the mid").await;
+    theatre.surgeon.sees("#panel h2", "Setting 1: a few questions").await;
+    theatre.operator.sees("#log", "Setting 1 finished after 5.0 s · system").await;
+    assert_eq!(theatre.comment_box().await, "Cut off in the mid");
+    theatre.say("dle", 1).await;
+    theatre.answer_questions(3).await;
+}
+
+/// The researcher unblinds the session while it is under way; gives the address of the list of sessions.
+async fn emergency_unblinding(theatre: &Theatre<'_>) -> String {
+    let (surgeon, page) = (&theatre.surgeon, &theatre.operator);
+    surgeon.sees("#change-title", "Setting 2 of 2").await;
+    let before = shown(theatre).await;
+    let researcher = theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")));
+    let operator = page.new_tab(&researcher).await;
+    page.click("td a.button").await;
+    page.sees("#unblind", "Emergency unblinding").await;
+    page.click("#unblind").await;
+    page.sees("#reason-consequence", "under way").await;
+    page.click("#reason-go").await;
+    assert_eq!(page.run("return document.getElementById('reason').validity.valueMissing", json!([])).await, true);
+    shoot(page, "researcher-6-emergency").await;
+    theatre.give_reason(EMERGENCY).await;
+    page.sees(".masthead", "Emergency unblinding").await;
+    page.sees(".unblinded", "mgm-hill-climber").await;
+    page.sees(".events", EMERGENCY).await;
+    page.close_tab(&operator).await;
+    page.sees("#log", "Unblinded by the researcher").await;
+    assert!(!page.text("body").await.contains("Bleeding"), "the operator, beside the surgeon, is not told the reason");
+    assert_eq!(shown(theatre).await, before, "nothing on the surgeon's page has changed");
+    surgeon.reload().await;
+    surgeon.sees("#change-title", "Setting 2 of 2").await;
+    assert_eq!(shown(theatre).await, before, "nor has it after a reload");
+    researcher
+}
+
+/// What stands on the surgeon's page, seen or not.
+async fn shown(theatre: &Theatre<'_>) -> Value {
+    let text = "return document.body.textContent.replace(/\\s+/g, ' ')";
+    theatre.surgeon.run(text, json!([])).await
+}
+
+async fn abort(theatre: &Theatre<'_>) {
+    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    theatre.tap_notice(2).await;
+    theatre.say("The last word", 2).await;
+    operator.click("#session-actions .danger").await;
+    operator.sees("#reason-consequence", "Everything said and answered so far is kept").await;
+    theatre.give_reason("The participant was called away").await;
+    surgeon.sees("#panel h2", "The session was ended").await;
+    surgeon.sees("#panel", "Everything you said is saved").await;
+    shoot(surgeon, "surgeon-12-aborted").await;
+    operator.sees("#phase", "Aborted").await;
+    operator.sees("#log", "Session aborted: The participant was called away").await;
+    shoot(operator, "operator-7-aborted").await;
+}
+
+/// The list of sessions has practice in a place of its own.
+async fn practice_stays_apart(theatre: &Theatre<'_>, researcher: &str) {
+    let page = &theatre.operator;
+    page.open(researcher).await;
+    page.sees("[aria-labelledby=sessions]", "S-04").await;
+    page.sees("[aria-labelledby=practice]", "S-03").await;
+    assert!(!page.text("[aria-labelledby=sessions]").await.contains("S-03"));
+    assert!(!page.text("[aria-labelledby=practice]").await.contains("S-04"));
+    page.sees("[aria-labelledby=sessions]", "emergency unblinding").await;
+    shoot(page, "researcher-7-practice-apart").await;
+}
+
+async fn database(theatre: &Theatre<'_>) {
+    let file = theatre.server.data.path().join("parfocal.db");
+    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+    let sql = "SELECT protocol, practice, (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments
+               FROM sessions AS s ORDER BY rowid";
+    let sessions = sqlx::query(sql).fetch_all(&pool).await.unwrap();
+    let sessions: Vec<(String, bool, i64)> = sessions.iter().map(|row| (row.get(0), row.get(1), row.get(2))).collect();
+    assert_eq!(sessions, [("practice".to_owned(), true, 1), ("limited".to_owned(), false, 2)]);
+    let sql =
+        "SELECT kind, role, payload FROM events NATURAL JOIN (SELECT session FROM sessions WHERE protocol = 'limited')
+               WHERE kind IN ('segment-finished', 'unblinded', 'aborted') ORDER BY number";
+    let events = sqlx::query(sql).fetch_all(&pool).await.unwrap();
+    let events: Vec<(String, String, Value)> = events
+        .iter()
+        .map(|row| (row.get(0), row.get(1), serde_json::from_str(row.get::<&str, _>(2)).unwrap()))
+        .collect();
+    let kinds: Vec<_> = events.iter().map(|(kind, role, _)| (kind.as_str(), role.as_str())).collect();
+    assert_eq!(kinds, [("segment-finished", "system"), ("unblinded", "researcher"), ("aborted", "operator")]);
+    assert_eq!(events[0].2["inspected_ms"], 5000);
+    assert_eq!((&events[1].2["reason"], &events[1].2["emergency"]), (&json!(EMERGENCY), &json!(true)));
+    assert_eq!(events[2].2["reason"], "The participant was called away");
+    let about =
+        "SELECT text, setting FROM comments JOIN segments USING (segment) ORDER BY comments.number LIMIT 2 OFFSET 1";
+    let about = sqlx::query(about).fetch_all(&pool).await.unwrap();
+    let about: Vec<(String, i64)> = about.iter().map(|row| (row.get(0), row.get(1))).collect();
+    assert_eq!(about, [("Cut off in the middle".to_owned(), 1), ("The last word".to_owned(), 2)]);
+    pool.close().await;
+}
