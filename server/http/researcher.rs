@@ -112,14 +112,14 @@ fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
 pub(super) fn in_words(value: &AnswerValue) -> String {
     match value {
         AnswerValue::Point(point) => point.to_string(),
-        AnswerValue::Points(points) => points.iter().map(point_in_words).collect::<Vec<_>>().join(", "),
+        AnswerValue::Points(points) => points.iter().map(|point| point_in_words(*point)).collect::<Vec<_>>().join(", "),
         AnswerValue::Text(text) => text.clone(),
     }
 }
 
 /// An item still open has no point.
-fn point_in_words(point: &u8) -> String {
-    if *point == 0 { "–".to_owned() } else { point.to_string() }
+fn point_in_words(point: u8) -> String {
+    if point == 0 { "–".to_owned() } else { point.to_string() }
 }
 
 /// One session.

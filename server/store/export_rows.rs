@@ -38,38 +38,38 @@ impl Reader {
     pub(super) async fn export_telemetry<E: From<StoreError>>(
         &self,
         session: SessionId,
-        mut take: impl FnMut(Vec<Value>) -> Result<(), E>,
+        take: impl FnMut(Vec<Value>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let session = session.to_string();
-        let mut rows = sqlx::query(
+        let sql =
             "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured, t.held IS NOT NULL AS held, t.optimal
              FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
-             WHERE g.session = ? ORDER BY g.setting, t.number",
-        )
-        .bind(&session)
-        .fetch(self.pool());
-        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
-            take(telemetry_row(&row)?)?;
-        }
-        Ok(())
+             WHERE g.session = ? ORDER BY g.setting, t.number";
+        self.hand_out(session, sql, telemetry_row, take).await
     }
 
     /// Hands what of the telemetry of `session` tells the policy to `take`, row by row.
     pub(super) async fn export_policy_steps<E: From<StoreError>>(
         &self,
         session: SessionId,
+        take: impl FnMut(Vec<Value>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT g.setting, t.run, t.frame, p.name, t.metric, t.policy_micros, t.latency_micros, t.held
+             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number LEFT JOIN policies AS p ON p.number = t.policy
+             WHERE g.session = ? ORDER BY g.setting, t.number";
+        self.hand_out(session, sql, policy_row, take).await
+    }
+
+    /// Hands the rows of `sql`, whose one parameter is `session`, to `take`, each as `read` reads it.
+    async fn hand_out<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        sql: &'static str,
+        read: fn(&SqliteRow) -> Result<Vec<Value>, StoreError>,
         mut take: impl FnMut(Vec<Value>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let session = session.to_string();
-        let mut rows = sqlx::query(
-            "SELECT g.setting, t.run, t.frame, p.name, t.metric, t.policy_micros, t.latency_micros, t.held
-             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number LEFT JOIN policies AS p ON p.number = t.policy
-             WHERE g.session = ? ORDER BY g.setting, t.number",
-        )
-        .bind(&session)
-        .fetch(self.pool());
+        let mut rows = sqlx::query(sql).bind(session.to_string()).fetch(self.pool());
         while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
-            take(policy_row(&row)?)?;
+            take(read(&row)?)?;
         }
         Ok(())
     }

@@ -36,6 +36,27 @@ impl Reader {
         Ok(Self { pool: SqlitePoolOptions::new().max_connections(3).connect_with(options).await? })
     }
 
+    /// The database as it is now, whatever is written from now on: all that is read from what comes back belongs together.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn snapshot(&self) -> Result<Self, StoreError> {
+        let options = (*self.pool.connect_options()).clone();
+        // One connection, within one transaction from its first to its last use. The first reading takes the snapshot.
+        let pool = SqlitePoolOptions::new()
+            .max_connections(1)
+            .idle_timeout(None)
+            .max_lifetime(None)
+            .test_before_acquire(false)
+            .after_connect(|connection, _| {
+                Box::pin(async move {
+                    sqlx::query("BEGIN").execute(&mut *connection).await?;
+                    sqlx::query("SELECT count(*) FROM runs").execute(&mut *connection).await.map(|_| ())
+                })
+            });
+        Ok(Self { pool: pool.connect_with(options).await? })
+    }
+
     async fn check_version(&self) -> Result<(), StoreError> {
         let mut connection = self.pool.acquire().await?;
         let applied = connection.list_applied_migrations("_sqlx_migrations").await?;
@@ -50,6 +71,7 @@ impl Reader {
         &self.pool
     }
 
+    /// Ends its connections.
     pub(super) async fn close(&self) {
         self.pool.close().await;
     }

@@ -1,4 +1,5 @@
-//! Telemetry into SQLite: in batches, on a connection of its own, so that it delays nothing and nothing waits for it.
+//! Telemetry into SQLite: in batches, on a connection of its own, so that it delays nothing and nothing waits for it. What
+//! belongs to no setting of a session is forgotten after a while.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -23,6 +24,12 @@ const MOST_WAITING: usize = 9_000;
 /// Batches between two checkpoints: about every 16 s.
 const CHECKPOINT_BATCHES: u32 = 64;
 
+/// Latest steps kept beside those of settings: eleven hours at 50 a second, some 200 MB.
+pub const KEPT_OUTSIDE: i64 = 2_000_000;
+/// Steps looked at between two checkpoints for whether they can be forgotten: more than come in that time, and few
+/// enough to hold up no comment.
+const LOOKED_AT: i64 = 4_000;
+
 /// What became of telemetry since the start.
 #[derive(Debug, Default)]
 pub struct Counts {
@@ -38,12 +45,17 @@ pub struct Counts {
 pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
     let mut writer = Writer::default();
     let mut batches = 0_u32;
+    let mut looked_at = 0;
     let mut open = true;
     while open {
         open = writer.collect(&mut receiver).await;
         writer.flush(&store).await;
         batches = batches.wrapping_add(1);
         if batches.is_multiple_of(CHECKPOINT_BATCHES) {
+            match store.forget_steps_outside(looked_at, LOOKED_AT, KEPT_OUTSIDE).await {
+                Ok(up_to) => looked_at = up_to,
+                Err(error) => tracing::warn!("old telemetry could not be forgotten: {error}; it is tried again"),
+            }
             checkpoint(&store).await;
         }
     }
@@ -110,6 +122,32 @@ impl Writer {
             insert(&mut transaction, store.run(), record, segment, policy).await?;
         }
         Ok(transaction.commit().await?)
+    }
+}
+
+impl Store {
+    /// Forgets steps that belong to no setting of a session, of the `count` after step `from`, but never one of the
+    /// latest `kept`. Gives the step up to which it looked, which is where to go on.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn forget_steps_outside(&self, from: i64, count: i64, kept: i64) -> Result<i64, StoreError> {
+        let _turn = self.turn().await;
+        let bounds = sqlx::query_as(
+            "SELECT (SELECT min(number) FROM telemetry WHERE number > ?), (SELECT max(number) FROM telemetry)",
+        );
+        let bounds = bounds.bind(from).fetch_one(&self.inner.telemetry).await?;
+        let (Some(first), Some(last)): (Option<i64>, Option<i64>) = bounds else { return Ok(from) };
+        let up_to = (first + count - 1).min(last - kept);
+        if up_to < first {
+            return Ok(from);
+        }
+        sqlx::query("DELETE FROM telemetry WHERE number BETWEEN ? AND ? AND segment IS NULL")
+            .bind(first)
+            .bind(up_to)
+            .execute(&self.inner.telemetry)
+            .await?;
+        Ok(up_to)
     }
 }
 

@@ -207,6 +207,26 @@ async fn an_export_never_overwrites_and_a_session_that_is_not_there_is_named() {
 }
 
 #[tokio::test]
+async fn an_export_of_a_session_under_way_is_of_one_moment() {
+    let data = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(data.path()).await;
+    let session = bench.begin("paper").await;
+    bench.whole_setting().await;
+    let snapshot = Reader::open(data.path()).await.unwrap().snapshot().await.unwrap();
+    bench.say("said while it is being exported").await;
+    bench.whole_setting().await;
+    let now = Reader::open(data.path()).await.unwrap();
+    assert_eq!(snapshot.comments(session).await.unwrap().len(), 1);
+    assert_eq!(now.comments(session).await.unwrap().len(), 3);
+    assert_eq!(snapshot.events(session).await.unwrap().len(), 5, "created, started, three of the first setting");
+    let (one, other) = (data.path().join("one"), data.path().join("other"));
+    export(&snapshot, session, &one, false).await.unwrap();
+    assert_eq!(rows(&one, "comments").len(), 3, "each export takes a moment of its own");
+    export(&now, session, &other, false).await.unwrap();
+    assert_eq!(failed(&verify(&other)), [""; 0]);
+}
+
+#[tokio::test]
 async fn the_pages_zip_is_the_commands_folder() {
     let data = tempfile::tempdir().unwrap();
     let (bench, session) = with_session(data.path()).await;

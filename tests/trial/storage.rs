@@ -164,6 +164,36 @@ async fn telemetry_is_written_with_its_segment_and_nothing_else_waits_for_it() {
 }
 
 #[tokio::test]
+async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = Bench::start(folder.path()).await;
+    bench.begin("paper").await;
+    let segment = bench.view().segment.unwrap();
+    let (sender, receiver) = tokio::sync::mpsc::channel(4096);
+    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    for frame in 1..=1000 {
+        sender.send(step(frame, Some(segment).filter(|_| (201..=300).contains(&frame)))).await.unwrap();
+    }
+    drop(sender);
+    writer.await.unwrap();
+    let pool = raw(folder.path()).await;
+    let left = async || {
+        let sql = "SELECT frame, segment IS NOT NULL FROM telemetry ORDER BY frame";
+        sqlx::query_as::<_, (i64, bool)>(sql).fetch_all(&pool).await.unwrap()
+    };
+    let up_to = bench.store.forget_steps_outside(0, 150, 400).await.unwrap();
+    assert_eq!((up_to, left().await.len()), (150, 850), "a few at a time");
+    let mut looked_at = up_to;
+    for _ in 0..10 {
+        looked_at = bench.store.forget_steps_outside(looked_at, 150, 400).await.unwrap();
+    }
+    let left = left().await;
+    assert_eq!(left.iter().filter(|(_, inside)| *inside).count(), 100, "all of the setting's");
+    let outside: Vec<i64> = left.iter().filter(|(_, inside)| !inside).map(|(frame, _)| *frame).collect();
+    assert_eq!(outside, (601..=1000).collect::<Vec<_>>(), "of the others the latest 400");
+}
+
+#[tokio::test]
 async fn telemetry_that_a_failing_disk_refused_is_tried_again() {
     let folder = tempfile::tempdir().unwrap();
     let bench = Bench::start(folder.path()).await;

@@ -72,6 +72,14 @@ pub enum ExportError {
 /// # Errors
 /// When there is no such session, it is asked for unblinded before it was, or `out` cannot be written.
 pub async fn export(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
+    // A session may be under way: what is said meanwhile is in all of the files or in none.
+    let snapshot = reader.snapshot().await?;
+    let outcome = write(&snapshot, session, out, unblinded).await;
+    snapshot.close().await;
+    outcome
+}
+
+async fn write(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
     let Some(stored) = reader.session(session).await? else {
         return Err(ExportError::NoSession { session, known: known_sessions(reader).await? });
     };
