@@ -8,6 +8,7 @@ mod pace;
 mod path;
 pub mod phantom;
 mod pool;
+pub mod recorded;
 mod spec;
 pub mod walk;
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::footage::FootageCamera;
 use super::phantom::{Before, PhantomCamera};
+use super::recorded::RecordedCamera;
 use super::{Camera, CameraError};
 use crate::clock::Clock;
 use crate::lens::Optics;
@@ -23,7 +24,8 @@ pub struct CameraSettings {
 }
 
 /// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a white tile),
-/// `phantom:dark` (with its lens cap on), or `footage:PATH` with a video, an image or a folder of images.
+/// `phantom:dark` (with its lens cap on), `footage:PATH` with a video, an image or a folder of images, `scan:DIR` with a
+/// recorded scan, or `gige:ID`.
 ///
 /// # Errors
 /// [`CameraError::BadSource`] when there is no such camera, or its source cannot be used.
@@ -37,6 +39,10 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
             Ok(camera) => Ok(Box::new(camera)),
             Err(error) => Err(CameraError::BadSource(error.to_string())),
         },
+        Some(("scan", path)) if !path.is_empty() => match RecordedCamera::open(Path::new(path), settings) {
+            Ok(camera) => Ok(Box::new(camera)),
+            Err(error) => Err(CameraError::BadSource(error.to_string())),
+        },
         #[cfg(feature = "aravis")]
         Some(("gige", source)) => Ok(Box::new(super::gige::GigeCamera::open(source, settings)?)),
         #[cfg(not(feature = "aravis"))]
@@ -47,8 +53,8 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
         )),
         _ => Err(CameraError::BadSource(format!(
             "there is no camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and `phantom:dark` \
-             to try the bench's commands), `footage:PATH` (a video, an image or a \
-             folder of images) or `gige:ID` (`gige:list` says which there are)"
+             to try the bench's commands), `footage:PATH` (a video, an image or a folder of images), `scan:DIR` (a \
+             recorded scan) or `gige:ID` (`gige:list` says which there are)"
         ))),
     }
 }

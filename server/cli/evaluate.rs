@@ -1,23 +1,31 @@
 //! `parfocal evaluate`: all policies on the same focal-time scans, and the paper's table with ours beside it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Failure;
+use super::{Failure, scan};
 use crate::autofocus::{PolicyName, Registry, shipped};
-use crate::training::evaluate::{Benchmark, COUNT, FRAMES, Outcome, SEED, compare, evaluate};
+use crate::camera::phantom::Trajectory;
+use crate::camera::recorded::ScanFolder;
+use crate::training::evaluate::{Benchmark, COUNT, FRAMES, Outcome, SEED, ScanSet, compare, evaluate};
 use crate::training::footage;
 use crate::training::pictures::{Split, reference};
+use crate::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
 use crate::training::report::Report;
 use crate::training::scan::ScanSettings;
 
 /// What to evaluate, and on what.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Which scans: `simulated`, the reference benchmark.
-    #[arg(long, default_value = "simulated")]
+    /// Which scans: `simulated`, the reference benchmark; `phantom`, recorded over the phantom as an arm would; or the folder
+    /// of a recorded scan.
+    #[arg(long, value_name = "simulated|phantom|DIR", default_value = "simulated")]
     scans: String,
+    /// What a recorded scan shows between two of its focal powers.
+    #[arg(long, value_enum, default_value_t)]
+    between: Between,
     /// A video, an image or a folder of images to scan in place of the reference pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
@@ -27,12 +35,12 @@ pub struct Arguments {
     /// Folder with weights (`NAME.safetensors`) to take in the place of those that ship.
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Seed of the scans' courses.
-    #[arg(long, default_value_t = SEED)]
+    /// Seed of the scans' courses; a recorded scan has its own.
+    #[arg(long, value_name = "N", default_value_t = SEED)]
     seed: u64,
-    /// Number of scans.
-    #[arg(long, default_value_t = COUNT)]
-    count: usize,
+    /// Number of scans; 200 simulated ones or 1 over the phantom, if not said.
+    #[arg(long, value_name = "N")]
+    count: Option<usize>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -52,14 +60,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         registry = shipped::with_folder(registry, folder);
     }
     let policies = policies(&arguments.policies, &registry);
-    let benchmark = benchmark(arguments)?;
-    let bar = progress(policies.len() * benchmark.count);
-    let outcomes = evaluate(&registry, &policies, &benchmark, &|name| {
+    let scans = scans(arguments)?;
+    let bar = progress(policies.len() * scans.set.count());
+    let outcomes = evaluate(&registry, &policies, scans.set.as_ref(), &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;
     bar.finish_and_clear();
-    let report = report(arguments, &outcomes);
+    let report = report(arguments, &scans, &outcomes);
     if let Some(folder) = &arguments.out {
         report
             .write(&outcomes, folder)
@@ -81,32 +89,75 @@ fn policies(asked: &str, registry: &Registry) -> Vec<PolicyName> {
     }
 }
 
-fn benchmark(arguments: &Arguments) -> Result<Benchmark, Failure> {
-    if arguments.count == 0 {
+/// What to evaluate on.
+struct Scans {
+    set: Box<dyn ScanSet>,
+    seed: u64,
+    between: Option<Between>,
+}
+
+fn scans(arguments: &Arguments) -> Result<Scans, Failure> {
+    if arguments.count == Some(0) {
         return Err("--count must be at least 1".into());
     }
+    if arguments.scans == "simulated" {
+        return simulated(arguments);
+    }
+    if !arguments.footage.is_empty() {
+        return Err("--footage makes simulated scans; leave out --scans".into());
+    }
+    let between = Some(arguments.between);
+    let recorded = |scans| Box::new(Recorded { scans, between: arguments.between });
+    if arguments.scans == "phantom" {
+        let scans = (0..arguments.count.unwrap_or(1) as u64).map(|index| phantom(arguments.seed.wrapping_add(index)));
+        return Ok(Scans { set: recorded(scans.collect()), seed: arguments.seed, between });
+    }
+    let folder = Path::new(&arguments.scans);
+    if !folder.is_dir() {
+        return Err(format!(
+            "there are no scans '{0}'; use simulated, phantom or a recorded scan's folder",
+            arguments.scans
+        )
+        .into());
+    }
+    if arguments.count.is_some_and(|count| count > 1) {
+        return Err("a folder holds one scan; leave out --count".into());
+    }
+    let folder = ScanFolder::open(folder)?;
+    let bar = scan::bar(folder.poses().len(), 0);
+    let scan = RecordedScan::read(&folder, &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, between })
+}
+
+fn phantom(seed: u64) -> Arc<RecordedScan> {
+    let bar = scan::bar(POSES, 0);
+    let scan = RecordedScan::phantom(&Trajectory::new(seed, POSES, HASTE), seed, FOCAL_POWERS, &|| bar.inc(1));
+    bar.finish_and_clear();
+    Arc::new(scan)
+}
+
+fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
     let mut clips = Vec::new();
     for path in &arguments.footage {
         clips.extend(footage::clips(path)?);
     }
-    if arguments.scans != "simulated" {
-        return Err(format!("there are no scans '{}'; use --scans simulated", arguments.scans).into());
-    }
+    let (seed, count) = (arguments.seed, arguments.count.unwrap_or(COUNT));
     let mut settings = ScanSettings::default();
     if clips.is_empty() {
-        clips = reference(Split::Test, arguments.count.min(COUNT) as u64)?;
+        clips = reference(Split::Test, count.min(COUNT) as u64)?;
         settings = ScanSettings::reference();
     }
-    let (seed, count) = (arguments.seed, arguments.count);
-    Ok(Benchmark { clips, settings, seed, count, frames: FRAMES })
+    let set = Box::new(Benchmark { clips, settings, seed, count, frames: FRAMES });
+    Ok(Scans { set, seed, between: None })
 }
 
-fn report(arguments: &Arguments, outcomes: &[Outcome]) -> Report {
+fn report(arguments: &Arguments, scans: &Scans, outcomes: &[Outcome]) -> Report {
     let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();
     let comparisons = compare(&rows);
     let footage = arguments.footage.iter().map(|path| path.display().to_string()).collect();
-    let scans = arguments.scans.clone();
-    Report { scans, seed: arguments.seed, count: arguments.count, footage, rows, comparisons }
+    let (name, count) = (arguments.scans.clone(), scans.set.count());
+    Report { scans: name, seed: scans.seed, count, footage, between: scans.between, rows, comparisons }
 }
 
 fn progress(total: usize) -> ProgressBar {

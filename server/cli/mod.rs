@@ -7,8 +7,10 @@ mod devices;
 mod evaluate;
 mod export;
 mod inspect;
+mod interrupt;
 mod lens;
 mod policies;
+mod scan;
 mod serve;
 mod tables;
 mod train;
@@ -40,6 +42,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
+    /// Record focal-time scans, look at them, and import them.
+    Scan(scan::Arguments),
     /// Start the server: the live view, the control loop and the trial.
     Serve(serve::Arguments),
     /// Make a learned policy from nothing.
@@ -72,6 +76,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Lens(arguments) => lens::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
+        Command::Scan(arguments) => scan::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

@@ -1,13 +1,12 @@
 //! `parfocal train`: makes a learned policy from nothing, on this machine.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Failure;
+use super::{Failure, interrupt};
 use crate::clock::SystemClock;
 use crate::training::recipe::{Recipe, names, shipped};
 use crate::training::run::{LEG, Run};
@@ -65,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let total = recipe.updates();
     let mut run = Run::start(recipe, arguments.seed, clips, &arguments.out, arguments.resume)?;
-    let stop = stop_on_interrupt()?;
+    let stop = interrupt::flag(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());
     let mut validation = run.best();
     let whole = run.go(&SystemClock, &|| stop.load(Ordering::Relaxed), &mut |progress: &Progress| {
@@ -96,25 +95,6 @@ fn recipe(arguments: &Arguments) -> Result<Recipe, Failure> {
     let unknown = || format!("nothing trains '{}'; there are recipes for {}", arguments.policy, names().join(", "));
     let text = shipped(&arguments.policy).ok_or_else(unknown)?;
     Ok(Recipe::parse(text)?)
-}
-
-/// A flag that the first Ctrl-C raises; the second ends the process at once.
-fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
-        runtime.block_on(async {
-            if tokio::signal::ctrl_c().await.is_ok() {
-                eprintln!("saving after at most {LEG} more updates; Ctrl-C again to leave at once");
-                flag.store(true, Ordering::Relaxed);
-                if tokio::signal::ctrl_c().await.is_ok() {
-                    std::process::exit(130);
-                }
-            }
-        });
-    })?;
-    Ok(stop)
 }
 
 fn bar(total: u64, done: u64) -> ProgressBar {

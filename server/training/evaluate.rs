@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::rollout::{Path, PathFigures, roll_out, roll_out_oracle};
+use super::rollout::{FocalTimeScan, Path, PathFigures, roll_out, roll_out_oracle};
 use super::scan::{Clip, Scan, ScanSettings};
 use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
 use crate::autofocus::{PolicyError, PolicyName, Registry};
@@ -19,7 +19,21 @@ pub const COUNT: usize = 200;
 /// Seed of the reference benchmark.
 pub const SEED: u64 = 2023;
 
-/// A set of scans to evaluate on: scan `i` goes over clip `i` modulo their number.
+/// What policies are evaluated on.
+pub trait ScanSet {
+    /// Number of scans.
+    fn count(&self) -> usize;
+
+    /// Scan `index`, from 0, at its beginning, and the number of its frames.
+    fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize);
+
+    /// Number of stretches that each scan is cut into for intervals and tests, which need many independent figures.
+    fn parts(&self) -> usize {
+        1
+    }
+}
+
+/// A set of simulated scans: scan `i` goes over clip `i` modulo their number.
 #[derive(Debug, Clone)]
 pub struct Benchmark {
     /// What is scanned.
@@ -45,13 +59,25 @@ impl Benchmark {
     }
 }
 
-/// One policy's paths over the scans of a benchmark.
+impl ScanSet for Benchmark {
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize) {
+        (Box::new(Self::scan(self, index)), self.frames)
+    }
+}
+
+/// One policy's paths over the scans of a set.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The policy, or [`ORACLE`].
     pub policy: String,
     /// Its path over each scan.
     pub paths: Vec<Path>,
+    /// See [`ScanSet::parts`].
+    pub parts: usize,
 }
 
 /// A policy's figures over all scans.
@@ -71,11 +97,11 @@ pub struct Row {
     pub travel: f64,
     /// Changes of direction a second.
     pub reversals: f64,
-    /// 95 % bootstrap interval of `mae` over scans.
+    /// 95 % bootstrap interval of `mae` over scans, or their parts.
     pub mae_interval: (f64, f64),
-    /// 95 % bootstrap interval of `in_focus` over scans.
+    /// 95 % bootstrap interval of `in_focus` over scans, or their parts.
     pub in_focus_interval: (f64, f64),
-    /// Each scan's mean absolute error.
+    /// Each scan's, or part's, mean absolute error.
     pub scan_mae: Vec<f64>,
 }
 
@@ -92,27 +118,31 @@ pub struct Comparison {
     pub p: f64,
 }
 
-/// Runs the named policies, and the oracle first, over `benchmark`. `progress` is told after each policy's scan.
+/// Runs the named policies, and the oracle first, over `scans`. `progress` is told after each policy's scan.
 ///
 /// # Errors
 /// When a policy is unknown or cannot run.
 pub fn evaluate(
     registry: &Registry,
     policies: &[PolicyName],
-    benchmark: &Benchmark,
+    scans: &dyn ScanSet,
     progress: &dyn Fn(&str),
 ) -> Result<Vec<Outcome>, PolicyError> {
-    let scans = || (0..benchmark.count).map(|index| benchmark.scan(index));
-    let paths = scans().map(|mut scan| roll_out_oracle(&mut scan, benchmark.frames)).collect();
-    let mut outcomes = vec![Outcome { policy: ORACLE.to_owned(), paths }];
+    let (count, parts) = (scans.count(), scans.parts());
+    let perfect = |index| {
+        let (mut scan, frames) = scans.scan(index);
+        roll_out_oracle(scan.as_mut(), frames)
+    };
+    let mut outcomes = vec![Outcome { policy: ORACLE.to_owned(), paths: (0..count).map(perfect).collect(), parts }];
     for name in policies {
-        let mut paths = Vec::with_capacity(benchmark.count);
-        for mut scan in scans() {
+        let mut paths = Vec::with_capacity(count);
+        for index in 0..count {
+            let (mut scan, frames) = scans.scan(index);
             let mut policy = registry.build(name)?;
-            paths.push(roll_out(policy.as_mut(), &mut scan, benchmark.frames));
+            paths.push(roll_out(policy.as_mut(), scan.as_mut(), frames));
             progress(name.as_str());
         }
-        outcomes.push(Outcome { policy: name.to_string(), paths });
+        outcomes.push(Outcome { policy: name.to_string(), paths, parts });
     }
     Ok(outcomes)
 }
@@ -121,7 +151,8 @@ impl Outcome {
     /// The figures over all paths.
     #[must_use]
     pub fn row(&self) -> Row {
-        let figures: Vec<PathFigures> = self.paths.iter().map(Path::figures).collect();
+        let parts = self.paths.iter().flat_map(|path| path.parts(self.parts));
+        let figures: Vec<PathFigures> = parts.map(|part| part.figures()).collect();
         let column = |value: fn(&PathFigures) -> f64| figures.iter().map(value).collect::<Vec<_>>();
         let errors: Vec<f64> = self.paths.iter().flat_map(Path::errors).collect();
         let (scan_mae, in_focus) = (column(|f| f.mae), column(|f| f.in_focus));

@@ -7,6 +7,8 @@ use std::{fs, io};
 use serde::Serialize;
 
 use super::evaluate::{Comparison, ORACLE, Outcome, Row};
+use super::plot::{PANEL, begin, legend, line, panel};
+use super::recorded::Between;
 use super::rollout::{IN_FOCUS, Path};
 
 /// What `evaluate` gives. The contract fixes the fields' names.
@@ -20,14 +22,20 @@ pub struct Report {
     pub count: usize,
     /// Footage scanned, if any.
     pub footage: Vec<String>,
+    /// What a recorded scan shows between two of its focal powers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub between: Option<Between>,
     /// One a policy.
     pub rows: Vec<Row>,
     /// One a pair of policies.
     pub comparisons: Vec<Comparison>,
 }
 
-/// The paper's figures on its simulated scans: policy, mean absolute error, its deviation, share in focus (percent).
-const PAPER: [(&str, f64, f64, f64); 6] = [
+/// One of the paper's results: policy, mean absolute error, its deviation, share in focus (percent).
+type PaperRow = (&'static str, f64, f64, f64);
+
+/// The paper's figures on its simulated scans.
+const SIMULATED: [PaperRow; 6] = [
     ("fixed", 0.236, 0.152, 19.0),
     ("mgm-hill-climber", 0.102, 0.138, 67.9),
     ("mlr-hill-climber", 0.092, 0.118, 68.2),
@@ -36,16 +44,27 @@ const PAPER: [(&str, f64, f64, f64); 6] = [
     ("cnn-learned", 0.049, 0.072, 84.9),
 ];
 
+/// Its figures on a scan recorded by a robotic arm.
+const ROBOTIC: [PaperRow; 6] = [
+    ("fixed", 0.262, 0.161, 26.4),
+    ("mgm-hill-climber", 0.146, 0.148, 46.4),
+    ("mlr-hill-climber", 0.163, 0.168, 44.1),
+    ("mgm-learned", 0.126, 0.118, 50.8),
+    ("mlr-learned", 0.156, 0.131, 39.5),
+    ("cnn-learned", 0.070, 0.099, 79.1),
+];
+
 impl Report {
-    /// The table as Markdown, the paper's simulated figures beside ours.
+    /// The table as Markdown, beside the paper's figures on scans of the same kind.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(
             "| policy | MAE ± sd | 95 % CI | in focus | travel / frame | reversals / s | paper: MAE ± sd | in focus |\n\
              |---|---|---|---|---|---|---|---|\n",
         );
+        let paper = if self.between.is_some() { ROBOTIC } else { SIMULATED };
         for row in &self.rows {
-            let paper = PAPER
+            let paper = paper
                 .iter()
                 .find(|paper| paper.0 == row.policy)
                 .map_or_else(|| "– | –".to_owned(), |(_, mae, sd, share)| format!("{mae:.3} ± {sd:.3} | {share:.1} %"));
@@ -62,7 +81,14 @@ impl Report {
                 row.reversals,
             );
         }
-        let _ = writeln!(text, "\nScans: {}, {} of them, seed {}.", self.scans, self.count, self.seed);
+        let _ = write!(text, "\nScans: {}, {} of them, seed {}.", self.scans, self.count, self.seed);
+        text.push_str(match self.between {
+            None => "\n",
+            Some(Between::Nearest) => " A frame shows the picture recorded at the nearest focal power.\n",
+            Some(Between::Interpolated) => {
+                " A frame shows a mix of the pictures recorded at the two focal powers around.\n"
+            }
+        });
         text
     }
 
@@ -90,9 +116,6 @@ impl Report {
     }
 }
 
-const WIDTH: f64 = 900.0;
-const PANEL: f64 = 230.0;
-const LEFT: f64 = 55.0;
 const COLOURS: [&str; 8] = ["#999999", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#6a3d9a"];
 
 /// Focal path (above) and error (below; moving average of 5 frames) of each policy on scan `index`, the optimum in black.
@@ -104,12 +127,9 @@ pub fn figure(outcomes: &[Outcome], index: usize) -> String {
         .filter_map(|outcome| Some((outcome.policy.as_str(), outcome.paths.get(index)?)))
         .collect();
     let height = 2.0 * PANEL + 110.0;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" \
-         font-size=\"12\"><rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-    );
-    panel(&mut svg, 20.0, "focal power", 1.0);
-    panel(&mut svg, PANEL + 50.0, "focal error", 0.5);
+    let mut svg = begin(height);
+    panel(&mut svg, 20.0, "focal power", 1.0, "frame");
+    panel(&mut svg, PANEL + 50.0, "focal error", 0.5, "frame");
     for (colour, (name, path)) in COLOURS.iter().cycle().zip(&policies) {
         line(&mut svg, &path.focal_power, 20.0, 1.0, colour, name);
         line(&mut svg, &moving_average(&path.errors().collect::<Vec<_>>()), PANEL + 50.0, 0.5, colour, name);
@@ -118,47 +138,10 @@ pub fn figure(outcomes: &[Outcome], index: usize) -> String {
         line(&mut svg, &path.optimum, 20.0, 1.0, "black", "optimum");
         line(&mut svg, &vec![IN_FOCUS; path.optimum.len()], PANEL + 50.0, 0.5, "#bbbbbb", "in focus");
     }
-    let mut x = LEFT;
-    for (colour, name) in COLOURS.iter().cycle().zip(policies.iter().map(|p| p.0)).chain([(&"black", "optimum")]) {
-        let y = height - 12.0;
-        let _ = writeln!(svg, "<rect x=\"{x}\" y=\"{}\" width=\"12\" height=\"4\" fill=\"{colour}\"/>", y - 6.0);
-        let _ = writeln!(svg, "<text x=\"{}\" y=\"{y}\">{name}</text>", x + 16.0);
-        x += 105.0;
-    }
+    let names = policies.iter().map(|policy| policy.0);
+    legend(&mut svg, height - 12.0, names.zip(COLOURS.into_iter().cycle()).chain([("optimum", "black")]));
     svg.push_str("</svg>\n");
     svg
-}
-
-fn panel(svg: &mut String, top: f64, label: &str, most: f64) {
-    let (right, bottom) = (WIDTH - 15.0, top + PANEL);
-    let _ = writeln!(
-        svg,
-        "<rect x=\"{LEFT}\" y=\"{top}\" width=\"{}\" height=\"{PANEL}\" fill=\"none\" stroke=\"#cccccc\"/>\
-         <text x=\"{LEFT}\" y=\"{}\">{label}</text><text x=\"{}\" y=\"{}\" text-anchor=\"end\">{most}</text>\
-         <text x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">0</text>\
-         <text x=\"{right}\" y=\"{}\" text-anchor=\"end\">frame</text>",
-        right - LEFT,
-        top - 5.0,
-        LEFT - 5.0,
-        top + 10.0,
-        LEFT - 5.0,
-        bottom + 14.0,
-    );
-}
-
-#[allow(clippy::cast_precision_loss, reason = "frame numbers are small")]
-fn line(svg: &mut String, values: &[f64], top: f64, most: f64, colour: &str, name: &str) {
-    let step = (WIDTH - 15.0 - LEFT) / (values.len().max(2) - 1) as f64;
-    let mut points = String::new();
-    for (index, value) in values.iter().enumerate() {
-        let y = top + PANEL * (1.0 - (value / most).clamp(0.0, 1.0));
-        let _ = write!(points, "{:.1},{y:.1} ", LEFT + step * index as f64);
-    }
-    let _ = writeln!(
-        svg,
-        "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\">\
-         <title>{name}</title></polyline>"
-    );
 }
 
 /// Mean of up to five values around each.

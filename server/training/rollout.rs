@@ -3,7 +3,34 @@
 
 use super::scan::Scan;
 use crate::autofocus::{Observation, Policy, STEP};
+use crate::imaging::Patch;
 use crate::lens::FocalPower;
+
+/// A focal-time scan that a policy can be run on, frame by frame.
+pub trait FocalTimeScan {
+    /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.
+    fn observe(&mut self, focal_power: FocalPower) -> Patch;
+
+    /// The optimal focal power at this frame.
+    fn optimum(&self) -> FocalPower;
+
+    /// Goes on to the next frame; at the last one it may stay.
+    fn advance(&mut self);
+}
+
+impl FocalTimeScan for Scan {
+    fn observe(&mut self, focal_power: FocalPower) -> Patch {
+        Self::observe(self, focal_power)
+    }
+
+    fn optimum(&self) -> FocalPower {
+        Self::optimum(self)
+    }
+
+    fn advance(&mut self) {
+        Self::advance(self);
+    }
+}
 
 /// Errors below this are in focus, as in the paper.
 pub const IN_FOCUS: f64 = 0.1;
@@ -38,6 +65,17 @@ impl Path {
         self.focal_power.iter().zip(&self.optimum).map(|(f, best)| (f - best).abs())
     }
 
+    /// This path cut into `count` stretches of the same length, to within a frame.
+    #[must_use]
+    pub fn parts(&self, count: usize) -> Vec<Self> {
+        let frames = self.focal_power.len();
+        let part = |index: usize| {
+            let range = frames * index / count..frames * (index + 1) / count;
+            Self { focal_power: self.focal_power[range.clone()].to_vec(), optimum: self.optimum[range].to_vec() }
+        };
+        (0..count).map(part).filter(|part| !part.focal_power.is_empty()).collect()
+    }
+
     /// Figures of this path; all zero for an empty one.
     #[must_use]
     pub fn figures(&self) -> PathFigures {
@@ -56,7 +94,7 @@ impl Path {
 
 /// Runs `policy` over `frames` frames of `scan`, starting in the middle of the lens's range. What the policy asks for is
 /// what the next frame is seen at.
-pub fn roll_out(policy: &mut dyn Policy, scan: &mut Scan, frames: usize) -> Path {
+pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: usize) -> Path {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();
     for _ in 0..frames {
@@ -70,7 +108,7 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut Scan, frames: usize) -> Path
 }
 
 /// What a policy with the paper's steps could do at best, if it knew the next frame's optimum.
-pub fn roll_out_oracle(scan: &mut Scan, frames: usize) -> Path {
+pub fn roll_out_oracle(scan: &mut dyn FocalTimeScan, frames: usize) -> Path {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();
     for _ in 0..frames {
@@ -100,5 +138,13 @@ mod tests {
         assert!((figures.travel - 0.0375).abs() < 1e-12);
         // Up, down, up: two turns in a fifth of a second.
         assert!((figures.reversals - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn parts_hold_every_frame_once() {
+        let path = Path { focal_power: (0..7).map(f64::from).collect(), optimum: vec![0.5; 7] };
+        let parts: Vec<_> = path.parts(3).into_iter().map(|part| part.focal_power).collect();
+        assert_eq!(parts, [vec![0.0, 1.0], vec![2.0, 3.0], vec![4.0, 5.0, 6.0]]);
+        assert_eq!(path.parts(9).len(), 7);
     }
 }

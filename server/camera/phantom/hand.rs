@@ -34,6 +34,21 @@ const HABITS: [Habit; 6] = [
     Habit { range: (0.03, 0.97), speed: 0.16, memory: 1.5 },
 ];
 
+/// How fast a hand moves, against one that inspects calmly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Haste {
+    /// Factor of the speeds along the surface, of turning and of leaning.
+    pub sideways: f64,
+    /// Factor of the speed towards the surface and away from it.
+    pub focus: f64,
+}
+
+impl Default for Haste {
+    fn default() -> Self {
+        Self { sideways: 1.0, focus: 1.0 }
+    }
+}
+
 /// Physiological tremor: frequency, 1/s, and amplitude, texels. A hand trembles at 8 to 12 Hz.
 const TREMORS: [(f64, f64); 3] = [(8.3, 0.35), (9.7, 0.3), (11.6, 0.2)];
 
@@ -48,10 +63,19 @@ impl Hand {
     /// The hand of a seed, at time zero.
     #[must_use]
     pub fn new(seed: u64) -> Self {
+        Self::moving(seed, Haste::default())
+    }
+
+    /// A hand that moves with another haste.
+    #[must_use]
+    pub fn moving(seed: u64, haste: Haste) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(4);
         let phases = [(); 2].map(|()| [(); 3].map(|()| TAU * rng.random::<f64>()));
-        Self { path: Path::new(seed, RATE, HABITS), phases }
+        let mut habits = HABITS;
+        let factors = [haste.sideways; 5].into_iter().chain([haste.focus]);
+        habits.iter_mut().zip(factors).for_each(|(habit, factor)| habit.speed *= factor);
+        Self { path: Path::new(seed, RATE, habits), phases }
     }
 
     /// Where the camera is at `time` after the start; asked for in rising order.

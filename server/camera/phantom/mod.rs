@@ -1,5 +1,12 @@
 //! The brain phantom: a generated brain surface seen by a hand-held hyperspectral camera, for work without a device.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "pixels of the patch, and focal power in f32"
+)]
+
 mod cortex;
 mod defocus;
 mod field;
@@ -9,12 +16,14 @@ mod mosaic;
 mod scene;
 mod sensor;
 pub mod spectra;
+mod still;
 mod vessels;
 mod view;
 
-pub use hand::{Hand, Pose};
+pub use hand::{Hand, Haste, Pose};
 pub use live::{Before, PhantomCamera};
 pub use scene::{SIDE, Scene};
+pub use still::{Still, Trajectory};
 
 use crate::imaging::{CELL, Calibration, ContentArea, PATCH_SIDE};
 use crate::lens::FocalPower;
@@ -22,7 +31,7 @@ use defocus::Stack;
 use field::Field;
 use mosaic::Bands;
 use sensor::{AutoExposure, Sensor};
-use view::{Line, Mapping, Optics};
+use view::{Mapping, Optics, Region};
 
 /// Width of the phantom's pictures in samples.
 pub const SENSOR_WIDTH: usize = CELL * view::WIDTH;
@@ -37,7 +46,6 @@ pub struct Phantom {
     bands: Bands,
     sensor: Sensor,
     exposure: AutoExposure,
-    lines: [Line; 3],
 }
 
 impl Phantom {
@@ -52,7 +60,6 @@ impl Phantom {
             bands: Bands::new(&Calibration::default()),
             sensor: Sensor::new(seed, SENSOR_WIDTH, SENSOR_HEIGHT),
             exposure: AutoExposure::new(),
-            lines: [(); 3].map(|()| view::blank_line()),
         }
     }
 
@@ -64,20 +71,38 @@ impl Phantom {
 
     /// Takes one exposure: [`SENSOR_WIDTH`] x [`SENSOR_HEIGHT`] 10-bit samples into `samples`, row by row.
     pub fn expose(&mut self, pose: &Pose, focal_power: FocalPower, samples: &mut [u16]) {
-        let mapping = Mapping::new(&self.optics, pose);
         let noise = self.sensor.fresh_noise();
+        self.render((pose, focal_power), self.exposure.gain(), &noise, &Region::WHOLE, samples);
+    }
+
+    /// What the sensor reads with `noise` from each row's place on; light is computed within `region` alone, and samples
+    /// above and below it are left as they were.
+    fn render(&self, seen: (&Pose, FocalPower), gain: f32, noise: &[u32], region: &Region, samples: &mut [u16]) {
+        let mapping = Mapping::new(&self.optics, seen.0);
         let mut expected = vec![0.0; SENSOR_WIDTH];
-        view::darken(&mut self.lines[2]);
-        self.look(0, &mapping, focal_power);
-        for (y, rows) in samples.chunks_exact_mut(CELL * SENSOR_WIDTH).enumerate().take(view::HEIGHT) {
-            self.look(y + 1, &mapping, focal_power);
-            let lines = [(y + 2) % 3, y % 3, (y + 1) % 3].map(|line| &self.lines[line]);
-            let (first, last) = self.optics.span(y);
-            let columns = if first <= last { (first, last + 1) } else { (0, 0) };
-            let expected = &mut expected[..CELL * (columns.1 - columns.0)];
-            for (row, out) in rows.chunks_exact_mut(SENSOR_WIDTH).enumerate() {
-                self.bands.expose(expected, lines, row, columns, self.exposure.gain());
-                self.sensor.read_row(out, CELL * y + row, CELL * columns.0, expected, noise[CELL * y + row]);
+        let mut lines = [(); 3].map(|()| view::blank_line());
+        let look = |line: &mut _, y: usize| {
+            let surface = (&self.stack, &self.relief);
+            view::look(line, y, &self.optics, &mapping, surface, seen.1.get() as f32, &region.columns);
+        };
+        let rows = region.rows.clone();
+        if rows.start > 0 {
+            look(&mut lines[(rows.start - 1) % 3], rows.start - 1);
+        }
+        look(&mut lines[rows.start % 3], rows.start);
+        for (y, samples) in samples.chunks_exact_mut(CELL * SENSOR_WIDTH).enumerate().take(rows.end).skip(rows.start) {
+            let below = &mut lines[(y + 1) % 3];
+            if y + 1 < view::HEIGHT {
+                look(below, y + 1);
+            } else {
+                view::darken(below);
+            }
+            let lines = [(y + 2) % 3, y % 3, (y + 1) % 3].map(|line| &lines[line]);
+            let columns = region.lit(self.optics.span(y));
+            let expected = &mut expected[..CELL * columns.len()];
+            for (row, out) in samples.chunks_exact_mut(SENSOR_WIDTH).enumerate() {
+                self.bands.expose(expected, lines, row, (columns.start, columns.end), gain);
+                self.sensor.read_row(out, CELL * y + row, CELL * columns.start, expected, noise[CELL * y + row]);
             }
         }
     }
@@ -108,12 +133,6 @@ impl Phantom {
     /// The focal power at which the patch in the middle of the content area is sharpest: the mean over the patch of
     /// what would be sharp at each pixel, weighted by the squared contrast that is there to be sharpened.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        clippy::cast_sign_loss,
-        reason = "pixels of the patch"
-    )]
     pub fn optimal(&self, pose: &Pose) -> FocalPower {
         let mapping = Mapping::new(&self.optics, pose);
         let area = self.content_area();
@@ -133,17 +152,5 @@ impl Phantom {
             weights += weight;
         }
         FocalPower::nearest(sum / weights)
-    }
-
-    /// Fills the cell row `y` of the ring of three; beyond the sensor there is darkness.
-    #[allow(clippy::cast_possible_truncation, reason = "focal power, in f32")]
-    fn look(&mut self, y: usize, mapping: &Mapping, focal_power: FocalPower) {
-        let line = &mut self.lines[y % 3];
-        if y < view::HEIGHT {
-            let surface = (&self.stack, &self.relief);
-            view::look(line, y, &self.optics, mapping, surface, focal_power.get() as f32);
-        } else {
-            view::darken(line);
-        }
     }
 }

@@ -29,6 +29,11 @@ impl Bands {
         std::array::from_fn(|k| share * self.0.iter().map(|band| band[k]).sum::<f32>())
     }
 
+    /// Expected counts at gain 1 of a cell that sees `light`.
+    pub(super) fn counts(&self, light: [f32; ENDMEMBERS]) -> [f32; BANDS] {
+        self.0.map(|band| band.iter().zip(light).map(|(response, light)| response * light).sum())
+    }
+
     /// Expected counts of sensor row `row` (0..4) of a cell row, for the cells in `columns`, into `out` (4 a cell).
     /// `lines` are the cell rows above, here and below.
     pub(super) fn expose(&self, out: &mut [f32], lines: [&Line; 3], row: usize, columns: (usize, usize), gain: f32) {

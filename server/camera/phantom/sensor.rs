@@ -8,7 +8,7 @@
 )]
 
 use multiversion::multiversion;
-use rand::{RngExt, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::camera::walk::standard_normal;
@@ -50,7 +50,12 @@ impl Sensor {
 
     /// Where each row's noise starts in this exposure.
     pub(super) fn fresh_noise(&mut self) -> Vec<u32> {
-        (0..self.pattern.len()).map(|_| self.rng.random_range(0..TABLE as u32)).collect()
+        noise(self.pattern.len(), &mut self.rng)
+    }
+
+    /// Where each row's noise starts in an exposure whose noise is drawn from `rng`.
+    pub(super) fn noise_of(&self, rng: &mut impl Rng) -> Vec<u32> {
+        noise(self.pattern.len(), rng)
     }
 
     /// Counts of row `y`: where light fell, `expected` counts from column `left` on, and darkness elsewhere.
@@ -61,6 +66,10 @@ impl Sensor {
         let pattern = &self.normal[self.pattern[y] as usize..][span.clone()];
         develop(&mut out[span.clone()], expected, pattern, &self.normal[noise..][span]);
     }
+}
+
+fn noise(rows: usize, rng: &mut impl Rng) -> Vec<u32> {
+    (0..rows).map(|_| rng.random_range(0..TABLE as u32)).collect()
 }
 
 /// Turns expected counts into noisy ones: in electrons, variance = signal + read noise squared (photon transfer).
@@ -97,6 +106,16 @@ const GAINS: (f32, f32) = (0.1, 10.0);
 impl AutoExposure {
     pub(super) const fn new() -> Self {
         Self { gain: 1.5 }
+    }
+
+    /// The gain at which it comes to rest over a scene that would give `counts` at gain 1.
+    pub(super) fn settled(mut counts: Vec<f32>) -> f32 {
+        if counts.is_empty() {
+            return Self::new().gain;
+        }
+        let index = counts.len() - 1 - counts.len() / BRIGHT_SHARE;
+        let (_, bright, _) = counts.select_nth_unstable_by(index, f32::total_cmp);
+        (BRIGHT / bright.max(1e-3)).clamp(GAINS.0, GAINS.1)
     }
 
     /// Light gathered, in units of what brings a white target to full scale.

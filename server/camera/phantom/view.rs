@@ -2,6 +2,8 @@
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "places on the surface, in f32")]
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -38,6 +40,23 @@ pub(super) struct Optics {
     light: Vec<f32>,
     /// First and last lit column of each row.
     spans: Vec<(usize, usize)>,
+}
+
+/// A part of the picture, in cells: what need not be seen is not computed.
+#[derive(Debug, Clone)]
+pub(super) struct Region {
+    pub(super) columns: Range<usize>,
+    pub(super) rows: Range<usize>,
+}
+
+impl Region {
+    pub(super) const WHOLE: Self = Self { columns: 0..WIDTH, rows: 0..HEIGHT };
+
+    /// The columns between the first and last lit one; `0..0` where there are none.
+    pub(super) fn lit(&self, (first, last): (usize, usize)) -> Range<usize> {
+        let columns = first.max(self.columns.start)..(last + 1).min(self.columns.end);
+        if columns.is_empty() { 0..0 } else { columns }
+    }
 }
 
 /// One cell row of the picture: abundances times light, by endmember, one column of darkness on either side.
@@ -160,7 +179,7 @@ pub(super) fn height_at(relief: &Field, u: f32, v: f32) -> f32 {
     relief.data[y as usize * relief.side + x as usize]
 }
 
-/// What the surface looks like along one cell row at `focal_power`, into `line`.
+/// What the surface looks like along one cell row at `focal_power`, into `line`, in `columns` and the ones beside them.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub(super) fn look(
     line: &mut Line,
@@ -169,18 +188,32 @@ pub(super) fn look(
     mapping: &Mapping,
     surface: (&Stack, &Field),
     focal_power: f32,
+    columns: &Range<usize>,
 ) {
-    let (stack, relief) = surface;
     darken(line);
     let (first, last) = optics.spans[y];
-    for x in first..=last {
-        let (column, row) = (x as f32, y as f32);
-        let (u, v) = mapping.place(column, row);
-        let miss = focal_power - mapping.sharp_at(column, row, height_at(relief, u, v));
-        let abundances = stack.at(u, v, mapping.blur_square * miss * miss);
-        let light = optics.light[y * WIDTH + x];
-        for (plane, abundance) in line.iter_mut().zip(abundances) {
-            plane[x + 1] = light * abundance;
+    for x in first.max(columns.start.saturating_sub(1))..(last + 1).min(columns.end + 1) {
+        let cell = look_at(x, y, optics, mapping, surface, focal_power);
+        for (plane, light) in line.iter_mut().zip(cell) {
+            plane[x + 1] = light;
         }
     }
+}
+
+/// What one cell sees at `focal_power`: abundances times light.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
+pub(super) fn look_at(
+    x: usize,
+    y: usize,
+    optics: &Optics,
+    mapping: &Mapping,
+    (stack, relief): (&Stack, &Field),
+    focal_power: f32,
+) -> [f32; ENDMEMBERS] {
+    let (column, row) = (x as f32, y as f32);
+    let (u, v) = mapping.place(column, row);
+    let miss = focal_power - mapping.sharp_at(column, row, height_at(relief, u, v));
+    let light = optics.light[y * WIDTH + x];
+    stack.at(u, v, mapping.blur_square * miss * miss).map(|abundance| light * abundance)
 }

@@ -1,0 +1,45 @@
+//! How the hand that moves over the recorded benchmark's phantom was chosen: several speeds along the surface and towards
+//! it, on brains that the benchmark does not use, judged by `fixed` and the hill-climbers alone against the paper's robotic
+//! column. The least largest deviation wins; the last line is the benchmark itself. `cargo bench --bench calibrate_recorded`, with
+//! `-- frozen` for that line alone.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at the first surprise")]
+
+use std::sync::Arc;
+
+use parfocal::autofocus::{PolicyName, Registry};
+use parfocal::camera::phantom::{Haste, Trajectory};
+use parfocal::training::evaluate::{Outcome, SEED, evaluate};
+use parfocal::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
+
+/// The paper's robotic column: policy and mean absolute error.
+const PAPER: [(&str, f64); 3] = [("fixed", 0.262), ("mgm-hill-climber", 0.146), ("mlr-hill-climber", 0.163)];
+/// Brains tried at each speed, and poses over each.
+const TRIED: (u64, usize) = (3, 400);
+
+fn main() {
+    println!("largest deviation; then MAE and share in focus of oracle, fixed, MGM and MLR hill-climber");
+    let tried: &[f64] = if std::env::args().any(|argument| argument == "frozen") { &[] } else { &[1.0, 2.0, 3.0] };
+    for &focus in tried {
+        for sideways in [8.0, 16.0, 24.0, 32.0, 40.0] {
+            let haste = Haste { sideways, focus };
+            report((1..=TRIED.0).map(|brain| scan(SEED + brain, haste, TRIED.1)).collect(), haste);
+        }
+    }
+    report(vec![scan(SEED, HASTE, POSES)], HASTE);
+}
+
+fn scan(seed: u64, haste: Haste, poses: usize) -> Arc<RecordedScan> {
+    let trajectory = Trajectory::new(seed, poses, haste);
+    Arc::new(RecordedScan::phantom(&trajectory, seed, FOCAL_POWERS, &|| ()))
+}
+
+fn report(scans: Vec<Arc<RecordedScan>>, haste: Haste) {
+    let set = Recorded { scans, between: Between::Nearest };
+    let policies = PAPER.map(|(name, _)| PolicyName::new(name));
+    let outcomes = evaluate(&Registry::standard(), &policies, &set, &|_| ()).unwrap();
+    let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();
+    let deviation = rows[1..].iter().zip(PAPER).map(|(row, (_, mae))| (row.mae / mae - 1.0).abs()).fold(0.0, f64::max);
+    let figures: Vec<_> = rows.iter().map(|row| format!("{:.3} {:.1} %", row.mae, 100.0 * row.in_focus)).collect();
+    let Haste { sideways, focus } = haste;
+    println!("{:5.1} %  {}  sideways {sideways}, focus {focus}", 100.0 * deviation, figures.join("  "));
+}

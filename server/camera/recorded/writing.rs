@@ -1,0 +1,206 @@
+//! A recorded scan's folder, written. A pose's pictures appear under their name all at once, when all are stored, and only
+//! then does the pose get its line: whatever ends the recording, what is there is whole and the rest is missing.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+
+use super::{HEADER, Header, Image, POSES, Pose, ScanError, ScanFolder};
+use crate::imaging::{GrayImage, PatchArea};
+use crate::lens::FocalPower;
+
+/// A scan being recorded. One process at a time.
+#[derive(Debug)]
+pub struct Recording {
+    folder: ScanFolder,
+    /// Locked as long as this lives.
+    journal: File,
+}
+
+/// A pose as it was taken.
+#[derive(Debug, Clone)]
+pub struct Shot {
+    /// Its number, from 1.
+    pub pose: usize,
+    /// Its pictures, in the order in which they were taken; all of one size.
+    pub images: Vec<(FocalPower, GrayImage)>,
+    /// Where the patch is.
+    pub patch: PatchArea,
+    /// The focal power at which the patch is sharpest in the stack.
+    pub optimum: FocalPower,
+    /// The best focal power, where a simulation knows it.
+    pub truth: Option<FocalPower>,
+}
+
+impl Recording {
+    /// Begins a scan in `path`, a new or empty folder, or goes on with the one there that was begun with the same
+    /// `header` (the software's version aside).
+    ///
+    /// # Errors
+    /// When the folder holds anything else, is being recorded into, or cannot be written.
+    pub fn open(path: &Path, header: &Header) -> Result<Self, ScanError> {
+        fs::create_dir_all(path).map_err(|error| unwritable(path, 0, error))?;
+        let occupied = || -> io::Result<bool> {
+            let mut entries = fs::read_dir(path)?.filter_map(Result::ok);
+            Ok(entries.any(|entry| !is_ours(&entry.file_name().to_string_lossy())))
+        };
+        if !path.join(HEADER).exists() {
+            if occupied().map_err(|error| unwritable(path, 0, error))? {
+                return Err(ScanError::Occupied(path.to_owned()));
+            }
+            write_whole(&path.join(HEADER), &pretty(header)).map_err(|error| unwritable(path, 0, error))?;
+        }
+        let journal = path.join(POSES);
+        let journal =
+            File::options().create(true).append(true).open(&journal).map_err(|e| unwritable(&journal, 0, e))?;
+        if journal.try_lock().is_err() {
+            return Err(ScanError::Busy(path.to_owned()));
+        }
+        let folder = ScanFolder::open(path)?;
+        same(folder.header(), header)
+            .map_err(|difference| ScanError::Other { path: path.to_owned(), difference: difference.to_owned() })?;
+        let recording = Self { folder, journal };
+        recording.tidy_up()?;
+        Ok(recording)
+    }
+
+    /// What is stored so far.
+    #[must_use]
+    pub const fn folder(&self) -> &ScanFolder {
+        &self.folder
+    }
+
+    /// Stores a pose.
+    ///
+    /// # Errors
+    /// When it cannot be written; then nothing of it is left.
+    pub fn store(&mut self, shot: &Shot) -> Result<(), ScanError> {
+        let name = format!("pose{:04}", shot.pose);
+        let partial = self.folder.path().join(format!(".{name}.partial"));
+        let stored = self.write(shot, &name, &partial);
+        if stored.is_err() {
+            let _ = fs::remove_dir_all(&partial);
+        }
+        let pose = stored.map_err(|error| self.unwritable(error))?;
+        self.folder.insert(pose);
+        Ok(())
+    }
+
+    fn write(&self, shot: &Shot, name: &str, partial: &Path) -> io::Result<Pose> {
+        fs::create_dir(partial)?;
+        let write = |(power, picture): &(FocalPower, GrayImage)| -> io::Result<Image> {
+            let png = png(picture)?;
+            let file = format!("{name}_f{:.3}.png", power.get());
+            write_through(&partial.join(&file), &png)?;
+            Ok(Image { focal_power: *power, file: format!("{name}/{file}"), sha256: hex::encode(Sha256::digest(&png)) })
+        };
+        let images = shot.images.par_iter().map(write).collect::<io::Result<Vec<_>>>()?;
+        let whole = self.folder.path().join(name);
+        // Of a pose without a line: its line could not be written.
+        let _ = fs::remove_dir_all(&whole);
+        fs::rename(partial, &whole)?;
+        let (width, height) = shot.images.first().map_or((0, 0), |(_, picture)| (picture.width, picture.height));
+        let Shot { pose, patch, optimum, truth, .. } = *shot;
+        let pose = Pose { pose, width, height, patch: (patch.x, patch.y), optimum, truth, images };
+        self.note(&pose)?;
+        Ok(pose)
+    }
+
+    /// Gives `pose` its line, or leaves the file as it was.
+    fn note(&self, pose: &Pose) -> io::Result<()> {
+        let mut journal = &self.journal;
+        let before = journal.metadata()?.len();
+        let line = serde_json::to_string(pose)? + "\n";
+        journal.write_all(line.as_bytes()).and_then(|()| journal.sync_data()).inspect_err(|_| {
+            let _ = journal.set_len(before);
+        })
+    }
+
+    /// Takes away what a recording that was killed left half done.
+    fn tidy_up(&self) -> Result<(), ScanError> {
+        let unwritable = |error| self.unwritable(error);
+        self.journal.set_len(self.folder.whole_bytes).map_err(unwritable)?;
+        for entry in fs::read_dir(self.folder.path()).map_err(unwritable)?.filter_map(Result::ok) {
+            if is_partial(&entry.file_name().to_string_lossy()) {
+                fs::remove_dir_all(entry.path()).map_err(unwritable)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn unwritable(&self, error: io::Error) -> ScanError {
+        unwritable(self.folder.path(), self.folder.poses().len(), error)
+    }
+}
+
+fn unwritable(path: &Path, kept: usize, error: io::Error) -> ScanError {
+    let path = path.to_owned();
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => ScanError::Full { path, kept },
+        _ => ScanError::Unwritable { path, error },
+    }
+}
+
+fn is_partial(name: &str) -> bool {
+    name.starts_with(".pose") && name.ends_with(".partial")
+}
+
+/// Whether a recording that was killed may have left `name` before it had a header.
+fn is_ours(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(".partial")
+}
+
+/// What differs between two headers.
+fn same(stored: &Header, asked: &Header) -> Result<(), &'static str> {
+    let differs = [
+        (stored.camera != asked.camera, "of another camera"),
+        (stored.lens != asked.lens, "with another lens"),
+        (stored.calibration != asked.calibration, "with another calibration"),
+        (stored.seed != asked.seed, "of another seed"),
+        (stored.poses != asked.poses, "of another number of poses"),
+        (stored.focal_powers != asked.focal_powers, "of other focal powers"),
+        (stored.simulated != asked.simulated || stored.order != asked.order, "of another kind"),
+    ];
+    differs.iter().find(|(differs, _)| *differs).map_or(Ok(()), |(_, how)| Err(how))
+}
+
+fn pretty(header: &Header) -> Vec<u8> {
+    // Names, numbers and lists of them always are JSON.
+    let mut text = serde_json::to_vec_pretty(header).unwrap_or_default();
+    text.push(b'\n');
+    text
+}
+
+/// Writes a file that is either there and whole or not there.
+fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let partial: PathBuf = path.with_file_name(format!(".{name}.partial"));
+    let written = write_through(&partial, content).and_then(|()| fs::rename(&partial, path));
+    if written.is_err() {
+        let _ = fs::remove_file(&partial);
+    }
+    written
+}
+
+/// Writes a file and waits until the disk has it.
+fn write_through(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(content)?;
+    file.sync_data()
+}
+
+/// A gray picture as 8-bit PNG; levels are rounded.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels and sizes of pictures")]
+fn png(picture: &GrayImage) -> io::Result<Vec<u8>> {
+    let levels: Vec<u8> = picture.data.iter().map(|value| value.round() as u8).collect();
+    let mut bytes = Vec::with_capacity(levels.len());
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(&levels, picture.width as u32, picture.height as u32, ExtendedColorType::L8)
+        .map_err(io::Error::other)?;
+    Ok(bytes)
+}

@@ -1,0 +1,53 @@
+//! `parfocal scan`: recorded focal-time scans, recorded, looked at and imported.
+
+mod import;
+mod info;
+mod record;
+
+use std::io::Write;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::Failure;
+
+/// Arguments of `parfocal scan`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Record a scan: at each pose a picture at every focal power, in random order. The same command again goes on.
+    Record(record::Arguments),
+    /// Say what a scan holds, and check that every picture is the one that was stored.
+    Info(info::Arguments),
+    /// Make a scan of a folder of pictures named like `pose0001_f0.350.png`.
+    Import(import::Arguments),
+}
+
+/// Does what the arguments say.
+///
+/// # Errors
+/// When a scan cannot be read, recorded or imported.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.action {
+        Action::Record(arguments) => record::run(arguments),
+        Action::Info(arguments) => info::run(arguments),
+        Action::Import(arguments) => import::run(arguments),
+    }
+}
+
+/// A bar over `total` poses, `done` of which are done.
+pub(super) fn bar(total: usize, done: usize) -> ProgressBar {
+    let bar = ProgressBar::new(total as u64).with_position(done as u64);
+    bar.reset_eta();
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} poses, {eta} left {msg}");
+    style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
+}
+
+fn print(text: &str) -> Result<(), Failure> {
+    std::io::stdout().write_all(text.as_bytes())?;
+    Ok(())
+}

@@ -1,0 +1,34 @@
+//! `parfocal scan import`: a folder of pictures named by pose and focal power as a scan.
+
+use std::path::PathBuf;
+
+use super::{Failure, bar, print};
+use crate::training::recording::{Imported, import};
+
+/// Arguments of `parfocal scan import`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of pictures named like `pose0001_f0.350.png`: the pose's number and the focal power, 0 to 1.
+    folder: PathBuf,
+    /// Folder of the scan; new, or one that the same command began.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Name of the camera, for people; the folder's name, without it.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+}
+
+/// Imports.
+///
+/// # Errors
+/// When the pictures are no scan, or it cannot be stored.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let imported = Imported::look(&arguments.folder)?;
+    let progress = bar(imported.len(), 0);
+    let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy().into_owned();
+    let camera = arguments.camera.clone().unwrap_or(folder);
+    import(&imported, &camera, &arguments.out, &|| progress.inc(1))?;
+    progress.finish_and_clear();
+    let out = arguments.out.display();
+    print(&format!("{} poses in {out}; look at them with `parfocal scan info {out}`\n", imported.len()))
+}

@@ -1,0 +1,190 @@
+//! `parfocal scan info`: what a scan holds, and whether it is whole and unchanged.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Failure, bar, print};
+use crate::camera::recorded::{Damage, ScanFolder, numbers};
+use crate::training::plot;
+
+/// Arguments of `parfocal scan info`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the scan.
+    folder: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    /// Also draw the optimum over the poses into this SVG file.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// What is printed.
+#[derive(Debug, Serialize)]
+struct Info {
+    path: String,
+    camera: String,
+    lens: Option<String>,
+    simulated: bool,
+    calibration: Option<String>,
+    seed: u64,
+    poses: usize,
+    recorded: usize,
+    focal_powers: Vec<f64>,
+    width: usize,
+    height: usize,
+    bytes: u64,
+    optimum: Optimum,
+    deviation: Option<Deviation>,
+    missing: Vec<usize>,
+    damaged: Vec<String>,
+}
+
+/// The optimum over the poses.
+#[derive(Debug, Default, Serialize)]
+struct Optimum {
+    min: f64,
+    max: f64,
+    /// Mean absolute change from one pose to the next.
+    step: f64,
+}
+
+/// How far the optimum found in the pictures lies from the one that a simulation knows.
+#[derive(Debug, Serialize)]
+struct Deviation {
+    mean: f64,
+    max: f64,
+    /// The pose of `max`.
+    worst_pose: usize,
+    /// Share of poses within one step of the focal powers.
+    within_step: f64,
+}
+
+/// Looks at the scan and checks every picture.
+///
+/// # Errors
+/// When there is no scan; when poses are missing or pictures damaged, after telling of them.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let scan = ScanFolder::open(&arguments.folder)?;
+    let progress = bar(scan.poses().len(), 0);
+    let poses: Vec<_> = scan.poses().values().collect();
+    let checked: Vec<_> = poses.par_iter().map(|pose| scan.check(pose)).inspect(|_| progress.inc(1)).collect();
+    progress.finish_and_clear();
+    let bytes = checked.iter().map(|(bytes, _)| bytes).sum();
+    let damages: Vec<Damage> = checked.into_iter().flat_map(|(_, damages)| damages).collect();
+    let info = info(&scan, bytes, &damages);
+    if let Some(path) = &arguments.out {
+        std::fs::write(path, picture(&scan))
+            .map_err(|error| format!("the picture could not be saved to {}: {error}", path.display()))?;
+    }
+    print(&if arguments.json { serde_json::to_string(&info)? + "\n" } else { text(&info) })?;
+    if let Some(damage) = damages.first() {
+        let more = if damages.len() > 1 { format!(" (and {} more)", damages.len() - 1) } else { String::new() };
+        return Err(format!("{} is damaged: {}{more}", damage.file, damage.reason).into());
+    }
+    scan.whole()?;
+    Ok(())
+}
+
+fn info(scan: &ScanFolder, bytes: u64, damages: &[Damage]) -> Info {
+    let header = scan.header().clone();
+    let first = scan.poses().values().next();
+    Info {
+        path: scan.path().display().to_string(),
+        camera: header.camera,
+        lens: header.lens,
+        simulated: header.simulated,
+        calibration: header.calibration,
+        seed: header.seed,
+        poses: header.poses,
+        recorded: scan.poses().len(),
+        focal_powers: header.focal_powers.iter().map(|power| power.get()).collect(),
+        width: first.map_or(0, |pose| pose.width),
+        height: first.map_or(0, |pose| pose.height),
+        bytes,
+        optimum: optimum(&path(scan)),
+        deviation: deviation(scan),
+        missing: scan.missing(),
+        damaged: damages.iter().map(|damage| damage.file.clone()).collect(),
+    }
+}
+
+/// The optimum of each stored pose.
+fn path(scan: &ScanFolder) -> Vec<f64> {
+    scan.poses().values().map(|pose| pose.optimum.get()).collect()
+}
+
+#[allow(clippy::cast_precision_loss, reason = "counts of poses")]
+fn optimum(path: &[f64]) -> Optimum {
+    let steps = path.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    Optimum {
+        min: path.iter().copied().reduce(f64::min).unwrap_or_default(),
+        max: path.iter().copied().reduce(f64::max).unwrap_or_default(),
+        step: steps.sum::<f64>() / (path.len().max(2) - 1) as f64,
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "counts of poses")]
+fn deviation(scan: &ScanFolder) -> Option<Deviation> {
+    let poses = scan.poses().values();
+    let known: Vec<_> = poses.filter_map(|pose| Some((pose.pose, pose.optimum.distance(pose.truth?)))).collect();
+    let powers = &scan.header().focal_powers;
+    let step = powers.windows(2).map(|pair| pair[0].distance(pair[1])).fold(0.0, f64::max);
+    let &(worst_pose, max) = known.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let count = known.len() as f64;
+    Some(Deviation {
+        mean: known.iter().map(|known| known.1).sum::<f64>() / count,
+        max,
+        worst_pose,
+        within_step: known.iter().filter(|known| known.1 <= step).count() as f64 / count,
+    })
+}
+
+fn text(info: &Info) -> String {
+    let first = info.focal_powers.first().copied().unwrap_or_default();
+    let last = info.focal_powers.last().copied().unwrap_or_default();
+    let mut rows = vec![
+        ("camera", info.camera.clone()),
+        ("lens", info.lens.clone().unwrap_or_else(|| "not told".to_owned())),
+        ("calibration", info.calibration.clone().unwrap_or_else(|| "none".to_owned())),
+        ("seed", info.seed.to_string()),
+        ("poses", format!("{} of {}", info.recorded, info.poses)),
+        ("focal powers", format!("{} from {first:.3} to {last:.3}", info.focal_powers.len())),
+        ("pictures", format!("{}x{} pixels, {} bytes in all", info.width, info.height, info.bytes)),
+        (
+            "optimum",
+            format!("{:.3} to {:.3}, changing by {:.4} a pose", info.optimum.min, info.optimum.max, info.optimum.step),
+        ),
+    ];
+    if let Some(Deviation { mean, max, worst_pose, within_step }) = &info.deviation {
+        let share = 100.0 * within_step;
+        rows.push((
+            "off the truth",
+            format!("by {mean:.4} on average, {max:.3} at most (pose {worst_pose}); {share:.1} % within a step"),
+        ));
+    }
+    if !info.missing.is_empty() {
+        rows.push(("missing", format!("poses {}", numbers(&info.missing))));
+    }
+    rows.push(("damaged", if info.damaged.is_empty() { "none".to_owned() } else { info.damaged.join(", ") }));
+    rows.into_iter().fold(String::new(), |mut text, (name, value)| {
+        let _ = writeln!(text, "{name:<14}{value}");
+        text
+    })
+}
+
+/// The optimum over the poses in black, the truth behind it where it is known.
+fn picture(scan: &ScanFolder) -> String {
+    let truth: Option<Vec<f64>> = scan.poses().values().map(|pose| Some(pose.truth?.get())).collect();
+    let mut lines = Vec::new();
+    if let Some(truth) = &truth {
+        lines.push(("truth", "#56b4e9", truth.as_slice()));
+    }
+    let path = path(scan);
+    lines.push(("optimum", "black", path.as_slice()));
+    plot::over_poses(&lines)
+}

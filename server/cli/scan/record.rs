@@ -1,0 +1,182 @@
+//! `parfocal scan record`: from the phantom, each pose held still, or from a bench of camera, lens and stepper.
+
+use std::io::BufRead;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use indicatif::ProgressBar;
+
+use super::{Failure, bar, print};
+use crate::camera::phantom::Trajectory;
+use crate::camera::recorded::{FORMAT, Header, Order, Recording, VERSION};
+use crate::camera::{self, CameraSettings};
+use crate::cli::interrupt;
+use crate::clock::SystemClock;
+use crate::imaging::{Calibration, Reconstructor};
+use crate::lens;
+use crate::training::evaluate::SEED;
+use crate::training::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
+use crate::training::recording::{Bench, Devices, PhantomBench, RecordError, Stepper, StepperError, record};
+
+/// Arguments of `parfocal scan record`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the scan; new, or one that the same command began.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Camera, as of `parfocal serve`. `phantom` without a lens is held still at each pose of a hand-held trajectory.
+    #[arg(long, value_name = "SPEC", default_value = "phantom")]
+    camera: String,
+    /// Lens to send to each focal power, as of `parfocal serve`.
+    #[arg(long, value_name = "SPEC")]
+    lens: Option<String>,
+    /// Shell command that moves the camera to a pose, its number in the place of `{pose}`, and ends with 0 once it is
+    /// there; without it, you are asked to move the camera and to press Enter.
+    #[arg(long, value_name = "COMMAND", requires = "lens")]
+    stepper: Option<String>,
+    /// Number of poses.
+    #[arg(long, value_name = "N", default_value_t = POSES, value_parser = parse_poses)]
+    poses: usize,
+    /// Number of focal powers, evenly spread over the lens's range.
+    #[arg(long, value_name = "N", default_value_t = FOCAL_POWERS, value_parser = parse_powers)]
+    focal_powers: usize,
+    /// Seed of the order in which focal powers are taken, and of all of a simulation.
+    #[arg(long, value_name = "N", default_value_t = SEED)]
+    seed: u64,
+    /// Frames a second to ask of the camera.
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    fps: u32,
+    /// Calibration of the sensor (TOML); without it, that of a typical unit.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+}
+
+/// Records until all poses are stored, Ctrl-C, or a failure.
+///
+/// # Errors
+/// When something fails; the poses before it are kept.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let stop = interrupt::flag("stopping after this pose".to_owned())?;
+    let progress = bar(arguments.poses, 0);
+    let (mut bench, header) = match &arguments.lens {
+        None if arguments.camera == "phantom" => phantom(arguments),
+        None => {
+            Err(format!("say with --lens which lens goes to each focal power before `{}`", arguments.camera).into())
+        }
+        Some(lens) => devices(arguments, lens, &stop, &progress),
+    }?;
+    let mut recording = Recording::open(&arguments.out, &header)?;
+    progress.set_position(recording.folder().poses().len() as u64);
+    progress.reset_eta();
+    let outcome = record(&mut recording, bench.as_mut(), &|| stop.load(Ordering::Relaxed), &|| progress.inc(1));
+    progress.finish_and_clear();
+    let (done, out) = (recording.folder().poses().len(), arguments.out.display());
+    match outcome {
+        Ok(()) => print(&format!("{done} poses in {out}; look at them with `parfocal scan info {out}`\n")),
+        Err(_) if stop.load(Ordering::Relaxed) => print(&format!(
+            "stopped: {done} of {} poses are kept in {out}; run the same command again to go on\n",
+            arguments.poses
+        )),
+        Err(RecordError::Folder(error)) => Err(error.into()),
+        Err(error) => Err(format!("{error} ({done} of {} poses are kept in {out})", arguments.poses).into()),
+    }
+}
+
+fn phantom(arguments: &Arguments) -> Result<(Box<dyn Bench>, Header), Failure> {
+    if arguments.calibration.is_some() {
+        return Err("the phantom's sensor is the typical one: leave out --calibration, or name a --lens".into());
+    }
+    let trajectory = Trajectory::new(arguments.seed, arguments.poses, HASTE);
+    let header = header(arguments, "brain phantom, held still at each pose (simulated)", None, true);
+    Ok((Box::new(PhantomBench::new(trajectory)), header))
+}
+
+fn devices(
+    arguments: &Arguments,
+    lens: &str,
+    stop: &Arc<AtomicBool>,
+    progress: &ProgressBar,
+) -> Result<(Box<dyn Bench>, Header), Failure> {
+    let calibration = arguments.calibration.as_deref().map(calibration).transpose()?;
+    let clock = Arc::new(SystemClock);
+    let lens = lens::open(lens, Arc::clone(&clock) as _)?;
+    let settings = CameraSettings {
+        fps: arguments.fps.into(),
+        seed: arguments.seed,
+        optics: lens.optics(),
+        clock: Arc::clone(&clock) as _,
+    };
+    let camera = camera::open(&arguments.camera, settings)?;
+    let stepper = match &arguments.stepper {
+        Some(command) => Stepper::Command(command.clone()),
+        None => Stepper::Asked(Box::new(asker(arguments.poses, Arc::clone(stop), progress.clone()))),
+    };
+    let (health, simulated) = (camera.health(), camera.health().simulated || lens.health().simulated);
+    let mut header = header(arguments, &health.name, Some(lens.health().name.to_string()), simulated);
+    header.calibration =
+        calibration.as_ref().map(|calibration| format!("{}, {}", calibration.name, calibration.version));
+    let reconstructor = Reconstructor::new(&calibration.unwrap_or_default());
+    Ok((Box::new(Devices { camera, lens, reconstructor, stepper, clock }), header))
+}
+
+fn header(arguments: &Arguments, camera: &str, lens: Option<String>, simulated: bool) -> Header {
+    Header {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
+        camera: camera.to_owned(),
+        lens,
+        simulated,
+        calibration: None,
+        seed: arguments.seed,
+        order: Order::Random,
+        poses: arguments.poses,
+        focal_powers: evenly_spread(arguments.focal_powers),
+    }
+}
+
+fn calibration(path: &Path) -> Result<Calibration, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    Ok(Calibration::from_toml(&text).map_err(|error| format!("{}: {error}", path.display()))?)
+}
+
+/// Asks on the terminal for each pose and waits for Enter.
+fn asker(
+    poses: usize,
+    stop: Arc<AtomicBool>,
+    progress: ProgressBar,
+) -> impl FnMut(usize) -> Result<(), StepperError> + Send {
+    let (sender, lines) = channel();
+    // Ends with the process: reading a terminal cannot be cut short.
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    move |pose| {
+        progress.suspend(|| eprintln!("pose {pose} of {poses}: move the camera there, then press Enter"));
+        loop {
+            match lines.recv_timeout(Duration::from_millis(100)) {
+                Ok(_) => return Ok(()),
+                Err(RecvTimeoutError::Disconnected) => return Err(StepperError::Unattended(pose)),
+                Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
+                    return Err(StepperError::Stopped(pose));
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+        }
+    }
+}
+
+fn parse_poses(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|poses| (1..=100_000).contains(poses)).ok_or_else(|| "must be from 1 to 100000".to_owned())
+}
+
+fn parse_powers(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|powers| (2..=1001).contains(powers)).ok_or_else(|| "must be from 2 to 1001".to_owned())
+}

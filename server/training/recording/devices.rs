@@ -1,0 +1,145 @@
+//! A bench of real devices: a camera, a lens, and somebody or something that moves on to the next pose.
+
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+use std::{fmt, io};
+
+use super::{Bench, RecordError, Taken};
+use crate::camera::recorded::LEAST_SIDE;
+use crate::camera::{Camera, CameraError, FrameImage};
+use crate::clock::{Clock, Moment};
+use crate::imaging::{GrayImage, PatchArea, Reconstructor, RgbImage, content_area, rgb_to_gray};
+use crate::lens::{FocalPower, Lens};
+
+/// How long a frame is waited for.
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// How far off the lens may read back: twice the hysteresis of a tunable lens.
+const TOLERANCE: f64 = 0.01;
+
+/// What moves the camera to its next pose.
+pub enum Stepper {
+    /// A person, who is asked for each pose and says when it is there; whether to go on.
+    Asked(Box<dyn FnMut(usize) -> Result<(), StepperError> + Send>),
+    /// A shell command in which `{pose}` stands for the pose's number.
+    Command(String),
+}
+
+/// Why the camera was not moved.
+#[derive(Debug, thiserror::Error)]
+pub enum StepperError {
+    /// Nobody is there to do it.
+    #[error("nobody confirmed pose {0}: the input has ended; give a --stepper where nobody is to press Enter")]
+    Unattended(usize),
+    /// It was told to stop.
+    #[error("stopped before pose {0}")]
+    Stopped(usize),
+    /// The command cannot be started.
+    #[error("the stepper's shell cannot be started: {0}")]
+    NotStarted(io::Error),
+    /// The command says that it did not get there.
+    #[error("the stepper failed at pose {pose} ({status}); once it works, run the same command again to go on")]
+    Failed {
+        /// The pose it was for.
+        pose: usize,
+        /// How it ended.
+        status: ExitStatus,
+    },
+}
+
+impl fmt::Debug for Stepper {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Asked(_) => f.write_str("Asked"),
+            Self::Command(command) => f.debug_tuple("Command").field(command).finish(),
+        }
+    }
+}
+
+impl Stepper {
+    /// Moves the camera to `pose` and waits until it is there.
+    fn go(&mut self, pose: usize) -> Result<(), StepperError> {
+        match self {
+            Self::Asked(ask) => ask(pose),
+            Self::Command(command) => {
+                let command = command.replace("{pose}", &pose.to_string());
+                let mut shell = Command::new("sh");
+                let status = shell.args(["-c", &command]).stdin(Stdio::null()).stdout(io::stderr()).status();
+                let status = status.map_err(StepperError::NotStarted)?;
+                if status.success() { Ok(()) } else { Err(StepperError::Failed { pose, status }) }
+            }
+        }
+    }
+}
+
+/// Camera, lens and stepper.
+pub struct Devices {
+    /// Takes the pictures.
+    pub camera: Box<dyn Camera>,
+    /// Is sent to each focal power.
+    pub lens: Box<dyn Lens>,
+    /// Makes gray pictures from mosaics.
+    pub reconstructor: Reconstructor,
+    /// Moves on.
+    pub stepper: Stepper,
+    /// Where time comes from.
+    pub clock: Arc<dyn Clock>,
+}
+
+impl Bench for Devices {
+    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError> {
+        self.stepper.go(pose)?;
+        let pictures = powers.iter().map(|&power| self.picture(power)).collect::<Result<Vec<_>, _>>()?;
+        let Some(GrayImage { width, height, .. }) = pictures.first() else { return Err(RecordError::TooSmall(0, 0)) };
+        let (width, height) = (*width, *height);
+        if let Some(other) = pictures.iter().find(|picture| (picture.width, picture.height) != (width, height)) {
+            let reason = format!("its pictures changed from {width}x{height} to {}x{}", other.width, other.height);
+            return Err(CameraError::Failed(reason).into());
+        }
+        let too_small = |_| RecordError::TooSmall(width, height);
+        if width < LEAST_SIDE || height < LEAST_SIDE {
+            return Err(RecordError::TooSmall(width, height));
+        }
+        let area = pictures.first().and_then(content_area::detect);
+        let patch = PatchArea::central(width, height, area.as_ref()).map_err(too_small)?;
+        Ok(Taken { pictures, patch, truth: None })
+    }
+}
+
+impl Devices {
+    /// Sends the lens to `power` and takes the first picture whose exposure began after it had settled there.
+    fn picture(&mut self, power: FocalPower) -> Result<GrayImage, RecordError> {
+        self.lens.set(power)?;
+        let dynamics = self.lens.dynamics();
+        // Four times the settling time leaves 1/160 000 of a step.
+        let settled = self.clock.now() + dynamics.delay + dynamics.settling * 4;
+        let image = self.frame_since(settled)?;
+        let reached = self.lens.read_back()?;
+        if reached.distance(power) > TOLERANCE {
+            return Err(RecordError::Astray { asked: power.get(), reached: reached.get() });
+        }
+        Ok(self.gray(&image))
+    }
+
+    /// The first frame whose exposure began at `moment` or later.
+    fn frame_since(&mut self, moment: Moment) -> Result<FrameImage, RecordError> {
+        let asked = self.clock.now();
+        loop {
+            let waited = self.clock.now().since(asked);
+            let left = TIMEOUT.checked_sub(waited).ok_or(CameraError::Timeout(TIMEOUT))?;
+            let frame = self.camera.next_frame(left)?;
+            if frame.exposed_at >= moment + frame.exposure {
+                return Ok(frame.image);
+            }
+        }
+    }
+
+    fn gray(&mut self, image: &FrameImage) -> GrayImage {
+        let mut gray = GrayImage::default();
+        match image {
+            FrameImage::Mosaic(mosaic) => self.reconstructor.reconstruct(mosaic, &mut RgbImage::default(), &mut gray),
+            FrameImage::Rgb(rgb) => rgb_to_gray(rgb, &mut gray),
+        }
+        gray
+    }
+}

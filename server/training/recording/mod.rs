@@ -1,0 +1,101 @@
+//! Recording a focal-time scan: pose by pose, each at every focal power in random order, until all poses are stored.
+
+mod devices;
+mod import;
+mod phantom;
+
+pub use devices::{Devices, Stepper, StepperError};
+pub use import::{ImportError, Imported, import};
+pub use phantom::PhantomBench;
+
+use super::recorded::{Stack as PatchStack, capture_order, levels_at};
+use crate::camera::recorded::{Recording, ScanError, Shot};
+use crate::camera::{CameraError, recorded::LEAST_SIDE};
+use crate::imaging::{GrayImage, PatchArea};
+use crate::lens::{FocalPower, LensError};
+
+/// What scans are recorded of.
+pub trait Bench {
+    /// Goes to pose `pose` (from 1) and takes a picture at each of `powers`, in this order.
+    ///
+    /// # Errors
+    /// When pose, lens or camera fail; then nothing of the pose is stored.
+    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError>;
+}
+
+/// The pictures of one pose.
+#[derive(Debug, Clone)]
+pub struct Taken {
+    /// In the order asked for; all of one size.
+    pub pictures: Vec<GrayImage>,
+    /// Where the patch is.
+    pub patch: PatchArea,
+    /// The best focal power, where a simulation knows it.
+    pub truth: Option<FocalPower>,
+}
+
+/// Why recording ended early. What was stored is whole.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// It was told to.
+    #[error("stopped")]
+    Stopped,
+    /// The camera could not be moved on.
+    #[error(transparent)]
+    Stepper(#[from] StepperError),
+    /// The camera failed.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The lens failed.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// The lens is not where it was sent.
+    #[error("the lens was sent to focal power {asked:.3} and stands at {reached:.3}; see `parfocal lens info`")]
+    Astray {
+        /// Where it was sent.
+        asked: f64,
+        /// Where it says it stands.
+        reached: f64,
+    },
+    /// The camera's pictures are of no use.
+    #[error("a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE} pixels; the camera's are {0}x{1}")]
+    TooSmall(usize, usize),
+    /// The folder cannot be written.
+    #[error(transparent)]
+    Folder(#[from] ScanError),
+}
+
+/// Records every pose that `recording` misses. `stop` is asked between poses and `progress` told after each.
+///
+/// # Errors
+/// [`RecordError::Stopped`] when it was told to stop; else when something failed.
+pub fn record(
+    recording: &mut Recording,
+    bench: &mut dyn Bench,
+    stop: &dyn Fn() -> bool,
+    progress: &dyn Fn(),
+) -> Result<(), RecordError> {
+    let (seed, powers) = (recording.folder().header().seed, recording.folder().header().focal_powers.clone());
+    for pose in recording.folder().missing() {
+        if stop() {
+            return Err(RecordError::Stopped);
+        }
+        let order = capture_order(seed, pose - 1, powers.len());
+        let in_order: Vec<FocalPower> = order.iter().map(|&position| powers[position]).collect();
+        let taken = bench.take(pose, &in_order)?;
+        if stop() {
+            return Err(RecordError::Stopped);
+        }
+        recording.store(&shot(pose, &in_order, taken))?;
+        progress();
+    }
+    Ok(())
+}
+
+/// A pose as it is stored, its optimum searched in the stack as the evaluation does.
+fn shot(pose: usize, in_order: &[FocalPower], taken: Taken) -> Shot {
+    let Taken { pictures, patch, truth } = taken;
+    let patches = pictures.iter().map(|picture| Box::new(levels_at(picture, patch))).collect();
+    let optimum = PatchStack::new(in_order, patches).optimum;
+    Shot { pose, images: in_order.iter().copied().zip(pictures).collect(), patch, optimum, truth }
+}
