@@ -9,7 +9,7 @@ use parfocal::clock::{Clock, ManualClock};
 use parfocal::control::{Command, Drive, Eye, Hold, StepRecord, Stepper};
 use parfocal::ids::SegmentId;
 use parfocal::imaging::ContentArea;
-use parfocal::lens::LensError;
+use parfocal::lens::{LensDynamics, LensError};
 use proptest::prelude::*;
 use uuid::Uuid;
 
@@ -271,6 +271,23 @@ fn a_long_exposure_is_attributed_to_its_middle() {
     bench.stepper.step(late).unwrap();
     let seen = bench.script.seen();
     assert!((seen[1] - 0.7).abs() < 1e-3, "{seen:?}");
+}
+
+/// The same, of a lens whose driver takes it to move at once and that was measured to move so.
+#[test]
+fn measured_dynamics_replace_the_drivers_and_stand_in_the_telemetry() {
+    let mut bench = Bench::new(PATIENT);
+    let dynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
+    bench.stepper = bench.stepper.moving(dynamics);
+    bench.script.set(Deed::GoTo(0.9));
+    bench.stepper.obey(drive("scripted", None));
+    assert_eq!(bench.step().measured, Some(power(0.5)), "exposed before the first command");
+    bench.clock.advance(Duration::from_micros(15_470));
+    let mut late = frame(2, bench.clock.now());
+    late.exposure = FRAME;
+    let record = bench.stepper.step(late).unwrap().record;
+    assert!((record.measured.unwrap().get() - 0.7).abs() < 1e-3, "{record:?}");
+    assert!((bench.script.seen()[1] - 0.7).abs() < 1e-3);
 }
 
 #[test]
