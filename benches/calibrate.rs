@@ -7,9 +7,10 @@ use std::sync::Arc;
 
 use parfocal::autofocus::{PolicyName, Registry};
 use parfocal::imaging::GrayImage;
+use parfocal::training::clip::Clip;
 use parfocal::training::evaluate::{Benchmark, FRAMES, Outcome, evaluate};
 use parfocal::training::pictures::{Split, sharp_phantom};
-use parfocal::training::scan::{Clip, ScanSettings};
+use parfocal::training::scan::ScanSettings;
 use parfocal::training::texture::vary_contrast;
 
 const COUNT: usize = 200;

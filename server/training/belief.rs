@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
+use super::clip::Clip;
 use super::optimiser::{Optimiser, Rule};
-use super::scan::{Clip, Variety};
+use super::scan::Variety;
 use super::session::{Session, lead_astray};
 use crate::autofocus::belief::{Trace, median, spread_over_bins, target};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};

@@ -142,14 +142,16 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, sums: &mut [f32]
             let whole = edge as usize;
             let (near, far) = (sign * (1.0 - edge.fract()), sign * edge.fract());
             for (row, out) in out.chunks_exact_mut(PATCH_SIDE).enumerate() {
-                let sums = &sums[(row + offset) * (side + 1) + whole..][..PATCH_SIDE + 1];
+                let sums = &sums[(row + offset) * (side + 1) + whole..][..=PATCH_SIDE];
                 for (value, pair) in out.iter_mut().zip(sums.windows(2)) {
                     *value += near * pair[0] + far * pair[1];
                 }
             }
         }
     }
-    out.iter_mut().for_each(|value| *value /= area);
+    for value in out.iter_mut() {
+        *value /= area;
+    }
 }
 
 #[cfg(test)]

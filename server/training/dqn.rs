@@ -15,9 +15,10 @@ use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Reduction, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
+use super::clip::Clip;
 use super::optimiser::{Optimiser, Rule};
 use super::replay::{Replay, Seen, Step};
-use super::scan::{Clip, Variety};
+use super::scan::Variety;
 use super::session::{Session, lead_astray};
 use crate::autofocus::STEP;
 use crate::autofocus::learned::{Sight, ValueNetwork, action_step, best_action, scaled_focal_power};

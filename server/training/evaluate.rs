@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::clip::Clip;
 use super::rollout::{FocalTimeScan, Path, PathFigures, roll_out, roll_out_oracle};
-use super::scan::{Clip, Scan, ScanSettings};
+use super::scan::{Scan, ScanSettings};
 use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
 use crate::autofocus::{PolicyError, PolicyName, Registry};
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use super::scan::{Area, Clip, ClipError};
+use super::clip::{Area, Clip, ClipError};
 use crate::imaging::{ContentArea, GrayImage, content_area};
 
 /// Most lines of a picture: the height the paper's walks are meant for.

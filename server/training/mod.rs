@@ -2,6 +2,7 @@
 
 pub mod belief;
 pub mod checkpoint;
+pub mod clip;
 pub mod defocus;
 pub mod dqn;
 pub mod evaluate;

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use super::scan::{Clip, ClipError};
+use super::clip::{Clip, ClipError};
 use super::texture::{texture, vary_contrast};
 use crate::camera::phantom::Scene;
 use crate::imaging::{GrayImage, gaussian_blur};

@@ -9,11 +9,12 @@ use std::sync::Arc;
 
 use super::belief::BeliefTrainer;
 use super::checkpoint::{Checkpoint, CheckpointError};
+use super::clip::Clip;
 use super::dqn::DqnTrainer;
 use super::evaluate::{Benchmark, Outcome, Row, evaluate};
 use super::pictures::{Split, varied};
 use super::recipe::Recipe;
-use super::scan::{Clip, ScanSettings};
+use super::scan::ScanSettings;
 use super::tensorboard::EventFile;
 use crate::autofocus::shipped::{self, Design};
 use crate::autofocus::{PolicyName, Registry, weights};
@@ -90,7 +91,7 @@ impl Run {
         resume: bool,
     ) -> Result<Self, TrainError> {
         let design = design(&recipe)?;
-        let unfit = |error: super::scan::ClipError| TrainError::Recipe(error.to_string());
+        let unfit = |error: super::clip::ClipError| TrainError::Recipe(error.to_string());
         let clips = if footage.is_empty() { varied(Split::Training, recipe.pictures).map_err(unfit)? } else { footage };
         let held_out = varied(Split::Validation, recipe.pictures.min(60)).map_err(unfit)?;
         let count = held_out.len();

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
-use super::scan::{Clip, Scan, Variety};
+use super::clip::Clip;
+use super::scan::{Scan, Variety};
 use crate::imaging::Patch;
 use crate::lens::FocalPower;
 

@@ -83,9 +83,6 @@ pub fn record(
         let order = capture_order(seed, pose - 1, powers.len());
         let in_order: Vec<FocalPower> = order.iter().map(|&position| powers[position]).collect();
         let taken = bench.take(pose, &in_order)?;
-        if stop() {
-            return Err(RecordError::Stopped);
-        }
         recording.store(&shot(pose, &in_order, taken))?;
         progress();
     }
