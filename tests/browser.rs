@@ -10,6 +10,11 @@ mod aftermath;
 mod blinding;
 #[path = "browser/course.rs"]
 mod course;
+#[allow(dead_code, reason = "shared with other tests")]
+#[path = "support/disk.rs"]
+mod disk;
+#[path = "browser/full_disk.rs"]
+mod full_disk;
 #[path = "browser/killed.rs"]
 mod killed;
 #[path = "browser/proxy.rs"]

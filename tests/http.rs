@@ -1,9 +1,15 @@
 //! The server from outside, over HTTP: who may do what, what every response carries, and how it starts and ends.
 
+#[allow(dead_code, reason = "shared with other tests")]
+#[path = "support/disk.rs"]
+mod disk;
+#[allow(dead_code, reason = "shared with other tests")]
 mod support;
 
 #[path = "http/blinding.rs"]
 mod blinding;
+#[path = "http/disk.rs"]
+mod failing_disk;
 #[path = "http/live.rs"]
 mod live;
 #[path = "http/roles.rs"]

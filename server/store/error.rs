@@ -48,6 +48,11 @@ pub enum StoreError {
     /// The disk or file cannot be written.
     #[error("the database cannot be written: the disk or the file is read-only; make it writable and try again")]
     ReadOnly,
+    /// The disk failed in another way.
+    #[error(
+        "the disk failed ({0}); see whether it has room and is sound, and try again; what was saved before is safe"
+    )]
+    Disk(String),
     /// The file is no database, or damaged.
     #[error("the database is damaged ({0}); keep a copy of the data folder before anything else")]
     Damaged(String),
@@ -74,6 +79,9 @@ impl StoreError {
     }
 }
 
+/// `SQLITE_IOERR_SHMSIZE`: there is no room to enlarge the file that a database's connections share.
+const NO_ROOM_TO_SHARE: u32 = 4874;
+
 /// `SQLite`'s result codes (sqlite.org/rescode.html); an extended code's lowest byte is its primary code.
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
@@ -81,8 +89,12 @@ impl From<sqlx::Error> for StoreError {
             .as_database_error()
             .and_then(sqlx::error::DatabaseError::code)
             .and_then(|code| code.parse::<u32>().ok());
+        if code == Some(NO_ROOM_TO_SHARE) {
+            return Self::Full;
+        }
         match code.map(|code| code & 0xff) {
             Some(13) => Self::Full,
+            Some(10) => Self::Disk(error.to_string()),
             Some(8) => Self::ReadOnly,
             Some(11 | 26) => Self::Damaged(error.to_string()),
             _ => Self::Database(error),

@@ -21,7 +21,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
+use sqlx::Sqlite;
 use sqlx::migrate::Migrator;
+use sqlx::pool::PoolConnection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 use tokio::sync::{Mutex, MutexGuard};
 
@@ -191,10 +193,19 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     let pool = SqlitePoolOptions::new()
         .max_connections(1)
         .min_connections(1)
+        .acquire_timeout(Duration::from_secs(5))
         .idle_timeout(None)
         .max_lifetime(None)
         .test_before_acquire(false);
     Ok(pool.connect_with(options).await?)
+}
+
+/// Ends `connection` where its transaction failed; the pool then makes another. A full disk can undo a transaction behind
+/// the driver's back or leave it half open, and it would keep everyone else from writing for good.
+fn drop_if_failed<T>(mut connection: PoolConnection<Sqlite>, outcome: &Result<T, StoreError>) {
+    if outcome.is_err() {
+        connection.close_on_drop();
+    }
 }
 
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {

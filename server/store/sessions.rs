@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
-use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::{Connection, Row};
 
-use super::{Reader, Stamp, Store, StoreError, moment, nanoseconds};
+use super::{Reader, Stamp, Store, StoreError, drop_if_failed, moment, nanoseconds};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
 use crate::trial::allocation::{Algorithm, Seed};
@@ -60,38 +60,10 @@ impl Store {
     /// When the disk or database failed.
     pub async fn create_session(&self, new: &NewSession, created: &Event) -> Result<(), StoreError> {
         let _turn = self.turn().await;
-        let mut transaction = self.inner.trial.begin().await?;
-        sqlx::query(
-            "INSERT INTO sessions (session, run, wall, monotonic_ns, participant, protocol, protocol_toml,
-             protocol_sha256, practice, algorithm, seed, set_index, commitment)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        )
-        .bind(new.session.to_string())
-        .bind(self.inner.run)
-        .bind(new.stamp.wall.to_string())
-        .bind(nanoseconds(new.stamp.at))
-        .bind(&new.participant)
-        .bind(&new.protocol)
-        .bind(&new.protocol_toml)
-        .bind(&new.protocol_sha256)
-        .bind(new.practice)
-        .bind(new.algorithm.name())
-        .bind(new.seed.to_hex())
-        .bind(i64::try_from(new.set_index).unwrap_or(i64::MAX))
-        .bind(&new.commitment)
-        .execute(&mut *transaction)
-        .await?;
-        for ((segment, policy), setting) in new.segments.iter().zip(1_i64..) {
-            sqlx::query("INSERT INTO segments (segment, session, setting, policy) VALUES (?, ?, ?, ?)")
-                .bind(segment.to_string())
-                .bind(new.session.to_string())
-                .bind(setting)
-                .bind(policy.as_str())
-                .execute(&mut *transaction)
-                .await?;
-        }
-        insert_event(&mut transaction, self.inner.run, new.session, created).await?;
-        Ok(transaction.commit().await?)
+        let mut connection = self.inner.trial.acquire().await?;
+        let made = insert_session(&mut connection, self.inner.run, new, created).await;
+        drop_if_failed(connection, &made);
+        made
     }
 
     /// Appends `events` to `session`, all or none.
@@ -100,11 +72,10 @@ impl Store {
     /// When the disk or database failed.
     pub async fn append_events(&self, session: SessionId, events: &[Event]) -> Result<(), StoreError> {
         let _turn = self.turn().await;
-        let mut transaction = self.inner.trial.begin().await?;
-        for event in events {
-            insert_event(&mut transaction, self.inner.run, session, event).await?;
-        }
-        Ok(transaction.commit().await?)
+        let mut connection = self.inner.trial.acquire().await?;
+        let appended = insert_events(&mut connection, self.inner.run, session, events).await;
+        drop_if_failed(connection, &appended);
+        appended
     }
 
     /// Notes how far the clock of `segment`, under way in `session`, has come.
@@ -129,6 +100,59 @@ impl Store {
         .await?;
         Ok(())
     }
+}
+
+async fn insert_session(
+    connection: &mut SqliteConnection,
+    run: i64,
+    new: &NewSession,
+    created: &Event,
+) -> Result<(), StoreError> {
+    let mut transaction = connection.begin().await?;
+    sqlx::query(
+        "INSERT INTO sessions (session, run, wall, monotonic_ns, participant, protocol, protocol_toml,
+         protocol_sha256, practice, algorithm, seed, set_index, commitment)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(new.session.to_string())
+    .bind(run)
+    .bind(new.stamp.wall.to_string())
+    .bind(nanoseconds(new.stamp.at))
+    .bind(&new.participant)
+    .bind(&new.protocol)
+    .bind(&new.protocol_toml)
+    .bind(&new.protocol_sha256)
+    .bind(new.practice)
+    .bind(new.algorithm.name())
+    .bind(new.seed.to_hex())
+    .bind(i64::try_from(new.set_index).unwrap_or(i64::MAX))
+    .bind(&new.commitment)
+    .execute(&mut *transaction)
+    .await?;
+    for ((segment, policy), setting) in new.segments.iter().zip(1_i64..) {
+        sqlx::query("INSERT INTO segments (segment, session, setting, policy) VALUES (?, ?, ?, ?)")
+            .bind(segment.to_string())
+            .bind(new.session.to_string())
+            .bind(setting)
+            .bind(policy.as_str())
+            .execute(&mut *transaction)
+            .await?;
+    }
+    insert_event(&mut transaction, run, new.session, created).await?;
+    Ok(transaction.commit().await?)
+}
+
+async fn insert_events(
+    connection: &mut SqliteConnection,
+    run: i64,
+    session: SessionId,
+    events: &[Event],
+) -> Result<(), StoreError> {
+    let mut transaction = connection.begin().await?;
+    for event in events {
+        insert_event(&mut transaction, run, session, event).await?;
+    }
+    Ok(transaction.commit().await?)
 }
 
 async fn insert_event(

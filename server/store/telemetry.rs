@@ -5,11 +5,12 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use sqlx::Connection;
 use sqlx::sqlite::SqliteConnection;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, timeout_at};
 
-use super::{Store, StoreError, nanoseconds};
+use super::{Store, StoreError, drop_if_failed, nanoseconds};
 use crate::autofocus::PolicyName;
 use crate::control::{Hold, StepRecord};
 use crate::ids::SegmentId;
@@ -115,11 +116,18 @@ impl Writer {
             return Ok(());
         }
         let _turn = store.turn().await;
-        let mut transaction = store.inner.telemetry.begin().await?;
+        let mut connection = store.inner.telemetry.acquire().await?;
+        let written = self.write_on(&mut connection, store.run()).await;
+        drop_if_failed(connection, &written);
+        written
+    }
+
+    async fn write_on(&mut self, connection: &mut SqliteConnection, run: i64) -> Result<(), StoreError> {
+        let mut transaction = connection.begin().await?;
         for record in &self.waiting {
             let segment = self.names.segment(&mut transaction, record.segment).await?;
             let policy = self.names.policy(&mut transaction, record.policy.as_ref()).await?;
-            insert(&mut transaction, store.run(), record, segment, policy).await?;
+            insert(&mut transaction, run, record, segment, policy).await?;
         }
         Ok(transaction.commit().await?)
     }

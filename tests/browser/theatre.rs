@@ -49,7 +49,12 @@ pub fn start_again(server: &mut Server) {
 impl<'a> Theatre<'a> {
     /// Opens the theatre: both are let in by their links.
     pub async fn open(driver: &'a Driver) -> Self {
-        let server = server();
+        Self::on(driver, Arc::new(tempfile::tempdir().unwrap())).await
+    }
+
+    /// The same on the data folder `data`.
+    pub async fn on(driver: &'a Driver, data: Arc<TempDir>) -> Self {
+        let server = start(data, "127.0.0.1:0");
         let proxy = Proxy::to(server.address).await;
         let (surgeon, operator) = tokio::join!(driver.browser(), driver.browser());
         surgeon.open(&format!("http://{}/enter?key={}", proxy.address, server.key("surgeon"))).await;

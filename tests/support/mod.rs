@@ -33,7 +33,13 @@ impl Server {
 
     /// A server on a data folder that another may have used before.
     pub fn on(data: Arc<TempDir>, arguments: &[&str]) -> Self {
-        let mut process = command(data.path(), arguments).stdout(Stdio::piped()).spawn().unwrap();
+        let command = command(data.path(), arguments);
+        Self::run(data, command)
+    }
+
+    /// The server that `command` starts on `data`.
+    pub fn run(data: Arc<TempDir>, mut command: Command) -> Self {
+        let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
         let mut said = String::new();
         for line in &mut lines {
@@ -89,7 +95,12 @@ pub fn command(data: &std::path::Path, arguments: &[&str]) -> Command {
 
 /// Runs `parfocal serve` where it is expected to fail: exit code, standard error.
 pub fn refused(data: &std::path::Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let mut process = command(data, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    refusal(command(data, arguments))
+}
+
+/// Runs `command`, a server that is expected to fail: exit code, standard error.
+pub fn refusal(mut command: Command) -> (Option<i32>, String) {
+    let mut process = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     let mut said = String::new();
     process.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     (process.wait().unwrap().code(), said)

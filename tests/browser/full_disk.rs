@@ -1,0 +1,53 @@
+//! A disk that fills up while the surgeon speaks: the page says what is not saved yet, keeps it, and saves it when there is
+//! room again.
+
+use std::sync::Arc;
+
+use serde_json::json;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+
+use crate::disk::SmallDisk;
+use crate::screenshots::shoot;
+use crate::theatre::Theatre;
+use crate::wait::until;
+use crate::webdriver::Driver;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
+    let Some(disk) = SmallDisk::mount() else { return };
+    let driver = Driver::start().await;
+    let theatre = Theatre::on(&driver, Arc::clone(&disk.folder)).await;
+    let surgeon = &theatre.surgeon;
+    theatre.begin("S-06", "limited").await;
+    theatre.tap_notice(1).await;
+    theatre.say("There is room", 1).await;
+    surgeon.sees("#panel h2", "a few questions").await;
+    disk.fill();
+    // Some room may be left within the files: long comments until none is.
+    let mut said = vec!["There is room".to_owned()];
+    until("the disk to refuse", || {
+        let text = format!("{} {}", said.len(), "long ".repeat(2000));
+        said.push(text.trim().to_owned());
+        async move {
+            let say = "const box = document.getElementById('comment'); box.value = arguments[0];
+                       box.dispatchEvent(new Event('input')); document.getElementById('send').click();";
+            surgeon.run(say, json!([text])).await;
+            until("an answer", || async { surgeon.text("#comment-state").await != "Saving…" }).await;
+            surgeon.text("#comment-state").await.contains("kept on this device")
+        }
+    })
+    .await;
+    surgeon.sees("#comment-state", "the disk is full").await;
+    shoot(surgeon, "surgeon-13-full-disk").await;
+    surgeon.reload().await;
+    surgeon.sees("#comment-state", "kept on this device").await;
+    disk.empty();
+    theatre.sees_saved(said.len()).await;
+
+    let file = disk.folder.path().join("parfocal.db");
+    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+    let kept: Vec<String> =
+        sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
+    assert_eq!(kept, said, "each once, in the order said");
+    pool.close().await;
+}

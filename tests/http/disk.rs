@@ -1,0 +1,128 @@
+//! Disks that fail for real: full and read-only, at the start and in mid-session. Nothing is acknowledged that is not kept.
+
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::sync::Arc;
+
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+
+use crate::disk::{SmallDisk, as_nobody};
+use crate::support::{Server, client, command, refusal, refused};
+
+const LISTEN: [&str; 2] = ["--bind", "127.0.0.1:0"];
+
+async fn ask(server: &Server, role: &str, path: &str, body: Value) -> (StatusCode, String) {
+    let request = client().post(server.url(path)).bearer_auth(server.key(role)).json(&body);
+    let response = request.send().await.unwrap();
+    (response.status(), response.text().await.unwrap())
+}
+
+/// A session under way: its id.
+async fn begin(server: &Server) -> String {
+    ask(server, "operator", "/api/operator/participants", json!({"code": "S-05"})).await;
+    let session = json!({"participant": "S-05", "protocol": "practice"});
+    let (status, made) = ask(server, "operator", "/api/operator/sessions", session).await;
+    assert!(status.is_success(), "{made}");
+    serde_json::from_str::<Value>(&made).unwrap()["session"].as_str().unwrap().to_owned()
+}
+
+fn comment(session: &str, number: u32, text: &str) -> Value {
+    json!({"key": format!("00000000-0000-4000-8000-{number:012}"), "session": session, "kind": "text", "text": text})
+}
+
+async fn comments(server: &Server) -> Value {
+    let request = client().get(server.url("/api/surgeon/session")).bearer_auth(server.key("surgeon"));
+    request.send().await.unwrap().json::<Value>().await.unwrap()["comments"].clone()
+}
+
+#[tokio::test]
+async fn a_disk_that_fills_up_refuses_and_takes_again_when_there_is_room() {
+    let Some(disk) = SmallDisk::mount() else { return };
+    let server = Server::on(Arc::clone(&disk.folder), &LISTEN);
+    let session = begin(&server).await;
+    let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, 1, "there is room")).await;
+    assert_eq!(status, StatusCode::NO_CONTENT);
+    disk.fill();
+    // Some room may be left within the files: say things until none is.
+    let mut number = 1;
+    let told = loop {
+        number += 1;
+        let long = "no room ".repeat(1500);
+        let (status, told) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, number, &long)).await;
+        if status != StatusCode::NO_CONTENT {
+            assert_eq!(status, StatusCode::INSUFFICIENT_STORAGE, "{told}");
+            break told;
+        }
+        assert!(number < 1000, "the disk never fills");
+    };
+    assert!(told.contains("the disk is full; make room"), "{told}");
+    assert_eq!(comments(&server).await, number - 1, "what was refused does not count");
+    disk.empty();
+    let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, number, "again")).await;
+    assert_eq!(status, StatusCode::NO_CONTENT);
+    assert_eq!(comments(&server).await, number);
+}
+
+#[test]
+fn a_disk_without_room_is_named_at_the_start() {
+    let Some(disk) = SmallDisk::mount() else { return };
+    disk.fill();
+    let (code, said) = refused(&disk.folder.path().join("data"), &LISTEN);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("disk is full; make room") && said.lines().count() == 1, "{said}");
+    // Room for the folder and its lock, and for hardly more.
+    disk.empty();
+    let room = std::fs::File::create(disk.folder.path().join("room")).unwrap();
+    rustix::fs::fallocate(&room, rustix::fs::FallocateFlags::empty(), 0, 48 * 1024).unwrap();
+    disk.fill();
+    drop(room);
+    std::fs::remove_file(disk.folder.path().join("room")).unwrap();
+    let (code, said) = refused(&disk.folder.path().join("data"), &LISTEN);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("disk is full; make room") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
+fn a_read_only_disk_is_named_at_the_start() {
+    let Some(disk) = SmallDisk::mount() else { return };
+    disk.make_read_only();
+    let (code, said) = refused(disk.folder.path(), &LISTEN);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("its disk is read-only") && said.contains("--data-dir"), "{said}");
+}
+
+fn allow(path: &Path, mode: u32) {
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+}
+
+#[tokio::test]
+async fn a_user_who_may_not_write_is_told_so_at_the_start_and_loses_nothing_in_mid_session() {
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    let Some(start) = as_nobody(&command(data.path(), &LISTEN)) else { return };
+    allow(data.path(), 0o755);
+    let (code, said) = refusal(start);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("you may not write there; change its permissions"), "{said}");
+
+    allow(data.path(), 0o777);
+    let server = Server::run(Arc::clone(&data), as_nobody(&command(data.path(), &LISTEN)).unwrap());
+    let session = begin(&server).await;
+    for file in ["parfocal.db", "parfocal.db-wal", "parfocal.db-shm"] {
+        allow(&data.path().join(file), 0o444);
+    }
+    allow(data.path(), 0o555);
+    // The files are open: what the server acknowledges from here on is in them.
+    let (status, _) = ask(&server, "surgeon", "/api/surgeon/comments", comment(&session, 1, "still kept")).await;
+    assert_eq!(status, StatusCode::NO_CONTENT);
+    drop(server);
+    let (code, said) = refusal(as_nobody(&command(data.path(), &LISTEN)).unwrap());
+    assert_eq!(code, Some(1));
+    assert!(said.contains("read-only; make it writable"), "{said}");
+    allow(data.path(), 0o777);
+    for file in ["parfocal.db", "parfocal.db-wal", "parfocal.db-shm"] {
+        allow(&data.path().join(file), 0o666);
+    }
+    let server = Server::run(Arc::clone(&data), as_nobody(&command(data.path(), &LISTEN)).unwrap());
+    assert_eq!(comments(&server).await, 1);
+}

@@ -1,0 +1,75 @@
+//! Disks that can be filled, and users who may not write: for tests that run as root, which others skip.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+
+use tempfile::TempDir;
+
+/// A disk of a few megabytes, in memory; gone when dropped.
+pub struct SmallDisk {
+    /// Where it is mounted.
+    pub folder: Arc<TempDir>,
+}
+
+impl SmallDisk {
+    /// A disk, or (said on standard error) none where this user may not mount one.
+    pub fn mount() -> Option<Self> {
+        let folder = Arc::new(tempfile::tempdir().unwrap());
+        let mounted =
+            Command::new("mount").args(["-t", "tmpfs", "-o", "size=4m,mode=777", "tmpfs"]).arg(folder.path()).output();
+        match mounted {
+            Ok(output) if output.status.success() => Some(Self { folder }),
+            _ => {
+                eprintln!("skipped: to try a full disk, one has to be mounted, which takes root");
+                None
+            }
+        }
+    }
+
+    /// Leaves no byte of room.
+    pub fn fill(&self) {
+        let mut filler = std::fs::File::create(self.filler()).unwrap();
+        while filler.write_all(&[0; 4096]).is_ok() {}
+    }
+
+    /// Makes room again.
+    pub fn empty(&self) {
+        std::fs::remove_file(self.filler()).unwrap();
+    }
+
+    /// Lets nobody, root included, write to it.
+    pub fn make_read_only(&self) {
+        let done = Command::new("mount").args(["-o", "remount,ro"]).arg(self.folder.path()).status();
+        assert!(done.unwrap().success());
+    }
+
+    fn filler(&self) -> std::path::PathBuf {
+        self.folder.path().join("filler")
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        // Even while a server that is about to be killed has it open.
+        let _ = Command::new("umount").arg("--lazy").arg(self.folder.path()).status();
+    }
+}
+
+/// `command` as a user who owns nothing, or (said on standard error) `None` where that takes more rights.
+pub fn as_nobody(command: &Command) -> Option<Command> {
+    let nobody = |program: &Path| {
+        let mut nobody = Command::new("setpriv");
+        nobody.args(["--reuid=65534", "--regid=65534", "--clear-groups"]).arg(program);
+        nobody
+    };
+    let program = Path::new(command.get_program());
+    if !nobody(program).arg("--version").output().is_ok_and(|output| output.status.success()) {
+        eprintln!("skipped: to be another user takes root, setpriv, and a program that this user may run");
+        return None;
+    }
+    let mut nobody = nobody(program);
+    nobody.args(command.get_args()).env("RUST_LOG", "warn");
+    Some(nobody)
+}
