@@ -2,6 +2,7 @@
 //! et al., MICCAI 2023): a window walks over the picture, the optimal focal power walks, and what is seen is blurred by
 //! a Gaussian whose standard deviation grows with the distance between the two.
 
+mod clip;
 mod defocus;
 mod reel;
 mod video;
