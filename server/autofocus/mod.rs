@@ -7,6 +7,7 @@ pub mod learned;
 mod metrics;
 pub mod networks;
 mod registry;
+pub mod scripted;
 pub mod shipped;
 pub mod spectrum;
 pub mod weights;

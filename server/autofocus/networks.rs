@@ -132,6 +132,43 @@ mod tests {
         assert_eq!(head.forward(&Tensor::zeros([5, 72], (Kind::Float, Device::Cpu))).size(), [5, 3]);
     }
 
+    /// What `tests/vectors/pytorch.py` wrote under `name`.
+    fn from_pytorch(name: &str) -> Tensor {
+        let vectors: serde_json::Value =
+            serde_json::from_str(include_str!("../../tests/vectors/pytorch.json")).unwrap();
+        let values: Vec<f64> = serde_json::from_value(vectors[name].clone()).unwrap();
+        Tensor::from_slice(&values).to_kind(Kind::Float)
+    }
+
+    /// The same sines as there.
+    #[allow(clippy::cast_precision_loss, reason = "small indices")]
+    fn wave(count: usize, rate: f64, scale: f64, offset: f64) -> Tensor {
+        let values: Vec<f64> = (0..count).map(|index| offset + scale * (rate * index as f64).sin()).collect();
+        Tensor::from_slice(&values).to_kind(Kind::Float)
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "small indices")]
+    fn fill(store: &nn::VarStore) {
+        let mut variables: Vec<_> = store.variables().into_iter().collect();
+        variables.sort_by(|a, b| a.0.cmp(&b.0));
+        for (k, (_, mut variable)) in variables.into_iter().enumerate() {
+            let values = wave(variable.numel(), 0.01f64.mul_add(k as f64, 0.37), 0.2, 0.0).view_as(&variable);
+            tch::no_grad(|| variable.copy_(&values));
+        }
+    }
+
+    #[test]
+    fn the_cnn_gives_what_pytorch_gives() {
+        let store = nn::VarStore::new(Device::Cpu);
+        let encoder = Encoder::new(&(store.root() / "encoder"));
+        let head = ValueHead::new(&(store.root() / "head"), HISTORY * (ENCODING + 1));
+        fill(&store);
+        let encodings = encoder.forward(&wave(8 * 1024, 0.113, 100.0, 128.0).view([8, 1024])).view([-1]);
+        assert!(encodings.allclose(&from_pytorch("cnn_encodings"), 1e-4, 1e-5, false));
+        let state = Tensor::cat(&[encodings, wave(8, 0.7, 1.0, 0.0)], 0).view([1, -1]);
+        assert!(head.forward(&state).view([-1]).allclose(&from_pytorch("cnn_values"), 1e-4, 1e-5, false));
+    }
+
     #[test]
     fn the_belief_tracker_goes_frame_by_frame_as_over_a_whole_scan() {
         tch::manual_seed(1);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Failure, scan};
-use crate::autofocus::{PolicyName, Registry, shipped};
+use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::ScanFolder;
 use crate::training::evaluate::{Benchmark, COUNT, FRAMES, Outcome, SEED, ScanSet, compare, evaluate};
@@ -29,7 +29,7 @@ pub struct Arguments {
     /// A video, an image or a folder of images to scan in place of the reference pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
-    /// Policies by name, separated by commas, or `all` that can run.
+    /// Policies by name, separated by commas, or `all` that can run; `file:PATH` for one from a `TorchScript` file.
     #[arg(long, default_value = "all")]
     policies: String,
     /// Folder with weights (`NAME.safetensors`) to take in the place of those that ship.
@@ -60,6 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         registry = shipped::with_folder(registry, folder);
     }
     let policies = policies(&arguments.policies, &registry);
+    let registry = policies.iter().fold(registry, scripted::with_file);
     let scans = scans(arguments)?;
     let bar = progress(policies.len() * scans.set.count());
     let outcomes = evaluate(&registry, &policies, scans.set.as_ref(), &|name| {

@@ -19,7 +19,7 @@ use tracing_subscriber::EnvFilter;
 use super::Failure;
 use super::announce::{announcement, reachable};
 use super::{calibration, devices};
-use crate::autofocus::Registry;
+use crate::autofocus::{PolicyName, Registry, scripted};
 use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Library, Parts};
@@ -55,6 +55,9 @@ pub struct Arguments {
     /// Folder of trial protocols beside those that ship.
     #[arg(long, value_name = "DIR")]
     protocols: Option<PathBuf>,
+    /// A policy from a `TorchScript` file, `file:PATH`: to be chosen, also in protocols, by that name. May be repeated.
+    #[arg(long = "policy", value_name = "file:PATH")]
+    policies: Vec<String>,
     /// Calibration of the sensor, a TOML file or a folder of `parfocal calibrate`; without it, that of a typical unit.
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
@@ -92,7 +95,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let store = open_store(arguments, &calibration, clock.as_ref()).await?;
     let keys = Keys::load_or_create(&arguments.data_dir)?;
     let mut random = random(arguments)?;
-    let registry = Registry::standard();
+    let registry = registry(arguments)?;
     let library = protocols(arguments, &registry)?;
     let reconstructor = Reconstructor::new(&calibration);
     let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), random.random())?;
@@ -144,6 +147,16 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join())).await?.1.ok();
     let _ = timeout(GRACE, async { (writer.await, store.close().await) }).await;
     Ok(())
+}
+
+/// The policies that ship and those from files, each tried once.
+fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
+    let names = arguments.policies.iter().map(|name| PolicyName::new(name));
+    names.fold(Ok(Registry::standard()), |registry: Result<_, Failure>, name| {
+        let registry = scripted::with_file(registry?, &name);
+        registry.build(&name)?;
+        Ok(registry)
+    })
 }
 
 async fn open_store(arguments: &Arguments, calibration: &Calibration, clock: &dyn Clock) -> Result<Store, Failure> {

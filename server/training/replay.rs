@@ -59,6 +59,18 @@ pub struct Window {
     start: usize,
 }
 
+impl Ring {
+    /// Makes room for `capacity` frames like `seen`: growing bit by bit would hold all twice at times. What is never
+    /// filled costs no memory.
+    fn reserve(&mut self, capacity: usize, seen: &Seen) {
+        self.steps.reserve_exact(capacity);
+        match seen {
+            Seen::Patch(bytes) => self.patches.reserve_exact(capacity * bytes.len()),
+            Seen::Metric(_) => self.metrics.reserve_exact(capacity),
+        }
+    }
+}
+
 impl Replay {
     /// A memory of at most `frames` frames for `seats` seats.
     #[must_use]
@@ -83,6 +95,9 @@ impl Replay {
         let capacity = self.capacity;
         let ring = &mut self.seats[seat];
         if ring.steps.len() < capacity {
+            if ring.steps.is_empty() {
+                ring.reserve(capacity, seen);
+            }
             ring.steps.push(step);
             match seen {
                 Seen::Patch(bytes) => ring.patches.extend_from_slice(bytes),

@@ -1,0 +1,93 @@
+//! What training costs: environment steps, replay memory, and updates beside the same loop in `PyTorch` (`peer.py`).
+//! `cargo bench --bench training`; for the peer, set PYTHON to a Python that has `PyTorch` 2.11.
+#![allow(
+    clippy::unwrap_used,
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    missing_docs,
+    reason = "a benchmark may stop at the first surprise"
+)]
+
+use std::hint::black_box;
+use std::process::Command;
+use std::sync::Arc;
+
+use parfocal::autofocus::learned::Sight;
+use parfocal::clock::{Clock, SystemClock};
+use parfocal::imaging::{PATCH_SIDE, Patch};
+use parfocal::training::dqn::DqnTrainer;
+use parfocal::training::pictures::{Split, varied};
+use parfocal::training::recipe::{Recipe, shipped};
+use parfocal::training::replay::{Replay, Seen, Step};
+use parfocal::training::scan::{Clip, Variety};
+use parfocal::training::session::Session;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Transitions in a batch, as in `peer.py`.
+const TRANSITIONS: usize = 256;
+const WINDOWS: usize = 16;
+
+/// Runs `work` a little to warm up, and then `times` times; how often a second it ran.
+fn rate(times: u32, mut work: impl FnMut()) -> f64 {
+    (0..times / 10 + 1).for_each(|_| work());
+    let begin = SystemClock.now();
+    (0..times).for_each(|_| work());
+    f64::from(times) / SystemClock.now().since(begin).as_secs_f64()
+}
+
+fn environment(clips: &[Arc<Clip>]) {
+    for (name, share) in [("reference scans", 0.0), ("varied scans", 1.0)] {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut sessions: Vec<_> = (0..64).map(|_| Session::draw(clips, Variety { share }, 0.0, &mut rng)).collect();
+        let rounds = rate(200, || {
+            for session in &mut sessions {
+                black_box(session.observe());
+                let target = session.focal_power().get() + 0.01;
+                session.advance(target);
+            }
+        });
+        println!("environment, {name}: {:.0} steps a second", 64.0 * rounds);
+    }
+}
+
+fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, times: u32) {
+    let mut recipe = Recipe::parse(shipped(name).unwrap()).unwrap().dqn.unwrap();
+    // A window's first seven frames have no full history, its last no successor.
+    (recipe.windows, recipe.window) = (WINDOWS, TRANSITIONS / WINDOWS + 8);
+    (recipe.frames_an_update, recipe.warm_up, recipe.replay) = (recipe.scans, 4000, 20_000);
+    let mut trainer = DqnTrainer::new(sight, recipe, clips.to_vec(), 1);
+    trainer.update();
+    let rate = rate(times, || {
+        black_box(trainer.update());
+    });
+    println!("ours {name}: {rate:.1} updates a second, {:.0} transitions", rate * TRANSITIONS as f64);
+}
+
+fn memory() {
+    const FRAMES: usize = 2_500_000;
+    let mut replay = Replay::new(FRAMES, 8);
+    let seen = Seen::patch(&Patch([7.0; PATCH_SIDE * PATCH_SIDE]));
+    for index in 0..FRAMES {
+        replay.push(index % 8, &seen, Step::default());
+    }
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let resident: f64 =
+        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.split_whitespace().next()?.parse().ok()).unwrap();
+    println!("replay memory of {FRAMES} patches: the process holds {:.2} GB", resident * 1024.0 / 1e9);
+    black_box(replay.len());
+}
+
+fn main() {
+    tch::set_num_threads(1);
+    let clips = varied(Split::Training, 12).unwrap();
+    environment(&clips);
+    updates(&clips, "mgm-learned-paper", Sight::Mgm, 300);
+    updates(&clips, "cnn-learned-paper", Sight::Patch, 60);
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    match Command::new(&python).arg("benches/peer.py").status() {
+        Ok(status) if status.success() => {}
+        _ => println!("no peer: '{python}' has no PyTorch; set PYTHON to one that has"),
+    }
+    memory();
+}

@@ -1,0 +1,148 @@
+//! Policies from elsewhere, as `TorchScript` files: `file:PATH` in the place of a policy's name.
+//!
+//! The module's `forward` takes the latest eight frames, oldest first, as two float tensors: gray patches `[8, 32, 32]` (0..=255)
+//! and the focal powers that they were exposed at, `[8]` (0..=1). It returns the values of the three actions, `[3]`: a step
+//! down, none, a step up. Before eight frames were seen, the first stands for those missing.
+#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "small numbers in single precision")]
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use tch::{CModule, Kind, Tensor};
+
+use super::learned::{action_step, best_action};
+use super::networks::{ACTIONS, HISTORY};
+use super::{Decision, Observation, Policy, PolicyName, Registry};
+use crate::imaging::PATCH_SIDE;
+
+/// What a policy's name begins with if it is a file.
+const PREFIX: &str = "file:";
+const SIDE: i64 = PATCH_SIDE as i64;
+
+/// `registry` with the policy that `name` stands for, if it is a file's; a file that is no such policy is listed with the reason and
+/// not available.
+#[must_use]
+pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
+    const SUMMARY: &str = "action values from a TorchScript file";
+    let Some(path) = name.as_str().strip_prefix(PREFIX) else { return registry };
+    match load(Path::new(path)) {
+        Ok(module) => registry.with(name.as_str(), SUMMARY, move || Box::new(Scripted::new(Arc::clone(&module)))),
+        Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
+    }
+}
+
+/// Reads the module and tries it once.
+fn load(path: &Path) -> Result<Arc<CModule>, String> {
+    let mut file = File::open(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let module = CModule::load_data(&mut file)
+        .map_err(|error| format!("{} is not TorchScript: {}", path.display(), first_line(&error.to_string())))?;
+    let (patches, focal_powers) = (vec![128.0; HISTORY * PATCH_SIDE * PATCH_SIDE], vec![0.5; HISTORY]);
+    values(&module, &patches, &focal_powers).map_err(|reason| {
+        let signature =
+            format!("forward(patches [{HISTORY}, {SIDE}, {SIDE}], focal_powers [{HISTORY}]) -> values [{ACTIONS}]");
+        format!("{} is not a policy: {reason}; it must have {signature}, all float32", path.display())
+    })?;
+    Ok(Arc::new(module))
+}
+
+/// The three action values; what the module is given is flat, oldest frame first.
+fn values(module: &CModule, patches: &[f32], focal_powers: &[f32]) -> Result<[f32; ACTIONS], String> {
+    let inputs = [Tensor::from_slice(patches).view([-1, SIDE, SIDE]), Tensor::from_slice(focal_powers)];
+    let output = tch::no_grad(|| module.forward_ts(&inputs)).map_err(|error| first_line(&error.to_string()))?;
+    if output.kind() != Kind::Float || output.size() != [ACTIONS as i64] {
+        return Err(format!("it returned {:?} of shape {:?}", output.kind(), output.size()));
+    }
+    let mut values = [0.0f32; ACTIONS];
+    output.copy_data(&mut values, ACTIONS);
+    if values.iter().all(|value| value.is_finite()) { Ok(values) } else { Err("it returned no numbers".to_owned()) }
+}
+
+/// libtorch's messages go on with a stack trace.
+fn first_line(message: &str) -> String {
+    message.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("it gave no reason").to_owned()
+}
+
+/// A module with its memory of eight frames.
+struct Scripted {
+    module: Arc<CModule>,
+    patches: VecDeque<f32>,
+    focal_powers: VecDeque<f32>,
+}
+
+impl Scripted {
+    const fn new(module: Arc<CModule>) -> Self {
+        Self { module, patches: VecDeque::new(), focal_powers: VecDeque::new() }
+    }
+
+    fn remember(&mut self, seen: &Observation<'_>) {
+        let missing = if self.focal_powers.is_empty() { HISTORY } else { 1 };
+        for _ in 0..missing {
+            self.patches.extend(&seen.patch.0);
+            self.focal_powers.push_back(seen.focal_power.get() as f32);
+        }
+        if self.focal_powers.len() > HISTORY {
+            self.patches.drain(..PATCH_SIDE * PATCH_SIDE);
+            self.focal_powers.pop_front();
+        }
+    }
+}
+
+impl Policy for Scripted {
+    fn step(&mut self, seen: &Observation<'_>) -> Decision {
+        self.remember(seen);
+        match values(&self.module, self.patches.make_contiguous(), self.focal_powers.make_contiguous()) {
+            Ok(values) => {
+                let target = seen.focal_power.moved(action_step(best_action(&values))).get();
+                Decision { target, metric: None, belief: None }
+            }
+            // It worked when it was loaded; now it fails on what it sees: the watchdog takes a target that is none.
+            Err(_) => Decision { target: f64::NAN, metric: None, belief: None },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::Patch;
+    use crate::lens::FocalPower;
+
+    fn policy(file: &str) -> Result<Box<dyn Policy>, String> {
+        let name = PolicyName::new(&format!("file:{}/tests/vectors/{file}", env!("CARGO_MANIFEST_DIR")));
+        with_file(Registry::default(), &name).build(&name).map_err(|error| error.to_string())
+    }
+
+    /// Vertical stripes that differ by `height` gray levels.
+    fn stripes(height: f32) -> Patch {
+        Patch(std::array::from_fn(|index| if index % 2 == 0 { 100.0 } else { 100.0 + height }))
+    }
+
+    #[test]
+    fn a_script_made_by_pytorch_sees_the_latest_frames_in_order() {
+        let mut policy = policy("steepest-frame.pt").unwrap();
+        let focal_power = FocalPower::new(0.5).unwrap();
+        let mut step = |height| policy.step(&Observation { patch: &stripes(height), focal_power }).target;
+        // It goes up where the latest frame is steeper than the one before, and else down; nothing is gained at first.
+        for (height, expected) in [(10.0, 0.5), (20.0, 0.55), (5.0, 0.45), (6.0, 0.55), (6.0, 0.5)] {
+            let target = step(height);
+            assert!((target - expected).abs() < 1e-9, "{height}: {target}");
+        }
+        for height in 0..20u8 {
+            let target = step(f32::from(50 - height));
+            assert!(height == 0 || (target - 0.45).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_is_no_policy_is_told_why() {
+        let error = |file| policy(file).err().unwrap();
+        assert!(
+            error("wrong-shape.pt")
+                .contains("it returned Float of shape [8]; it must have forward(patches [8, 32, 32]")
+        );
+        assert!(error("pytorch.json").contains("is not TorchScript"));
+        assert!(error("nothing.pt").contains("cannot read"));
+    }
+}
