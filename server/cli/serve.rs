@@ -151,12 +151,12 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The policies that ship and those from files, each tried once.
 fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
-    let names = arguments.policies.iter().map(|name| PolicyName::new(name));
-    names.fold(Ok(Registry::standard()), |registry: Result<_, Failure>, name| {
-        let registry = scripted::with_file(registry?, &name);
+    let mut registry = Registry::standard();
+    for name in arguments.policies.iter().map(|name| PolicyName::new(name)) {
+        registry = scripted::with_file(registry, &name);
         registry.build(&name)?;
-        Ok(registry)
-    })
+    }
+    Ok(registry)
 }
 
 async fn open_store(arguments: &Arguments, calibration: &Calibration, clock: &dyn Clock) -> Result<Store, Failure> {
