@@ -1,7 +1,7 @@
 //! `parfocal scan record`: from the phantom, each pose held still, or from a bench of camera, lens and stepper.
 
 use std::io::BufRead;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -13,7 +13,7 @@ use super::{Failure, bar, print};
 use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::{FORMAT, Header, Order, Recording, VERSION};
 use crate::camera::{self, CameraSettings};
-use crate::cli::interrupt;
+use crate::cli::{calibration, interrupt};
 use crate::clock::SystemClock;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens;
@@ -49,8 +49,8 @@ pub struct Arguments {
     /// Frames a second to ask of the camera.
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
-    /// Calibration of the sensor (TOML); without it, that of a typical unit.
-    #[arg(long, value_name = "FILE")]
+    /// Calibration of the sensor, a TOML file or a folder of `parfocal calibrate`; without it, that of a typical unit.
+    #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
 }
 
@@ -100,7 +100,7 @@ fn devices(
     stop: &Arc<AtomicBool>,
     progress: &ProgressBar,
 ) -> Result<(Box<dyn Bench>, Header), Failure> {
-    let calibration = arguments.calibration.as_deref().map(calibration).transpose()?;
+    let calibration = arguments.calibration.as_deref().map(calibration::read).transpose()?;
     let clock = Arc::new(SystemClock);
     let lens = lens::open(lens, Arc::clone(&clock) as _)?;
     let settings = CameraSettings {
@@ -110,14 +110,16 @@ fn devices(
         clock: Arc::clone(&clock) as _,
     };
     let camera = camera::open(&arguments.camera, settings)?;
+    if let Some(calibration) = &calibration {
+        calibration::check_size(calibration, "the camera's picture", camera.mosaic_size())?;
+    }
     let stepper = match &arguments.stepper {
         Some(command) => Stepper::Command(command.clone()),
         None => Stepper::Asked(Box::new(asker(arguments.poses, Arc::clone(stop), progress.clone()))),
     };
     let (health, simulated) = (camera.health(), camera.health().simulated || lens.health().simulated);
     let mut header = header(arguments, &health.name, Some(lens.health().name.to_string()), simulated);
-    header.calibration =
-        calibration.as_ref().map(|calibration| format!("{}, {}", calibration.name, calibration.version));
+    header.calibration = calibration.as_ref().map(Calibration::title);
     let reconstructor = Reconstructor::new(&calibration.unwrap_or_default());
     Ok((Box::new(Devices { camera, lens, reconstructor, stepper, clock }), header))
 }
@@ -136,11 +138,6 @@ fn header(arguments: &Arguments, camera: &str, lens: Option<String>, simulated: 
         poses: arguments.poses,
         focal_powers: evenly_spread(arguments.focal_powers),
     }
-}
-
-fn calibration(path: &Path) -> Result<Calibration, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    Ok(Calibration::from_toml(&text).map_err(|error| format!("{}: {error}", path.display()))?)
 }
 
 /// Asks on the terminal for each pose and waits for Enter.
