@@ -31,7 +31,7 @@ const WINDOWS: usize = 16;
 
 /// Runs `work` a little to warm up, and then `times` times; how often a second it ran.
 fn rate(times: u32, mut work: impl FnMut()) -> f64 {
-    (0..times / 10 + 1).for_each(|_| work());
+    (0..=times / 10).for_each(|_| work());
     let begin = SystemClock.now();
     (0..times).for_each(|_| work());
     f64::from(times) / SystemClock.now().since(begin).as_secs_f64()
