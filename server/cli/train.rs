@@ -33,6 +33,9 @@ pub struct Arguments {
     /// A recipe of your own (TOML) in place of the one that ships.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// Updates in the place of the recipe's, for a shorter or longer training.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    updates: Option<u64>,
     /// A video, an image or a folder of images to train on in place of drawn pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
@@ -57,7 +60,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let reason = if tch::Cuda::is_available() { "trains on the processor only" } else { "has no CUDA" };
         return Err(format!("this build {reason}; use --device cpu").into());
     }
-    let recipe = recipe(arguments)?;
+    let mut recipe = recipe(arguments)?;
+    if let Some(updates) = arguments.updates {
+        recipe = recipe.with_updates(updates);
+    }
     let mut clips = Vec::new();
     for path in &arguments.footage {
         clips.extend(footage::clips(path)?);

@@ -86,6 +86,18 @@ impl Recipe {
         }
     }
 
+    /// The same recipe for a training of `updates` updates.
+    #[must_use]
+    pub fn with_updates(mut self, updates: u64) -> Self {
+        if let Some(dqn) = &mut self.dqn {
+            dqn.updates = updates;
+        }
+        if let Some(belief) = &mut self.belief {
+            belief.updates = updates;
+        }
+        self
+    }
+
     /// Updates of the whole training.
     #[must_use]
     pub fn updates(&self) -> u64 {
