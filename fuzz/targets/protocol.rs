@@ -2,19 +2,22 @@
 
 #![no_main]
 
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use parfocal::autofocus::Registry;
+use parfocal::autofocus::{PolicyName, Registry};
 use parfocal::trial::protocol::Protocol;
 
+static KNOWN: LazyLock<Vec<PolicyName>> =
+    LazyLock::new(|| Registry::standard().entries().into_iter().map(|entry| entry.name).collect());
+
 fuzz_target!(|text: &str| {
-    let known: Vec<_> = Registry::standard().entries().into_iter().map(|entry| entry.name).collect();
-    match Protocol::parse(text, "fuzzed.toml", &known) {
+    match Protocol::parse(text, "fuzzed.toml", &KNOWN) {
         Ok(protocol) => {
             assert!((1..=24).contains(&protocol.settings()));
             assert!((Duration::from_secs(5)..=Duration::from_secs(3600)).contains(&protocol.segment_limit));
-            assert!(protocol.policies.iter().all(|policy| known.contains(policy)));
+            assert!(protocol.policies.iter().all(|policy| KNOWN.contains(policy)));
         }
         Err(error) => assert!(error.to_string().contains("fuzzed.toml"), "{error}"),
     }

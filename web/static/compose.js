@@ -55,9 +55,10 @@ export function composer(outbox, now) {
     send.classList.toggle("primary", !send.disabled);
     const waiting = outbox.waiting.filter((entry) => entry.path === PATH).length;
     if (waiting === 0) setText(status, kept === 0 ? "" : kept === 1 ? "1 comment saved" : `${kept} comments saved`);
-    else if (outbox.trouble) setText(status, `${waiting === 1 ? "1 comment" : `${waiting} comments`} kept on this ${outbox.durable ? "device" : "page: do not close it"}. ${outbox.trouble}`);
+    else if (outbox.trouble) setText(status, `${waiting === 1 ? "1 comment" : `${waiting} comments`} not saved yet, kept on this ${outbox.durable ? "device" : "page: do not close it"}. ${outbox.trouble}`);
     else setText(status, "Saving…");
     status.classList.toggle("saved", waiting === 0);
+    status.classList.toggle("unsaved", waiting > 0 && outbox.trouble !== null);
     const here = now();
     const elsewhere = begun && begun.setting > 0 && begun.segment !== here?.segment && box.value !== "";
     about.hidden = !elsewhere;
