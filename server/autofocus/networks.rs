@@ -16,7 +16,7 @@ pub const ENCODING: usize = 8;
 /// Slices of 0..=1 in the belief tracker's posterior.
 pub const BINS: usize = 41;
 /// Units of the belief tracker's memory.
-pub const MEMORY: usize = 96;
+pub const MEMORY: usize = 192;
 /// What the belief tracker sees of a frame: features, their change, where the lens stood (softly, one in [`BINS`]), and
 /// three numbers on how it moved.
 pub const BELIEF_INPUT: usize = 2 * FEATURES + BINS + 3;

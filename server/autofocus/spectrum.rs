@@ -18,7 +18,7 @@ use super::{mgm, mlr};
 use crate::imaging::{PATCH_SIDE, Patch};
 
 /// Bands of radial frequency.
-const BANDS: usize = 12;
+const BANDS: usize = 14;
 /// Values [`features`] gives: the bands, contrast, mean gradient magnitude, mean local ratio, brightness.
 pub const FEATURES: usize = BANDS + 4;
 /// Columns of the transform that a real patch needs: frequencies 0..=16; padded to whole vectors.
@@ -58,14 +58,14 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     }
 });
 
-/// Band of a frequency pair: by radius, finer for low frequencies; none for the mean and its leakage, and the corners.
+/// Band of a frequency pair: by radius, finer for low frequencies; none for the mean and its leakage, and the far corners.
 fn band(ky: usize, kx: usize) -> usize {
     if kx > HALF {
         return BANDS;
     }
     let ky = ky.min(PATCH_SIDE - ky) as f64;
     let radius = ky.hypot(kx as f64);
-    let edges = [1.5, 2.2, 3.0, 3.8, 4.7, 5.7, 6.8, 8.0, 9.4, 11.0, 12.8, 14.6, 16.5];
+    let edges = [1.5, 2.2, 3.0, 3.8, 4.7, 5.7, 6.8, 8.0, 9.4, 11.0, 12.8, 14.6, 16.5, 18.5, 20.5];
     edges.windows(2).position(|pair| (pair[0]..pair[1]).contains(&radius)).unwrap_or(BANDS)
 }
 
