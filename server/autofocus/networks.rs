@@ -170,6 +170,17 @@ mod tests {
     }
 
     #[test]
+    fn the_belief_tracker_gives_what_pytorch_gives() {
+        let store = nn::VarStore::new(Device::Cpu);
+        let network = BeliefNetwork::new(&store.root());
+        fill(&store);
+        let inputs = wave(2 * 5 * BELIEF_INPUT, 0.29, 1.0, 0.0).view([2, 5, BELIEF_INPUT as i64]);
+        let (logits, _) = network.forward(&inputs, &network.blank(2, Device::Cpu));
+        let found = logits.select(1, 4).contiguous().view([-1]);
+        assert!(found.allclose(&from_pytorch("belief_logits"), 1e-4, 1e-5, false));
+    }
+
+    #[test]
     fn the_belief_tracker_goes_frame_by_frame_as_over_a_whole_scan() {
         tch::manual_seed(1);
         let store = nn::VarStore::new(Device::Cpu);
