@@ -1,6 +1,6 @@
 """The paper's deep Q-learning update in PyTorch, eager, one thread: what `cargo bench --bench training` is compared with.
 
-256 transitions drawn at random from a replay memory of patches as bytes, each a state of eight frames and its successor;
+Transitions drawn at random from a replay memory of patches as bytes, each a state of eight frames and its successor;
 smooth L1, RMSProp, target network by moving average. Budd et al., MICCAI 2023.
 """
 
@@ -11,7 +11,7 @@ from torch import nn
 
 torch.set_num_threads(1)
 torch.manual_seed(1)
-TRANSITIONS, FRAMES, HISTORY = 256, 20_000, 8
+FRAMES, HISTORY = 20_000, 8
 
 
 def head(inputs):
@@ -44,7 +44,7 @@ class Cnn(nn.Module):
         return self.head(torch.cat([encodings, focal_powers], 1))
 
 
-def measure(name, make, seen, times):
+def measure(name, make, seen, batch, times):
     online, target = make(), make()
     target.load_state_dict(online.state_dict())
     optimiser = torch.optim.RMSprop(online.parameters(), lr=1e-5, momentum=0.95)
@@ -53,7 +53,7 @@ def measure(name, make, seen, times):
     back = torch.arange(HISTORY) - HISTORY + 1
 
     def update():
-        at = torch.randint(HISTORY, FRAMES - 1, (TRANSITIONS,))
+        at = torch.randint(HISTORY, FRAMES - 1, (batch,))
         now, after = at[:, None] + back, at[:, None] + back + 1
         with torch.no_grad():
             best = target(seen[after], focal_powers[after]).max(1).values
@@ -74,8 +74,9 @@ def measure(name, make, seen, times):
     for _ in range(times):
         update()
     rate = times / (time.perf_counter() - begin)
-    print(f"peer {name}: {rate:.1f} updates a second, {rate * TRANSITIONS:.0f} transitions", flush=True)
+    print(f"peer {name}, {batch} transitions: {rate:.1f} updates a second, {rate * batch:.0f} transitions", flush=True)
 
 
-measure("mgm-learned-paper", Scalar, torch.rand(FRAMES), 300)
-measure("cnn-learned-paper", Cnn, torch.randint(256, (FRAMES, 1024), dtype=torch.uint8), 20)
+for size in [32, 256]:
+    measure("mgm-learned-paper", Scalar, torch.rand(FRAMES), size, 300)
+    measure("cnn-learned-paper", Cnn, torch.randint(256, (FRAMES, 1024), dtype=torch.uint8), size, 20)

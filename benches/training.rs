@@ -25,9 +25,8 @@ use parfocal::training::session::Session;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Transitions in a batch, as in `peer.py`.
-const TRANSITIONS: usize = 256;
-const WINDOWS: usize = 16;
+/// Transitions in a window.
+const TRANSITIONS: usize = 16;
 
 /// Runs `work` a little to warm up, and then `times` times; how often a second it ran.
 fn rate(times: u32, mut work: impl FnMut()) -> f64 {
@@ -52,17 +51,17 @@ fn environment(clips: &[Arc<Clip>]) {
     }
 }
 
-fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, times: u32) {
+fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, batch: usize, times: u32) {
     let mut recipe = Recipe::parse(shipped(name).unwrap()).unwrap().dqn.unwrap();
     // A window's first seven frames have no full history, its last no successor.
-    (recipe.windows, recipe.window) = (WINDOWS, TRANSITIONS / WINDOWS + 8);
+    (recipe.windows, recipe.window) = (batch / TRANSITIONS, TRANSITIONS + 8);
     (recipe.frames_an_update, recipe.warm_up, recipe.replay) = (recipe.scans, 4000, 20_000);
     let mut trainer = DqnTrainer::new(sight, recipe, clips.to_vec(), 1);
     trainer.update();
     let rate = rate(times, || {
         black_box(trainer.update());
     });
-    println!("ours {name}: {rate:.1} updates a second, {:.0} transitions", rate * TRANSITIONS as f64);
+    println!("ours {name}, {batch} transitions: {rate:.1} updates a second, {:.0} transitions", rate * batch as f64);
 }
 
 fn memory() {
@@ -83,8 +82,11 @@ fn main() {
     tch::set_num_threads(1);
     let clips = varied(Split::Training, 12).unwrap();
     environment(&clips);
-    updates(&clips, "mgm-learned-paper", Sight::Mgm, 300);
-    updates(&clips, "cnn-learned-paper", Sight::Patch, 60);
+    // The batches of `peer.py`.
+    for batch in [32, 256] {
+        updates(&clips, "mgm-learned-paper", Sight::Mgm, batch, 300);
+        updates(&clips, "cnn-learned-paper", Sight::Patch, batch, 60);
+    }
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_owned());
     match Command::new(&python).arg("benches/peer.py").status() {
         Ok(status) if status.success() => {}

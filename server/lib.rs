@@ -8,6 +8,7 @@ pub mod ids;
 pub mod imaging;
 pub mod lens;
 pub mod options;
+pub mod priority;
 
 pub mod autofocus;
 pub mod camera;

@@ -24,6 +24,12 @@ pub const BELIEF_INPUT: usize = 2 * FEATURES + BINS + 3;
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;
 
+/// Keeps libtorch's work for this thread on this thread, also what its matrix libraries would share out: each thread has that
+/// setting of its own, and handing on so little costs more than doing it.
+pub fn compute_on_this_thread() {
+    tch::set_num_threads(1);
+}
+
 /// Three dense layers, `input` -> 256 -> 256 -> 3, `ReLU` between: the action values.
 #[derive(Debug)]
 pub struct ValueHead {

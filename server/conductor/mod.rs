@@ -7,6 +7,7 @@ mod flow;
 mod library;
 mod remarks;
 mod reports;
+mod timeline;
 mod views;
 
 use std::sync::Arc;
@@ -16,9 +17,8 @@ use rand_chacha::ChaCha12Rng;
 use tokio::sync::{Mutex, Notify, watch};
 
 pub use library::{Library, LibraryError, ProtocolSummary};
-pub use reports::{
-    AnswerLine, SessionDetail, SettingDetail, SettingSpan, Timeline, TimelineComment, TimelinePoint, Unblinding,
-};
+pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
+pub use timeline::{SettingSpan, Timeline, TimelineComment, TimelinePoint};
 
 use crate::autofocus::Registry;
 use crate::clock::Clock;

@@ -10,11 +10,11 @@ use super::course::Course;
 use super::{ConductError, Conductor, ProtocolSummary, operator_only};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
-use crate::store::{Participant, PathPoint, Reader, SessionLine};
+use crate::store::{Participant, Reader, SessionLine};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::participant::ParticipantCode;
-use crate::trial::view::{AnswerValue, LogLine, QuestionKind, Role, Said};
+use crate::trial::view::{AnswerValue, LogLine, QuestionKind, Role};
 
 /// A session in detail, for the researcher. Policies are in it once it was unblinded, and not before.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -87,62 +87,6 @@ pub struct Unblinding {
     pub policies: Vec<PolicyName>,
 }
 
-/// A session over time. Seconds count from its start by the server's clocks, pauses included.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Timeline {
-    /// When each setting was inspected.
-    pub settings: Vec<SettingSpan>,
-    /// The focal path.
-    pub points: Vec<TimelinePoint>,
-    /// What was said.
-    pub comments: Vec<TimelineComment>,
-}
-
-/// When a setting was inspected.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct SettingSpan {
-    /// Setting, from 1.
-    pub setting: usize,
-    /// From, seconds.
-    pub from: f64,
-    /// To, seconds; none while it lasts.
-    pub to: Option<f64>,
-}
-
-/// A point of the focal path.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct TimelinePoint {
-    /// Setting, from 1.
-    pub setting: i64,
-    /// Seconds.
-    pub seconds: f64,
-    /// Frame's number.
-    pub frame: i64,
-    /// Focal power asked for, 0..=1.
-    pub asked: f64,
-    /// Focal power that the frame was exposed at, 0..=1.
-    pub measured: Option<f64>,
-    /// The optimum, 0..=1, where a simulation knows it.
-    pub optimal: Option<f64>,
-}
-
-/// A comment on the timeline.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct TimelineComment {
-    /// When, by the server's wall clock.
-    #[schema(value_type = String)]
-    pub at: Timestamp,
-    /// Seconds.
-    pub seconds: f64,
-    /// Setting, from 1.
-    pub setting: Option<usize>,
-    /// Number of the frame that was on screen.
-    pub frame: Option<u64>,
-    /// What was said.
-    #[serde(flatten)]
-    pub said: Said,
-}
-
 impl Conductor {
     /// For reading what is kept.
     #[must_use]
@@ -205,42 +149,6 @@ impl Conductor {
         })
     }
 
-    /// Session `session` over time, its focal path thinned to about `points` a setting.
-    ///
-    /// # Errors
-    /// When there is none, or the database failed.
-    pub async fn timeline(&self, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
-        let course = self.shared.load(session).await?;
-        let reader = self.shared.store.reader();
-        let runs = reader.run_clocks().await?;
-        let events = reader.events(session).await?;
-        let events: Vec<(Timestamp, Event)> =
-            events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();
-        let started = events.iter().find(|(_, event)| event.kind == EventKind::Started);
-        let start = started.map_or(course.made.stamp.wall, |(at, _)| *at);
-        let point = |point: PathPoint| TimelinePoint {
-            seconds: seconds(start, runs.wall(point.run, point.exposed)),
-            setting: point.setting,
-            frame: point.frame,
-            asked: point.asked,
-            measured: point.measured,
-            optimal: point.optimal,
-        };
-        let comments = reader.comments(session).await?;
-        let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
-            at: comment.stamp.wall,
-            seconds: seconds(start, runs.wall(run, comment.stamp.at)),
-            setting: comment.segment.map(|segment| course.setting(segment)),
-            frame: comment.frame,
-            said: comment.said,
-        });
-        Ok(Timeline {
-            settings: spans(&course, &events, start),
-            points: reader.focal_path(session, points).await?.into_iter().map(point).collect(),
-            comments: comments.collect(),
-        })
-    }
-
     async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
         let mut latest: BTreeMap<(Option<SegmentId>, String), usize> = BTreeMap::new();
         let mut lines: Vec<Option<AnswerLine>> = Vec::new();
@@ -287,25 +195,6 @@ fn settings(course: &Course) -> Vec<SettingDetail> {
     course.state.plan().segments.iter().zip(1..).map(detail).collect()
 }
 
-fn spans(course: &Course, events: &[(Timestamp, Event)], start: Timestamp) -> Vec<SettingSpan> {
-    let mut spans: Vec<SettingSpan> = Vec::new();
-    for (at, event) in events {
-        let at = seconds(start, *at);
-        match event.kind {
-            EventKind::SegmentStarted { segment } => {
-                spans.push(SettingSpan { setting: course.setting(segment), from: at, to: None });
-            }
-            EventKind::SegmentFinished { .. } | EventKind::Aborted { .. } => {
-                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
-                    open.to = Some(at);
-                }
-            }
-            _ => {}
-        }
-    }
-    spans
-}
-
 fn log(course: &Course) -> Vec<LogLine> {
     let line = |event: &Event| LogLine {
         at: event.wall,
@@ -325,8 +214,4 @@ fn unblinding(course: &Course) -> Option<Unblinding> {
         }),
         _ => None,
     })
-}
-
-fn seconds(from: Timestamp, to: Timestamp) -> f64 {
-    to.duration_since(from).as_secs_f64()
 }

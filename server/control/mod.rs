@@ -4,7 +4,6 @@
 mod attribution;
 mod eye;
 mod pilot;
-pub mod priority;
 mod runner;
 mod slot;
 mod source;

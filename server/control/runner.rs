@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crate::autofocus::{Decision, Observation, Policy, PolicyError, PolicyName, Registry};
+use crate::autofocus::{Decision, Observation, Policy, PolicyError, PolicyName, Registry, networks};
 use crate::clock::{Clock, Moment};
 use crate::imaging::Patch;
 use crate::lens::FocalPower;
@@ -57,7 +57,8 @@ impl Runner {
         let (questions, questions_in) = sync_channel(1);
         let (answers_out, answers) = sync_channel(1);
         let thread = std::thread::Builder::new().name("policy".into()).spawn(move || {
-            super::priority::raise();
+            crate::priority::raise();
+            networks::compute_on_this_thread();
             serve(&registry, &name, &*clock, &questions_in, &answers_out);
         })?;
         Ok(Self { questions, answers, thread, asked_at: None, proven: false })

@@ -164,7 +164,7 @@ impl Worker {
     }
 
     fn run(mut self, mut commands: mpsc::UnboundedReceiver<Command>, stop: &AtomicBool) {
-        super::priority::raise();
+        crate::priority::raise();
         while !stop.load(Ordering::Relaxed) {
             let frame = self.source.frames.take(TICK);
             while let Ok(command) = commands.try_recv() {

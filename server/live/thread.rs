@@ -45,7 +45,7 @@ struct Worker {
 
 impl Worker {
     fn run(mut self) {
-        crate::control::priority::lower();
+        crate::priority::lower();
         while !self.control.frames.is_closed() {
             let Some(frame) = self.control.frames.take(PATIENCE) else { continue };
             // One bad picture must not end the live view.

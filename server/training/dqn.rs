@@ -11,91 +11,21 @@ use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Reduction, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
-use super::optimiser::{Optimiser, Rule};
+use super::dqn_batch::{Batch, bellman, gains, reach};
+use super::dqn_recipe::{DqnRecipe, Target};
+use super::optimiser::Optimiser;
 use super::replay::{Replay, Seen, Step};
 use super::scan::Variety;
 use super::session::{Session, lead_astray};
-use crate::autofocus::STEP;
 use crate::autofocus::learned::{Sight, ValueNetwork, action_step, best_action, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
 use crate::imaging::PATCH_SIDE;
-use crate::lens::FocalPower;
 
 const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
-
-/// What the action values are fitted to.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
-pub enum Target {
-    /// Bellman's equation, from the action taken: rewards of `steps` frames, then the target network's value.
-    Bellman {
-        /// Discount a frame.
-        discount: f64,
-        /// Frames whose rewards are summed.
-        steps: usize,
-        /// Whether the online network picks the action that the target network values.
-        double: bool,
-    },
-    /// What each of the three actions would have gained over standing still at the next frame, in steps; known in
-    /// simulation for all three whichever was taken.
-    Lookahead,
-}
-
-/// How a DQN policy is trained.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DqnRecipe {
-    /// Scans side by side.
-    pub scans: usize,
-    /// Frames of a scan.
-    pub frames_a_scan: u16,
-    /// Frames played between updates, over all scans together a multiple of `scans`.
-    pub frames_an_update: usize,
-    /// Frames played before the first update.
-    pub warm_up: u64,
-    /// Most frames remembered.
-    pub replay: usize,
-    /// Windows in a batch.
-    pub windows: usize,
-    /// Consecutive frames in a window.
-    pub window: usize,
-    /// Updates in all.
-    pub updates: u64,
-    /// What values are fitted to.
-    pub target: Target,
-    /// Optimiser.
-    pub optimiser: Rule,
-    /// Largest norm of a gradient.
-    pub clip: f64,
-    /// Share of the learning rate left at the end; the way there is a half cosine. 1: constant.
-    pub final_rate: f64,
-    /// Share of random actions at first.
-    pub first_epsilon: f64,
-    /// Share of random actions at last.
-    pub last_epsilon: f64,
-    /// Frames over which the first decays exponentially to the last.
-    pub epsilon_frames: u64,
-    /// Share of the online network that the target network takes over an update.
-    pub target_share: f64,
-    /// Share of scans that differ from the reference in speed, spot, noise, exposure, lens.
-    pub variety: f64,
-    /// Share of scans on which the policy is led astray.
-    pub wandering: f64,
-}
-
-impl DqnRecipe {
-    /// Share of random actions after `frames` frames.
-    #[must_use]
-    pub fn epsilon(&self, frames: u64) -> f64 {
-        let done = (frames as f64 / self.epsilon_frames.max(1) as f64).min(1.0);
-        self.first_epsilon * (self.last_epsilon / self.first_epsilon).powf(done)
-    }
-}
 
 /// A training in progress.
 pub struct DqnTrainer {
@@ -121,17 +51,6 @@ struct Seat {
     frames_left: u16,
     history: Vec<f32>,
     focal_powers: Vec<f32>,
-}
-
-/// Windows as tensors, and the states in them that have a next frame.
-struct Batch {
-    /// `[F, 1024]` or `[F, 1]`: all windows' frames.
-    frames: Tensor,
-    /// `[F]`: scaled focal powers.
-    focal_powers: Tensor,
-    steps: Vec<Step>,
-    /// Frames that are states: their history lies in their window.
-    states: Vec<usize>,
 }
 
 impl DqnTrainer {
@@ -342,47 +261,6 @@ impl DqnTrainer {
             }
         }
     }
-}
-
-/// Frames of its own scan that a step's state reaches back.
-fn reach(step: &Step) -> usize {
-    usize::from(step.age).min(HISTORY - 1)
-}
-
-/// What each action would gain at the next frame over standing still, in steps.
-fn gains(step: &Step) -> [f32; ACTIONS] {
-    let (stands, best) = (FocalPower::nearest(f64::from(step.focal_power)), f64::from(step.next_optimum));
-    let error = |action| (stands.moved(action_step(action)).get() - best).abs();
-    std::array::from_fn(|action| ((error(1) - error(action)) / STEP) as f32)
-}
-
-/// The states whose successors `steps` frames on are in the batch, as (row, action taken), and their targets.
-fn bellman(
-    batch: &Batch,
-    next_values: &[f32],
-    discount: f64,
-    steps: usize,
-    window: usize,
-) -> (Vec<(i64, i64)>, Vec<f32>) {
-    let mut row_of = vec![None; batch.steps.len()];
-    for (row, &at) in batch.states.iter().enumerate() {
-        row_of[at] = Some(row);
-    }
-    let (mut taken, mut wanted) = (Vec::new(), Vec::new());
-    for (row, &at) in batch.states.iter().enumerate() {
-        let end = at + steps;
-        let same_scan = end / window == at / window
-            && usize::from(batch.steps[end].age) == usize::from(batch.steps[at].age) + steps;
-        let Some(last) = same_scan.then(|| row_of[end]).flatten() else { continue };
-        let mut sum = discount.powi(steps as i32) * f64::from(next_values[last]);
-        for ahead in 0..steps {
-            let (now, next) = (&batch.steps[at + ahead], &batch.steps[at + ahead + 1]);
-            sum -= discount.powi(ahead as i32) * f64::from((now.next_optimum - next.focal_power).abs());
-        }
-        taken.push((row as i64, i64::from(batch.steps[at].action)));
-        wanted.push(sum as f32);
-    }
-    (taken, wanted)
 }
 
 impl Seat {

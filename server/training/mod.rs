@@ -5,6 +5,8 @@ pub mod checkpoint;
 pub mod clip;
 pub mod defocus;
 pub mod dqn;
+mod dqn_batch;
+pub mod dqn_recipe;
 pub mod evaluate;
 pub mod footage;
 pub mod optimiser;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::belief::BeliefRecipe;
-use super::dqn::DqnRecipe;
+use super::dqn_recipe::DqnRecipe;
 
 /// All that a training is made by, besides its seed and its footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -60,7 +60,10 @@ impl OptotuneLens {
         let (theirs, path_of_thread) = (shared.clone(), path.to_owned());
         let thread = std::thread::Builder::new()
             .name("lens".into())
-            .spawn(move || worker::run(&theirs, &path_of_thread, &settings))
+            .spawn(move || {
+                crate::priority::raise();
+                worker::run(&theirs, &path_of_thread, &settings);
+            })
             .map_err(system)?;
         let mut lens = Self {
             shared,
