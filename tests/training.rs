@@ -35,9 +35,9 @@ fn train(recipe: &Recipe, folder: &Path, legs: u64, resume: bool) -> bool {
 #[test]
 fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    let mut recipe = small("mgm-learned", 600);
-    if let Some(dqn) = &mut recipe.dqn {
-        (dqn.windows, dqn.window, dqn.frames_an_update) = (16, 32, 64);
+    let mut recipe = small("parfocal", 500);
+    if let Some(belief) = &mut recipe.belief {
+        belief.scans = 32;
     }
     assert!(train(&recipe, folder.path(), u64::MAX, false));
     let curves = std::fs::read_to_string(folder.path().join("curves.csv")).unwrap();

@@ -46,7 +46,7 @@ impl Kernel {
     pub(super) fn new(mix: &Mix<4>) -> Option<Self> {
         let able = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
         able.then(|| {
-            let scales = mix.weights.map(|row| WEIGHT_SUM / row.iter().map(|w| w.abs()).sum::<f32>().max(1e-30));
+            let scales = mix.weights.map(scale);
             let weights: [[i16; CELL * CELL]; 4] =
                 std::array::from_fn(|k| mix.weights[k].map(|weight| (weight * scales[k]).round() as i16));
             let pairs = |values: [f32; 4]| {
@@ -74,6 +74,14 @@ impl Kernel {
         // SAFETY: a kernel exists only where `new` found AVX2 and FMA.
         unsafe { row(self, encoder, rows, rgb, gray) }
     }
+}
+
+/// What an output's weights are multiplied by to become integers: such that the largest is one exactly, and so are all if they
+/// are equal, as gray's often are.
+fn scale(weights: [f32; CELL * CELL]) -> f32 {
+    let largest = weights.iter().fold(1e-30f32, |largest, weight| largest.max(weight.abs()));
+    let sum = weights.iter().map(|weight| weight.abs()).sum::<f32>().max(1e-30);
+    (WEIGHT_SUM / sum * largest).floor() / largest
 }
 
 // No closures in here: one that is passed on is compiled without these instructions, and then not inlined.
