@@ -48,7 +48,7 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
 
 #[test]
 fn training_resumed_is_training_never_stopped() {
-    for policy in ["mgm-learned", "parfocal"] {
+    for policy in ["mgm-learned", "cnn-learned", "parfocal"] {
         let recipe = small(policy, 2 * LEG);
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         assert!(train(&recipe, whole.path(), u64::MAX, false));

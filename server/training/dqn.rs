@@ -11,31 +11,27 @@ use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tch::{Device, Kind, Reduction, Tensor, nn};
+use tch::{Device, Reduction, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
 use super::dqn_batch::{Batch, bellman, gains, reach};
 use super::dqn_recipe::{DqnRecipe, Target};
-use super::optimiser::Optimiser;
-use super::replay::{Replay, Seen, Step};
+use super::optimiser::{Flat, Optimiser};
+use super::replay::{Frames, Replay, Seen, Step};
 use super::scan::Variety;
 use super::session::{Session, lead_astray};
-use crate::autofocus::learned::{Sight, ValueNetwork, action_step, best_action, scaled_focal_power};
+use super::values::Values;
+use crate::autofocus::learned::{Sight, action_step, best_action, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
-use crate::imaging::PATCH_SIDE;
-
-const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
 
 /// A training in progress.
 pub struct DqnTrainer {
     recipe: DqnRecipe,
     clips: Vec<Arc<Clip>>,
-    /// The variables of the network that is trained.
-    pub store: nn::VarStore,
-    network: ValueNetwork,
-    target_store: nn::VarStore,
-    target: ValueNetwork,
+    online: Values,
+    target: Values,
+    target_variables: Flat,
     optimiser: Optimiser,
     seats: Vec<Seat>,
     replay: Replay,
@@ -59,12 +55,11 @@ impl DqnTrainer {
     pub fn new(sight: Sight, recipe: DqnRecipe, clips: Vec<Arc<Clip>>, seed: u64) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let (store, mut target_store) = (nn::VarStore::new(Device::Cpu), nn::VarStore::new(Device::Cpu));
-        let network = ValueNetwork::new(&store.root(), sight);
-        let target = ValueNetwork::new(&target_store.root(), sight);
-        target_store.freeze();
-        tch::no_grad(|| blend(&target_store, &store, 1.0));
-        let optimiser = Optimiser::new(recipe.optimiser, &store);
+        let (online, mut target) = (Values::new(sight, Device::Cpu), Values::new(sight, Device::Cpu));
+        target.store.freeze();
+        let optimiser = Optimiser::new(recipe.optimiser, &online.store);
+        let mut target_variables = Flat::of(&target.store);
+        target_variables.approach(optimiser.flat(), 1.0);
         let seats = (0..recipe.scans)
             .map(|_| {
                 let mut seat = Seat::draw(&recipe, &clips, &mut rng);
@@ -75,7 +70,13 @@ impl DqnTrainer {
             .collect();
         let replay = Replay::new(recipe.replay, recipe.scans);
         let (updates, frames) = (0, 0);
-        Self { recipe, clips, store, network, target_store, target, optimiser, seats, replay, rng, updates, frames }
+        Self { recipe, clips, online, target, target_variables, optimiser, seats, replay, rng, updates, frames }
+    }
+
+    /// The variables of the network that is trained.
+    #[must_use]
+    pub const fn store(&self) -> &nn::VarStore {
+        &self.online.store
     }
 
     /// Updates done.
@@ -108,8 +109,8 @@ impl DqnTrainer {
 
     /// Adds all that [`DqnTrainer::restore`] needs, between two legs.
     pub fn save(&self, checkpoint: &mut Checkpoint) {
-        checkpoint.put_store("network", &self.store);
-        checkpoint.put_store("target", &self.target_store);
+        checkpoint.put_store("network", &self.online.store);
+        checkpoint.put_store("target", &self.target.store);
         self.optimiser.save(checkpoint);
         self.replay.save(checkpoint);
         checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
@@ -121,8 +122,8 @@ impl DqnTrainer {
     /// # Errors
     /// When the checkpoint is of another training.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        checkpoint.fill_store("network", &self.store)?;
-        checkpoint.fill_store("target", &self.target_store)?;
+        checkpoint.fill_store("network", &self.online.store)?;
+        checkpoint.fill_store("target", &self.target.store)?;
         self.optimiser.restore(checkpoint)?;
         self.replay.restore(checkpoint)?;
         self.updates = checkpoint.number("updates")?;
@@ -137,13 +138,15 @@ impl DqnTrainer {
             tch::no_grad(|| self.play_a_frame());
         }
         let batch = self.batch();
-        let loss = self.loss(&batch);
+        let encodings = self.online.encode(&batch.frames);
+        let loss = self.loss(&batch, &encodings);
+        let gradient = self.online.gradient(self.optimiser.flat(), &loss, &encodings, &batch.frames);
         let done = (self.updates as f64 / self.recipe.updates as f64).min(1.0);
         let floor = self.recipe.final_rate;
         let rate = floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
-        self.optimiser.minimise(&loss, self.recipe.clip, rate);
+        self.optimiser.descend(gradient, self.recipe.clip, rate);
         if matches!(self.recipe.target, Target::Bellman { .. }) {
-            tch::no_grad(|| blend(&self.target_store, &self.store, self.recipe.target_share));
+            self.target_variables.approach(self.optimiser.flat(), self.recipe.target_share);
         }
         self.updates += 1;
         loss.double_value(&[])
@@ -151,7 +154,7 @@ impl DqnTrainer {
 
     /// Every seat sees a frame, acts, and goes on.
     fn play_a_frame(&mut self) {
-        let sight = self.network.sight;
+        let sight = self.online.network.sight;
         let seen: Vec<Seen> = self
             .seats
             .iter_mut()
@@ -160,7 +163,11 @@ impl DqnTrainer {
                 sight.metric(&patch).map_or_else(|| Seen::patch(&patch), |metric| Seen::Metric(sight.scaled(metric)))
             })
             .collect();
-        let encodings = self.network.encode(&as_tensor(&seen));
+        let mut frames = Frames::default();
+        for seen in &seen {
+            frames.push(seen);
+        }
+        let encodings = self.online.encode(&frames);
         let count = self.seats.len() as i64;
         let mut flat = vec![0.0f32; encodings.numel()];
         encodings.contiguous().view([-1]).copy_data(&mut flat, encodings.numel());
@@ -172,7 +179,7 @@ impl DqnTrainer {
             let all: Vec<f32> = self.seats.iter().flat_map(|seat| part(seat).iter().copied()).collect();
             Tensor::from_slice(&all).view([count, -1])
         };
-        let values = self.network.values(&gather(|seat| &seat.history), &gather(|seat| &seat.focal_powers));
+        let values = self.online.network.values(&gather(|seat| &seat.history), &gather(|seat| &seat.focal_powers));
         let mut flat = vec![0.0f32; self.seats.len() * ACTIONS];
         values.view([-1]).copy_data(&mut flat, self.seats.len() * ACTIONS);
         let epsilon = self.recipe.epsilon(self.frames);
@@ -204,27 +211,22 @@ impl DqnTrainer {
 
     fn batch(&mut self) -> Batch {
         let length = self.recipe.window;
-        let (mut patches, mut metrics, mut steps) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut frames, mut steps) = (Frames::default(), Vec::new());
         let mut left = self.recipe.windows;
         while left > 0 {
             if let Some(window) = self.replay.draw(length, &mut self.rng) {
-                self.replay.read(window, length, &mut patches, &mut metrics, &mut steps);
+                self.replay.read(window, length, &mut frames, &mut steps);
                 left -= 1;
             }
         }
-        let frames = if metrics.is_empty() {
-            Tensor::from_slice(&patches).view([-1, PIXELS as i64]).to_kind(Kind::Float)
-        } else {
-            Tensor::from_slice(&metrics).view([-1, 1])
-        };
         let focal_powers: Vec<f32> = steps.iter().map(|step| scaled_focal_power(f64::from(step.focal_power))).collect();
         let whole = |at: &usize| at % length >= reach(&steps[*at]);
         let states = (0..steps.len()).filter(whole).collect();
         Batch { frames, focal_powers: Tensor::from_slice(&focal_powers), steps, states }
     }
 
-    /// Values `[S, 3]` of all of the batch's states by `network`.
-    fn values(network: &ValueNetwork, batch: &Batch) -> Tensor {
+    /// Values `[S, 3]` of all of the batch's states by `network`, from its encodings of the batch's frames.
+    fn values(network: &Values, batch: &Batch, encodings: &Tensor) -> Tensor {
         let history: Vec<i64> = batch
             .states
             .iter()
@@ -235,12 +237,12 @@ impl DqnTrainer {
             .collect();
         let history = Tensor::from_slice(&history);
         let count = batch.states.len() as i64;
-        let encodings = network.encode(&batch.frames).index_select(0, &history).view([count, -1]);
-        network.values(&encodings, &batch.focal_powers.index_select(0, &history).view([count, -1]))
+        let encodings = encodings.index_select(0, &history).view([count, -1]);
+        network.network.values(&encodings, &batch.focal_powers.index_select(0, &history).view([count, -1]))
     }
 
-    fn loss(&self, batch: &Batch) -> Tensor {
-        let values = Self::values(&self.network, batch);
+    fn loss(&self, batch: &Batch, encodings: &Tensor) -> Tensor {
+        let values = Self::values(&self.online, batch, encodings);
         match self.recipe.target {
             Target::Lookahead => {
                 let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[at])).collect();
@@ -248,7 +250,7 @@ impl DqnTrainer {
                 values.smooth_l1_loss(&wanted, Reduction::Mean, 1.0)
             }
             Target::Bellman { discount, steps, double } => {
-                let target = tch::no_grad(|| Self::values(&self.target, batch));
+                let target = tch::no_grad(|| Self::values(&self.target, batch, &self.target.encode(&batch.frames)));
                 let picker = if double { values.detach() } else { target.shallow_clone() };
                 let next = target.gather(1, &picker.argmax(1, true), false).view([-1]);
                 let mut next_values = vec![0.0f32; batch.states.len()];
@@ -285,34 +287,6 @@ impl Seat {
             self.history.extend_from_slice(encoding);
             self.focal_powers.remove(0);
             self.focal_powers.push(focal_power);
-        }
-    }
-}
-
-/// Frames in their compact form as one float tensor, `[N, 1024]` or `[N, 1]`.
-fn as_tensor(seen: &[Seen]) -> Tensor {
-    let count = seen.len() as i64;
-    let (mut bytes, mut metrics) = (Vec::new(), Vec::new());
-    for frame in seen {
-        match frame {
-            Seen::Patch(patch) => bytes.extend_from_slice(patch),
-            Seen::Metric(metric) => metrics.push(*metric),
-        }
-    }
-    if metrics.is_empty() {
-        Tensor::from_slice(&bytes).view([count, -1]).to_kind(Kind::Float)
-    } else {
-        Tensor::from_slice(&metrics).view([count, 1])
-    }
-}
-
-/// Moves every variable of `slow` towards that of `fast` by `share`.
-fn blend(slow: &nn::VarStore, fast: &nn::VarStore, share: f64) {
-    let fast = fast.variables();
-    for (name, mut variable) in slow.variables() {
-        if let Some(towards) = fast.get(&name) {
-            let step = (towards - &variable) * share;
-            let _ = variable.g_add_(&step);
         }
     }
 }

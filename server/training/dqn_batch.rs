@@ -8,7 +8,7 @@
 
 use tch::Tensor;
 
-use super::replay::Step;
+use super::replay::{Frames, Step};
 use crate::autofocus::STEP;
 use crate::autofocus::learned::action_step;
 use crate::autofocus::networks::{ACTIONS, HISTORY};
@@ -16,8 +16,8 @@ use crate::lens::FocalPower;
 
 /// Windows as tensors, and the states in them that have a next frame.
 pub(super) struct Batch {
-    /// `[F, 1024]` or `[F, 1]`: all windows' frames.
-    pub frames: Tensor,
+    /// All windows' frames.
+    pub frames: Frames,
     /// `[F]`: scaled focal powers.
     pub focal_powers: Tensor,
     pub steps: Vec<Step>,

@@ -1,6 +1,6 @@
 //! Optimisers whose whole state can be saved, so that training resumed goes on exactly as training never stopped.
 
-use tch::{Kind, Tensor, nn};
+use tch::{Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 
@@ -22,49 +22,105 @@ pub enum Rule {
     },
 }
 
+/// A store's variables as views of one tensor, in the order of their names: what is done to all of them is one operation.
+#[derive(Debug)]
+pub struct Flat {
+    /// The variables.
+    pub variables: Vec<Tensor>,
+    /// All their values, one after another.
+    pub values: Tensor,
+}
+
+impl Flat {
+    /// Moves the variables of `store` into one tensor.
+    #[must_use]
+    pub fn of(store: &nn::VarStore) -> Self {
+        let mut named: Vec<(String, Tensor)> = store.variables().into_iter().collect();
+        named.sort_by(|a, b| a.0.cmp(&b.0));
+        let mut variables: Vec<Tensor> = named.into_iter().map(|(_, tensor)| tensor).collect();
+        let values = tch::no_grad(|| joined(&variables));
+        for (part, variable) in parts(&values, &variables).iter().zip(&mut variables) {
+            variable.set_data(part);
+        }
+        Self { variables, values }
+    }
+
+    /// Moves all variables towards those of `other`, of the same network, by `share`.
+    pub fn approach(&mut self, other: &Self, share: f64) {
+        let _ = self.values.lerp_(&other.values, share);
+    }
+
+    /// The gradient of `loss` by all variables, as one tensor.
+    pub fn gradient(&self, loss: &Tensor) -> Tensor {
+        joined(&Tensor::run_backward(&[loss], &self.variables, false, false))
+    }
+}
+
+/// All tensors' values, one after another.
+pub fn joined(tensors: &[Tensor]) -> Tensor {
+    let flat: Vec<Tensor> = tensors.iter().map(|tensor| tensor.reshape([-1])).collect();
+    Tensor::cat(&flat, 0)
+}
+
+/// `values` as views that lie one after another and have the shapes of `variables`.
+fn parts(values: &Tensor, variables: &[Tensor]) -> Vec<Tensor> {
+    let mut at = 0;
+    let part = |variable: &Tensor| {
+        let length = variable.size().iter().product();
+        at += length;
+        values.narrow(0, at - length, length).view_as(variable)
+    };
+    variables.iter().map(part).collect()
+}
+
 /// An optimiser over all variables of a store.
 #[derive(Debug)]
 pub struct Optimiser {
     rule: Rule,
-    variables: Vec<Tensor>,
-    /// Two running averages for each variable: of squared gradients; of gradients or steps.
-    state: Vec<[Tensor; 2]>,
+    flat: Flat,
+    /// Running averages: of squared gradients; of gradients or steps.
+    state: [Tensor; 2],
     steps: i32,
 }
 
 impl Optimiser {
-    /// An optimiser of `store`'s variables, in the order of their names.
+    /// An optimiser of `store`'s variables, which it moves into one tensor.
     #[must_use]
     pub fn new(rule: Rule, store: &nn::VarStore) -> Self {
-        let mut named: Vec<(String, Tensor)> = store.variables().into_iter().collect();
-        named.sort_by(|a, b| a.0.cmp(&b.0));
-        let variables: Vec<Tensor> = named.into_iter().map(|(_, tensor)| tensor).collect();
-        let state = variables.iter().map(|v| [v.zeros_like(), v.zeros_like()].map(|t| t.detach())).collect();
-        Self { rule, variables, state, steps: 0 }
+        let flat = Flat::of(store);
+        let state = [flat.values.zeros_like(), flat.values.zeros_like()];
+        Self { rule, flat, state, steps: 0 }
+    }
+
+    /// The variables.
+    #[must_use]
+    pub const fn flat(&self) -> &Flat {
+        &self.flat
     }
 
     /// One step down the gradient of `loss`, its norm clipped to `clip`, the step size scaled by `scale`.
     pub fn minimise(&mut self, loss: &Tensor, clip: f64, scale: f64) {
-        for variable in &mut self.variables {
-            variable.zero_grad();
-        }
-        loss.backward();
+        let gradient = self.flat.gradient(loss);
+        self.descend(gradient, clip, scale);
+    }
+
+    /// One step down `gradient`, by all variables in the order of their names.
+    pub fn descend(&mut self, mut gradient: Tensor, clip: f64, scale: f64) {
         tch::no_grad(|| {
-            let squares: f64 =
-                self.variables.iter().map(|v| v.grad().square().sum(Kind::Float).double_value(&[])).sum();
-            let shrink = (clip / (squares.sqrt() + 1e-6)).min(1.0);
-            self.steps += 1;
-            for (variable, [squared, averaged]) in self.variables.iter_mut().zip(&mut self.state) {
-                let gradient = variable.grad() * shrink;
-                apply(self.rule, self.steps, scale, variable, &gradient, squared, averaged);
+            let shrink = clip / (gradient.norm().double_value(&[]) + 1e-6);
+            if shrink < 1.0 {
+                let _ = gradient.g_mul_scalar_(shrink);
             }
+            self.steps += 1;
+            let [squared, averaged] = &mut self.state;
+            apply(self.rule, self.steps, scale, &mut self.flat.values, &gradient, squared, averaged);
         });
     }
 
-    /// Adds the optimiser's state to a checkpoint.
+    /// Adds the optimiser's state to a checkpoint: both averages, variable by variable.
     pub fn save(&self, checkpoint: &mut Checkpoint) {
-        for (index, tensor) in self.state.iter().flatten().enumerate() {
-            checkpoint.put_tensor(&format!("optimiser.{index}"), tensor);
+        for (name, tensor) in self.named_state() {
+            checkpoint.put_tensor(&name, &tensor);
         }
         checkpoint.notes.insert("steps".to_owned(), self.steps.to_string());
     }
@@ -74,11 +130,17 @@ impl Optimiser {
     /// # Errors
     /// When the checkpoint is of another network.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        for (index, tensor) in self.state.iter_mut().flatten().enumerate() {
-            checkpoint.fill(&format!("optimiser.{index}"), tensor)?;
+        for (name, mut tensor) in self.named_state() {
+            checkpoint.fill(&name, &mut tensor)?;
         }
         self.steps = checkpoint.number("steps")?;
         Ok(())
+    }
+
+    fn named_state(&self) -> Vec<(String, Tensor)> {
+        let [squared, averaged] = self.state.each_ref().map(|values| parts(values, &self.flat.variables));
+        let both = squared.into_iter().zip(averaged).flat_map(<[Tensor; 2]>::from);
+        both.enumerate().map(|(index, tensor)| (format!("optimiser.{index}"), tensor)).collect()
     }
 }
 
@@ -86,23 +148,25 @@ fn apply(
     rule: Rule,
     steps: i32,
     scale: f64,
-    variable: &mut Tensor,
+    variables: &mut Tensor,
     gradient: &Tensor,
     squared: &mut Tensor,
     averaged: &mut Tensor,
 ) {
     match rule {
         Rule::RmsProp { learning_rate, momentum } => {
-            let _ = squared.g_mul_scalar_(0.99).g_add_(&(gradient * gradient * 0.01));
-            let _ = averaged.g_mul_scalar_(momentum).g_add_(&(gradient / (squared.sqrt() + 1e-8)));
-            let _ = variable.g_sub_(&(&*averaged * (learning_rate * scale)));
+            let _ = squared.lerp_(&gradient.square(), 0.01);
+            let _ = averaged.g_mul_scalar_(momentum).addcdiv_(gradient, &squared.sqrt().g_add_scalar_(1e-8));
+            let _ = variables.g_sub_(&(&*averaged * (learning_rate * scale)));
         }
         Rule::Adam { learning_rate } => {
-            let _ = squared.g_mul_scalar_(0.999).g_add_(&(gradient * gradient * 0.001));
-            let _ = averaged.g_mul_scalar_(0.9).g_add_(&(gradient * 0.1));
+            let _ = squared.lerp_(&gradient.square(), 0.001);
+            let _ = averaged.lerp_(gradient, 0.1);
             let (first, second) = (1.0 - 0.9f64.powi(steps), 1.0 - 0.999f64.powi(steps));
-            let step = (&*averaged / first) / ((&*squared / second).sqrt() + 1e-8);
-            let _ = variable.g_sub_(&(step * (learning_rate * scale)));
+            // The step is averaged / first / (sqrt(squared / second) + epsilon), its factors drawn together.
+            let rate = learning_rate * scale * second.sqrt() / first;
+            let spread = squared.sqrt().g_add_scalar_(1e-8 * second.sqrt());
+            let _ = variables.addcdiv_(&(&*averaged * -rate), &spread);
         }
     }
 }

@@ -36,6 +36,25 @@ impl Seen {
     }
 }
 
+/// What was seen of many frames, in its compact form: patches, 1024 bytes each, or scaled metrics.
+#[derive(Debug, Default)]
+pub struct Frames {
+    /// All frames' patches.
+    pub patches: Vec<u8>,
+    /// All frames' scaled metrics.
+    pub metrics: Vec<f32>,
+}
+
+impl Frames {
+    /// Adds a frame.
+    pub fn push(&mut self, seen: &Seen) {
+        match seen {
+            Seen::Patch(patch) => self.patches.extend_from_slice(patch),
+            Seen::Metric(metric) => self.metrics.push(*metric),
+        }
+    }
+}
+
 /// Frames of many scans, each seat's in a ring of its own.
 #[derive(Debug)]
 pub struct Replay {
@@ -172,23 +191,14 @@ impl Replay {
     }
 
     /// Appends what was seen in `window`, and its steps, to the given lists.
-    pub fn read(
-        &self,
-        window: Window,
-        length: usize,
-        patches: &mut Vec<u8>,
-        metrics: &mut Vec<f32>,
-        steps: &mut Vec<Step>,
-    ) {
+    pub fn read(&self, window: Window, length: usize, frames: &mut Frames, steps: &mut Vec<Step>) {
         let ring = &self.seats[window.seat];
         let patch = ring.patches.len() / ring.steps.len().max(1);
         for offset in 0..length {
             let at = (ring.head + window.start + offset) % ring.steps.len();
             steps.push(ring.steps[at]);
-            patches.extend_from_slice(&ring.patches[at * patch..(at + 1) * patch]);
-            if let Some(metric) = ring.metrics.get(at) {
-                metrics.push(*metric);
-            }
+            frames.patches.extend_from_slice(&ring.patches[at * patch..(at + 1) * patch]);
+            frames.metrics.extend(ring.metrics.get(at));
         }
     }
 }
@@ -210,10 +220,10 @@ mod tests {
         let mut oldest = u16::MAX;
         for _ in 0..200 {
             let Some(window) = replay.draw(4, &mut rng) else { continue };
-            let (mut metrics, mut steps) = (Vec::new(), Vec::new());
-            replay.read(window, 4, &mut Vec::new(), &mut metrics, &mut steps);
+            let (mut frames, mut steps) = (Frames::default(), Vec::new());
+            replay.read(window, 4, &mut frames, &mut steps);
             assert!(steps.windows(2).all(|pair| pair[1].age == pair[0].age + 1));
-            let mut pairs = steps.iter().zip(&metrics);
+            let mut pairs = steps.iter().zip(&frames.metrics);
             assert!(pairs.all(|(step, metric)| (f32::from(step.age) - *metric).abs() < f32::EPSILON));
             oldest = oldest.min(steps[0].age);
         }

@@ -196,7 +196,7 @@ impl Run {
     /// The present weights, with where they come from.
     fn weights(&self) -> Result<Vec<u8>, TrainError> {
         let store = match &self.learner {
-            Learner::Dqn(dqn) => &dqn.store,
+            Learner::Dqn(dqn) => dqn.store(),
             Learner::Belief(belief) => &belief.store,
         };
         let made = format!(

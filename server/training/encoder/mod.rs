@@ -1,0 +1,94 @@
+//! The paper's CNN encoder for training on the processor, its gradients written by hand. `networks::Encoder`, which works
+//! on every device and in the live loop, is the reference that it is tested against.
+
+mod kernels;
+#[cfg(test)]
+mod tests;
+
+use tch::{Device, Tensor, nn};
+
+use kernels::{FILTERS, Lanes, TAPS, Weights};
+
+/// Layers of the encoder, by their names in a store.
+const LAYERS: [&str; 4] = ["0", "2", "4", "6"];
+
+/// An encoder that computes with the variables that a store holds at the time.
+#[derive(Debug)]
+pub struct Encoder {
+    /// Bias and weight of each layer, shared with the store.
+    variables: [[Tensor; 2]; 4],
+}
+
+impl Encoder {
+    /// How many variables an encoder has.
+    pub const VARIABLES: usize = 2 * LAYERS.len();
+
+    /// The encoder whose variables lie under `path` in `store`; `None` where there is none, or not on the processor.
+    #[must_use]
+    pub fn of(store: &nn::VarStore, path: &str) -> Option<Self> {
+        if store.device() != Device::Cpu {
+            return None;
+        }
+        let mut variables = store.variables();
+        let mut take = |layer: &str, part: &str| variables.remove(&format!("{path}.{layer}.{part}"));
+        let mut layer = |name: &str| Some([take(name, "bias")?, take(name, "weight")?]);
+        let [first, second, third, fourth] = LAYERS;
+        Some(Self { variables: [layer(first)?, layer(second)?, layer(third)?, layer(fourth)?] })
+    }
+
+    /// Encodings `[N, 8]` of patches `[N, 1024]`, row after row.
+    #[must_use]
+    pub fn encode(&self, patches: &[u8]) -> Vec<f32> {
+        let patches = patches.as_chunks().0;
+        let mut encodings = vec![Lanes::default(); patches.len()];
+        kernels::encode(&self.weights(), patches, &mut encodings);
+        encodings.into_flattened()
+    }
+
+    /// The gradient by all variables, laid out one after another in the order of their names, of a loss whose gradient by
+    /// the encodings `[N, 8]` of patches `[N, 1024]` is `slopes`.
+    #[must_use]
+    pub fn gradient(&self, patches: &[u8], slopes: &[f32]) -> Vec<f32> {
+        let mut gradient = Weights::default();
+        kernels::add_gradients(&self.weights(), patches.as_chunks().0, slopes.as_chunks().0, &mut gradient);
+        flat(&gradient)
+    }
+
+    fn weights(&self) -> Weights {
+        let mut weights = Weights::default();
+        for (layer, [bias, weight]) in self.variables.iter().enumerate() {
+            bias.copy_data(&mut weights.biases[layer], FILTERS);
+            // Filter by filter, channel by channel, tap by tap.
+            let mut values = [0.0f32; FILTERS * FILTERS * TAPS];
+            weight.copy_data(&mut values, weight.numel());
+            let channels = weight.numel() / (FILTERS * TAPS);
+            for (index, value) in values[..weight.numel()].iter().enumerate() {
+                *weights.slot(layer, index, channels) = *value;
+            }
+        }
+        weights
+    }
+}
+
+/// In the order of the variables' names, each as `PyTorch` lays it out.
+fn flat(weights: &Weights) -> Vec<f32> {
+    let mut weights = weights.clone();
+    let mut all = Vec::with_capacity(4 * FILTERS + (1 + 3 * FILTERS) * FILTERS * TAPS);
+    for layer in 0..LAYERS.len() {
+        let channels = if layer == 0 { 1 } else { FILTERS };
+        all.extend(weights.biases[layer]);
+        all.extend((0..FILTERS * channels * TAPS).map(|index| *weights.slot(layer, index, channels)));
+    }
+    all
+}
+
+impl Weights {
+    /// The weight that `PyTorch` has at `index` in a layer of `channels` input channels.
+    fn slot(&mut self, layer: usize, index: usize, channels: usize) -> &mut f32 {
+        let (filter, channel, tap) = (index / (channels * TAPS), index / TAPS % channels, index % TAPS);
+        match layer {
+            0 => &mut self.first[tap][filter],
+            _ => &mut self.later[layer - 1][tap][channel][filter],
+        }
+    }
+}
