@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use parfocal::clock::SystemClock;
+use parfocal::training::checkpoint::Checkpoint;
 use parfocal::training::recipe::{Recipe, shipped};
 use parfocal::training::run::{LEG, Run};
 
@@ -27,7 +28,7 @@ fn small(policy: &str, updates: u64) -> Recipe {
 /// Trains for at most `legs` legs; returns whether the training is complete.
 fn train(recipe: &Recipe, folder: &Path, legs: u64, resume: bool) -> bool {
     tch::set_num_threads(1);
-    let mut run = Run::start(recipe.clone(), 7, Vec::new(), folder, resume).unwrap();
+    let mut run = Run::start(recipe.clone(), 7, Vec::new(), folder, resume, tch::Device::Cpu).unwrap();
     let left = Cell::new(legs);
     run.go(&SystemClock, &|| left.replace(left.get().saturating_sub(1)) == 0, &mut |_| ()).unwrap()
 }
@@ -53,6 +54,13 @@ fn training_resumed_is_training_never_stopped() {
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         assert!(train(&recipe, whole.path(), u64::MAX, false));
         assert!(!train(&recipe, parts.path(), 1, false));
+        let start = || Run::start(recipe.clone(), 7, Vec::new(), parts.path(), true, tch::Device::Cpu).unwrap();
+        assert_eq!(start().other_version(), None);
+        let file = parts.path().join("checkpoint.safetensors");
+        let mut checkpoint = Checkpoint::read(&file).unwrap();
+        checkpoint.notes.insert("version".to_owned(), "0.0.9".to_owned());
+        checkpoint.write(&file).unwrap();
+        assert_eq!(start().other_version(), Some("0.0.9"));
         assert!(train(&recipe, parts.path(), u64::MAX, true));
         for file in ["curves.csv", &format!("{policy}.safetensors")] {
             let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();

@@ -56,10 +56,7 @@ pub struct Arguments {
 /// When recipe, footage, folder or checkpoint are unusable.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     tch::set_num_threads(1);
-    if arguments.device == Compute::Cuda {
-        let reason = if tch::Cuda::is_available() { "trains on the processor only" } else { "has no CUDA" };
-        return Err(format!("this build {reason}; use --device cpu").into());
-    }
+    let device = device(arguments.device)?;
     let mut recipe = recipe(arguments)?;
     if let Some(updates) = arguments.updates {
         recipe = recipe.with_updates(updates);
@@ -69,7 +66,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         clips.extend(footage::clips(path)?);
     }
     let total = recipe.updates();
-    let mut run = Run::start(recipe, arguments.seed, clips, &arguments.out, arguments.resume)?;
+    let mut run = Run::start(recipe, arguments.seed, clips, &arguments.out, arguments.resume, device)?;
+    if let Some(version) = run.other_version() {
+        eprintln!(
+            "note: the checkpoint was made by parfocal {version}; what follows may differ from what it would have given"
+        );
+    }
     let stop = interrupt::flag(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());
     let mut validation = run.best();
@@ -86,6 +88,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         println!("stopped after {} of {total} updates; go on with --resume", run.updates());
     }
     Ok(())
+}
+
+fn device(compute: Compute) -> Result<tch::Device, Failure> {
+    match compute {
+        Compute::Cpu => Ok(tch::Device::Cpu),
+        Compute::Cuda if tch::Cuda::is_available() => Ok(tch::Device::Cuda(0)),
+        Compute::Cuda => {
+            Err("the libtorch in use has no CUDA, or finds no GPU; start parfocal with that of a PyTorch 2.11 \
+            for CUDA, as docs/training.md says, or use --device cpu"
+                .into())
+        }
+    }
 }
 
 fn recipe(arguments: &Arguments) -> Result<Recipe, Failure> {

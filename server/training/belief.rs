@@ -69,16 +69,16 @@ struct Batch {
 }
 
 impl BeliefTrainer {
-    /// A training from nothing on `clips`.
+    /// A training from nothing on `clips`, its network on `device`.
     #[must_use]
-    pub fn new(recipe: BeliefRecipe, clips: Vec<Arc<Clip>>, seed: u64) -> Self {
+    pub fn new(recipe: BeliefRecipe, clips: Vec<Arc<Clip>>, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let store = nn::VarStore::new(Device::Cpu);
+        let store = nn::VarStore::new(device);
         let network = BeliefNetwork::new(&store.root());
         let optimiser = Optimiser::new(recipe.optimiser, &store);
         let seats = (0..recipe.scans).map(|_| Seat::draw(&recipe, &clips, &mut rng)).collect();
-        let memory = network.blank(recipe.scans, Device::Cpu);
+        let memory = network.blank(recipe.scans, device);
         Self { recipe, clips, store, network, optimiser, seats, memory, rng, updates: 0 }
     }
 
@@ -96,7 +96,7 @@ impl BeliefTrainer {
             // Scans end one after another, not all at once.
             seat.windows_left = 1 + index % self.recipe.windows_a_scan;
         }
-        self.memory = self.network.blank(self.recipe.scans, Device::Cpu);
+        self.memory = self.network.blank(self.recipe.scans, self.store.device());
     }
 
     /// Adds all that [`BeliefTrainer::restore`] needs, between two legs.
@@ -135,7 +135,7 @@ impl BeliefTrainer {
     }
 
     fn collect(&mut self) -> Batch {
-        let (count, window) = (self.seats.len(), self.recipe.window);
+        let (count, window, device) = (self.seats.len(), self.recipe.window, self.store.device());
         let mut inputs = vec![0.0f32; count * window * BELIEF_INPUT];
         let mut beliefs = vec![0.0f32; count * window * BINS];
         let mut now = vec![0.0f32; count * BELIEF_INPUT];
@@ -147,7 +147,7 @@ impl BeliefTrainer {
                 now[index * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
                 inputs[(index * window + t) * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
             }
-            let tensor = Tensor::from_slice(&now).view([count as i64, 1, BELIEF_INPUT as i64]);
+            let tensor = Tensor::from_slice(&now).view([count as i64, 1, BELIEF_INPUT as i64]).to_device(device);
             let (logits, memory) = tch::no_grad(|| self.network.forward(&tensor, &self.memory));
             self.memory = memory;
             logits.view([-1, BINS as i64]).softmax(-1, Kind::Float).copy_data(&mut believed, count * BINS);
@@ -165,8 +165,8 @@ impl BeliefTrainer {
         }
         let (count, window) = (count as i64, window as i64);
         Batch {
-            inputs: Tensor::from_slice(&inputs).view([count, window, BELIEF_INPUT as i64]),
-            beliefs: Tensor::from_slice(&beliefs).view([count, window, BINS as i64]),
+            inputs: Tensor::from_slice(&inputs).view([count, window, BELIEF_INPUT as i64]).to_device(device),
+            beliefs: Tensor::from_slice(&beliefs).view([count, window, BINS as i64]).to_device(device),
         }
     }
 

@@ -15,7 +15,7 @@ use tch::{Device, Reduction, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
-use super::dqn_batch::{Batch, bellman, gains, reach};
+use super::dqn_batch::{Batch, bellman, gains};
 use super::dqn_recipe::{DqnRecipe, Target};
 use super::optimiser::{Flat, Optimiser};
 use super::replay::{Frames, Replay, Seen, Step};
@@ -50,12 +50,12 @@ struct Seat {
 }
 
 impl DqnTrainer {
-    /// A training from nothing on `clips`.
+    /// A training from nothing on `clips`, its networks on `device`.
     #[must_use]
-    pub fn new(sight: Sight, recipe: DqnRecipe, clips: Vec<Arc<Clip>>, seed: u64) -> Self {
+    pub fn new(sight: Sight, recipe: DqnRecipe, clips: Vec<Arc<Clip>>, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let (online, mut target) = (Values::new(sight, Device::Cpu), Values::new(sight, Device::Cpu));
+        let (online, mut target) = (Values::new(sight, device), Values::new(sight, device));
         target.store.freeze();
         let optimiser = Optimiser::new(recipe.optimiser, &online.store);
         let mut target_variables = Flat::of(&target.store);
@@ -152,6 +152,10 @@ impl DqnTrainer {
         loss.double_value(&[])
     }
 
+    fn device(&self) -> Device {
+        self.online.store.device()
+    }
+
     /// Every seat sees a frame, acts, and goes on.
     fn play_a_frame(&mut self) {
         let sight = self.online.network.sight;
@@ -175,9 +179,10 @@ impl DqnTrainer {
         for (seat, encoding) in self.seats.iter_mut().zip(flat.chunks_exact(width)) {
             seat.remember(encoding);
         }
+        let device = self.device();
         let gather = |part: fn(&Seat) -> &Vec<f32>| {
             let all: Vec<f32> = self.seats.iter().flat_map(|seat| part(seat).iter().copied()).collect();
-            Tensor::from_slice(&all).view([count, -1])
+            Tensor::from_slice(&all).view([count, -1]).to_device(device)
         };
         let values = self.online.network.values(&gather(|seat| &seat.history), &gather(|seat| &seat.focal_powers));
         let mut flat = vec![0.0f32; self.seats.len() * ACTIONS];
@@ -219,34 +224,22 @@ impl DqnTrainer {
                 left -= 1;
             }
         }
-        let focal_powers: Vec<f32> = steps.iter().map(|step| scaled_focal_power(f64::from(step.focal_power))).collect();
-        let whole = |at: &usize| at % length >= reach(&steps[*at]);
-        let states = (0..steps.len()).filter(whole).collect();
-        Batch { frames, focal_powers: Tensor::from_slice(&focal_powers), steps, states }
+        Batch::new(frames, steps, length, self.device())
     }
 
     /// Values `[S, 3]` of all of the batch's states by `network`, from its encodings of the batch's frames.
     fn values(network: &Values, batch: &Batch, encodings: &Tensor) -> Tensor {
-        let history: Vec<i64> = batch
-            .states
-            .iter()
-            .flat_map(|&at| {
-                let reach = reach(&batch.steps[at]);
-                (0..HISTORY).rev().map(move |back| (at - back.min(reach)) as i64)
-            })
-            .collect();
-        let history = Tensor::from_slice(&history);
-        let count = batch.states.len() as i64;
-        let encodings = encodings.index_select(0, &history).view([count, -1]);
-        network.network.values(&encodings, &batch.focal_powers.index_select(0, &history).view([count, -1]))
+        let encodings = encodings.index_select(0, &batch.history).view([batch.states.len() as i64, -1]);
+        network.network.values(&encodings, &batch.focal_powers)
     }
 
     fn loss(&self, batch: &Batch, encodings: &Tensor) -> Tensor {
         let values = Self::values(&self.online, batch, encodings);
+        let device = self.device();
         match self.recipe.target {
             Target::Lookahead => {
                 let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[at])).collect();
-                let wanted = Tensor::from_slice(&wanted).view([-1, ACTIONS as i64]);
+                let wanted = Tensor::from_slice(&wanted).view([-1, ACTIONS as i64]).to_device(device);
                 values.smooth_l1_loss(&wanted, Reduction::Mean, 1.0)
             }
             Target::Bellman { discount, steps, double } => {
@@ -257,9 +250,10 @@ impl DqnTrainer {
                 next.copy_data(&mut next_values, batch.states.len());
                 let (taken, wanted) = bellman(batch, &next_values, discount, steps, self.recipe.window);
                 let (rows, actions): (Vec<i64>, Vec<i64>) = taken.into_iter().unzip();
-                let chosen = values.index_select(0, &Tensor::from_slice(&rows));
-                let chosen = chosen.gather(1, &Tensor::from_slice(&actions).view([-1, 1]), false).view([-1]);
-                chosen.smooth_l1_loss(&Tensor::from_slice(&wanted), Reduction::Mean, 1.0)
+                let chosen = values.index_select(0, &Tensor::from_slice(&rows).to_device(device));
+                let actions = Tensor::from_slice(&actions).view([-1, 1]).to_device(device);
+                let chosen = chosen.gather(1, &actions, false).view([-1]);
+                chosen.smooth_l1_loss(&Tensor::from_slice(&wanted).to_device(device), Reduction::Mean, 1.0)
             }
         }
     }

@@ -6,11 +6,11 @@
     reason = "small counts as tensor sizes and shares"
 )]
 
-use tch::Tensor;
+use tch::{Device, Tensor};
 
 use super::replay::{Frames, Step};
 use crate::autofocus::STEP;
-use crate::autofocus::learned::action_step;
+use crate::autofocus::learned::{action_step, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
 use crate::lens::FocalPower;
 
@@ -18,15 +18,35 @@ use crate::lens::FocalPower;
 pub(super) struct Batch {
     /// All windows' frames.
     pub frames: Frames,
-    /// `[F]`: scaled focal powers.
+    /// `[8 S]`: of each state its latest eight frames, oldest first; before eight were seen, the first for those missing.
+    pub history: Tensor,
+    /// `[S, 8]`: the scaled focal powers at these.
     pub focal_powers: Tensor,
     pub steps: Vec<Step>,
     /// Frames that are states: their history lies in their window.
     pub states: Vec<usize>,
 }
 
+impl Batch {
+    /// A batch of `frames`, `window` of them in each window, for a network on `device`.
+    pub fn new(frames: Frames, steps: Vec<Step>, window: usize, device: Device) -> Self {
+        let states: Vec<usize> = (0..steps.len()).filter(|&at| at % window >= reach(&steps[at])).collect();
+        let latest = |&at: &usize| {
+            let reach = reach(&steps[at]);
+            (0..HISTORY).rev().map(move |back| at - back.min(reach))
+        };
+        let history: Vec<usize> = states.iter().flat_map(latest).collect();
+        let focal_powers: Vec<f32> =
+            history.iter().map(|&at| scaled_focal_power(f64::from(steps[at].focal_power))).collect();
+        let history: Vec<i64> = history.into_iter().map(|at| at as i64).collect();
+        let history = Tensor::from_slice(&history).to_device(device);
+        let focal_powers = Tensor::from_slice(&focal_powers).view([-1, HISTORY as i64]).to_device(device);
+        Self { frames, history, focal_powers, steps, states }
+    }
+}
+
 /// Frames of its own scan that a step's state reaches back.
-pub(super) fn reach(step: &Step) -> usize {
+fn reach(step: &Step) -> usize {
     usize::from(step.age).min(HISTORY - 1)
 }
 

@@ -7,6 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tch::Device;
+
 use super::belief::BeliefTrainer;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
@@ -23,6 +25,7 @@ use crate::clock::Clock;
 /// Updates between two moments at which a training may stop. All scans begin anew at each, so that none need be saved.
 pub const LEG: u64 = 100;
 const CHECKPOINT: &str = "checkpoint.safetensors";
+const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Why a training could not start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -75,11 +78,12 @@ pub struct Run {
     validation: Benchmark,
     curve: Vec<(u64, f64, Option<f64>)>,
     best: f64,
+    other_version: Option<String>,
 }
 
 impl Run {
     /// A training by `recipe` in `folder`; from its checkpoint where `resume` is set. Trains on `footage`, or on drawn
-    /// pictures where there is none.
+    /// pictures where there is none, with its networks on `device`.
     ///
     /// # Errors
     /// When the recipe fits no policy, the folder cannot be written, or there is no fitting checkpoint to resume.
@@ -89,6 +93,7 @@ impl Run {
         footage: Vec<Arc<Clip>>,
         folder: &Path,
         resume: bool,
+        device: Device,
     ) -> Result<Self, TrainError> {
         let design = design(&recipe)?;
         let unfit = |error: super::clip::ClipError| TrainError::Recipe(error.to_string());
@@ -99,16 +104,16 @@ impl Run {
             Benchmark { clips: held_out, settings: ScanSettings::reference(), seed: 1, count, frames: 250 };
         let learner = match (design, &recipe.dqn, &recipe.belief) {
             (Design::Values(sight), Some(dqn), _) => {
-                Learner::Dqn(Box::new(DqnTrainer::new(sight, dqn.clone(), clips, seed)))
+                Learner::Dqn(Box::new(DqnTrainer::new(sight, dqn.clone(), clips, seed, device)))
             }
             (Design::Belief, _, Some(belief)) => {
-                Learner::Belief(Box::new(BeliefTrainer::new(belief.clone(), clips, seed)))
+                Learner::Belief(Box::new(BeliefTrainer::new(belief.clone(), clips, seed, device)))
             }
             _ => return Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", recipe.policy))),
         };
         let folder = folder.to_owned();
-        let mut run =
-            Self { recipe, design, seed, folder, learner, validation, curve: Vec::new(), best: f64::INFINITY };
+        let (curve, best, other_version) = (Vec::new(), f64::INFINITY, None);
+        let mut run = Self { recipe, design, seed, folder, learner, validation, curve, best, other_version };
         if resume {
             run.restore()?;
         } else {
@@ -130,6 +135,13 @@ impl Run {
     #[must_use]
     pub const fn best(&self) -> f64 {
         self.best
+    }
+
+    /// The version of parfocal that made the checkpoint this training goes on from, where it is not this one: what follows
+    /// may differ from what would have followed there.
+    #[must_use]
+    pub fn other_version(&self) -> Option<&str> {
+        self.other_version.as_deref()
     }
 
     /// Trains to the end, or until `stop` says so between two legs; either way leaves a checkpoint. Returns whether the
@@ -199,13 +211,8 @@ impl Run {
             Learner::Dqn(dqn) => dqn.store(),
             Learner::Belief(belief) => &belief.store,
         };
-        let made = format!(
-            "{}, seed {}, {} updates, parfocal {}",
-            self.recipe.policy,
-            self.seed,
-            self.updates(),
-            env!("CARGO_PKG_VERSION")
-        );
+        let made =
+            format!("{}, seed {}, {} updates, parfocal {}", self.recipe.policy, self.seed, self.updates(), VERSION);
         weights::save(store, &made).map_err(|error| TrainError::Diverged(error.to_string()))
     }
 
@@ -239,7 +246,7 @@ impl Run {
              Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
              and layouts. Not a medical device.\n",
             self.recipe.policy,
-            env!("CARGO_PKG_VERSION"),
+            VERSION,
             self.seed,
             self.updates(),
             self.validation.count,
@@ -273,6 +280,7 @@ impl Run {
             Learner::Belief(belief) => belief.save(&mut checkpoint),
         }
         let mut note = |name: &str, value: String| checkpoint.notes.insert(name.to_owned(), value);
+        note("version", VERSION.to_owned());
         note("recipe", self.recipe_text());
         note("seed", self.seed.to_string());
         note("best", self.best.to_string());
@@ -294,6 +302,8 @@ impl Run {
         if checkpoint.notes.get("recipe") != Some(&self.recipe_text()) {
             return Err(CheckpointError::Unfit("it was made by another recipe".to_owned()).into());
         }
+        let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
+        self.other_version = (version != VERSION).then(|| version.to_owned());
         self.seed = checkpoint.number("seed")?;
         self.best = checkpoint.number("best")?;
         for line in checkpoint.notes.get("curve").into_iter().flat_map(|curve| curve.lines()) {
