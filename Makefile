@@ -35,7 +35,7 @@ readme:
 
 # Speed: each figure that the README states comes from here.
 bench:
-	cargo bench
+	cargo bench $(FEATURES)
 
 # A minute on each parser of bytes from outside (needs a nightly toolchain and cargo-fuzz).
 fuzz:

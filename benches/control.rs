@@ -1,5 +1,15 @@
-//! What a focus step costs: the metrics, each policy's step, and a whole step of the control loop.
+//! What a focus step costs: the metrics, each policy's step, and a whole step of the control loop; and how long the loop
+//! takes from exposure to lens command. `cargo bench --features aravis --bench control loop` measures the loop alone, with
+//! the phantom, and with Aravis's fake GigE Vision camera and the emulated lens driver.
 #![allow(missing_docs, clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "a benchmark")]
+
+#[cfg(feature = "aravis")]
+#[path = "control/devices.rs"]
+mod devices;
+#[cfg(feature = "aravis")]
+#[allow(dead_code, reason = "shared with tests")]
+#[path = "../tests/support/fake_camera.rs"]
+mod fake_camera;
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -7,9 +17,11 @@ use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use parfocal::autofocus::{Observation, PolicyName, Registry, mgm, mlr};
-use parfocal::camera::{self, CameraSettings, Frame, FrameImage};
+use parfocal::camera::{self, Camera, CameraSettings, Frame, FrameImage};
 use parfocal::clock::{Clock, SystemClock};
-use parfocal::control::{Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, Stepper};
+use parfocal::control::{
+    Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, StepRecord, Stepper,
+};
 use parfocal::imaging::{Calibration, GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage};
 use parfocal::lens::{FocalPower, Lens, SimulatedLens};
 
@@ -68,17 +80,25 @@ fn steps(criterion: &mut Criterion) {
     }
 }
 
-/// Exposure to lens command in the whole loop: phantom at 50 frames a second, telemetry drained, and a thread that makes a
-/// picture of each frame meanwhile, as the live view does.
+/// Exposure to lens command in the whole loop, with the phantom at 50 frames a second.
 fn latency(_: &mut Criterion) {
-    const STEPS: usize = 500;
     let clock = Arc::new(SystemClock);
     let lens = Box::new(SimulatedLens::new(clock.clone()));
-    let settings = CameraSettings { fps: 50.0, seed: 1, optics: lens.optics(), clock: clock.clone() };
-    let camera = camera::open("phantom", settings).expect("is there");
+    let settings = CameraSettings { fps: 50.0, seed: 1, optics: lens.optics(), clock };
+    let records = watch_loop(camera::open("phantom", settings).expect("is there"), lens, 50.0, 500);
+    let mut latencies: Vec<u32> = records.iter().map(|record| record.latency_micros).collect();
+    let LatencyFigures { steps, p50, p99 } = LatencyFigures::of(&mut latencies);
+    println!("loop/phantom  {steps} steps at 50 a second: exposure to lens command p50 {p50} µs, p99 {p99} µs");
+}
+
+/// What the whole loop did in `steps` steps, the MGM hill-climber in charge: telemetry is drained, and a thread makes a
+/// picture of each frame meanwhile, as the live view does.
+fn watch_loop(camera: Box<dyn Camera>, lens: Box<dyn Lens>, fps: f64, steps: usize) -> Vec<StepRecord> {
     let mut reconstructor = Reconstructor::new(&Calibration::default());
+    let clock = Arc::new(SystemClock);
     let rig = Rig { camera, lens, reconstructor: reconstructor.clone(), registry: Registry::standard(), clock };
-    let settings = Settings { frame_period: Duration::from_millis(20), telemetry_capacity: 256, dynamics: None };
+    let frame_period = Duration::from_secs_f64(1.0 / fps);
+    let settings = Settings { frame_period, telemetry_capacity: 256, dynamics: None };
     let (control, handle, mut telemetry) = ControlLoop::spawn(settings, rig).expect("starts");
     handle.send(Command::Drive {
         drive: Drive::Policy { name: PolicyName::new("mgm-hill-climber"), start: None },
@@ -97,17 +117,23 @@ fn latency(_: &mut Criterion) {
             }
         }
     });
-    let mut latencies: Vec<u32> = std::iter::from_fn(|| telemetry.blocking_recv())
-        .filter(|record| record.policy.is_some())
-        .map(|record| record.latency_micros)
-        .take(STEPS)
-        .collect();
-    let fps = handle.status.borrow().steps_per_second;
+    let in_charge = std::iter::from_fn(|| telemetry.blocking_recv()).filter(|record| record.policy.is_some());
+    let records = in_charge.take(steps).collect();
     control.stop();
     let _ = viewer.join();
-    let LatencyFigures { steps, p50, p99 } = LatencyFigures::of(&mut latencies);
-    println!("loop/latency            {steps} steps at {fps} a second: p50 {p50} µs, p99 {p99} µs");
+    records
 }
 
-criterion_group!(benches, metrics, policies, steps, latency);
+#[cfg(feature = "aravis")]
+fn bench_devices(_: &mut Criterion) {
+    devices::measure();
+}
+
+/// Cameras are a feature.
+#[cfg(not(feature = "aravis"))]
+fn bench_devices(_: &mut Criterion) {
+    println!("loop/gige  skipped: built without the feature aravis");
+}
+
+criterion_group!(benches, metrics, policies, steps, latency, bench_devices);
 criterion_main!(benches);

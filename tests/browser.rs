@@ -8,15 +8,24 @@ mod support;
 mod aftermath;
 #[path = "browser/blinding.rs"]
 mod blinding;
+#[cfg(feature = "aravis")]
+#[path = "browser/camera_card.rs"]
+mod camera_card;
 #[path = "browser/course.rs"]
 mod course;
 #[allow(dead_code, reason = "shared with other tests")]
 #[path = "support/disk.rs"]
 mod disk;
+#[cfg(feature = "aravis")]
+#[allow(dead_code, reason = "shared with other tests")]
+#[path = "support/fake_camera.rs"]
+mod fake_camera;
 #[path = "browser/full_disk.rs"]
 mod full_disk;
 #[path = "browser/killed.rs"]
 mod killed;
+#[path = "browser/lens_troubles.rs"]
+mod lens_troubles;
 #[path = "browser/proxy.rs"]
 mod proxy;
 #[path = "browser/screenshots.rs"]

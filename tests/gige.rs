@@ -1,13 +1,15 @@
 //! GigE Vision cameras against Aravis's fake camera, a real peer on the loopback (Debian's package `aravis-tools`).
 
+#[path = "support/fake_camera.rs"]
+mod fake_camera;
 #[allow(dead_code, reason = "shared with other tests")]
 mod support;
 
-use std::process::{Child, Command, Stdio};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::process::Command;
+use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::camera::gige::{GigeCamera, list};
+use parfocal::camera::gige::GigeCamera;
 use parfocal::camera::{Camera, CameraError, CameraSettings, Controls, Frame, FrameImage, Setting};
 use parfocal::clock::{Clock, SystemClock};
 use parfocal::lens::Lens;
@@ -15,62 +17,10 @@ use parfocal::lens::SimulatedLens;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
+use fake_camera::Fake;
 use support::{Server, client};
 
-const PROGRAM: &str = "arv-fake-gv-camera-0.8";
 const SECOND: Duration = Duration::from_secs(1);
-
-/// A fake camera, which has the port to itself: tests take turns.
-struct Fake {
-    process: Child,
-    options: Vec<String>,
-    _turn: MutexGuard<'static, ()>,
-}
-
-impl Fake {
-    /// Starts it; nothing where the program is not installed.
-    fn start(options: &[&str]) -> Option<Self> {
-        static TURN: Mutex<()> = Mutex::new(());
-        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
-        let Ok(process) = Self::spawn(&options) else {
-            println!("skipped: {PROGRAM} is not installed (Debian package aravis-tools)");
-            return None;
-        };
-        let fake = Self { process, options, _turn: turn };
-        Self::wait_until_it_answers();
-        Some(fake)
-    }
-
-    fn spawn(options: &[String]) -> std::io::Result<Child> {
-        let mut command = Command::new(PROGRAM);
-        command.args(["-i", "127.0.0.1", "-s", "TEST"]).args(options).stdout(Stdio::null()).stderr(Stdio::null());
-        command.spawn()
-    }
-
-    fn wait_until_it_answers() {
-        let begun = SystemClock.now();
-        while !list().iter().any(|found| found.id.contains("TEST")) {
-            assert!(SystemClock.now().since(begun) < 20 * SECOND, "the fake camera never answers");
-        }
-    }
-
-    fn kill(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
-    }
-
-    fn restart(&mut self) {
-        self.process = Self::spawn(&self.options).unwrap();
-    }
-}
-
-impl Drop for Fake {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
 
 fn settings(fps: f64) -> CameraSettings {
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);

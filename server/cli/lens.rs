@@ -47,7 +47,8 @@ enum Action {
 /// Which lens, and how to tell about it.
 #[derive(Debug, clap::Args)]
 struct Which {
-    /// `simulated`, `optotune:auto` or `optotune:/dev/...`; with `?min=5&max=10` to use only those dioptres.
+    /// `optotune:auto` or `optotune:/dev/...`, with `?min=5&max=10` to use only those dioptres; `simulated`; or `emulated`, an
+    /// Optotune driver that is not there, with `?delay=10&settling=40` and so on as `lens emulate` has them.
     #[arg(long, value_name = "SPEC")]
     lens: String,
     /// Print JSON.

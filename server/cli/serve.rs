@@ -43,7 +43,7 @@ pub struct Arguments {
     /// Camera: phantom, footage:PATH, scan:DIR or gige:ID.
     #[arg(long, value_name = "SPEC", default_value = "phantom")]
     camera: String,
-    /// Lens: simulated or optotune:DEVICE.
+    /// Lens: simulated, emulated (an Optotune driver that is not there), optotune:auto or optotune:DEVICE.
     #[arg(long, value_name = "SPEC", default_value = "simulated")]
     lens: String,
     /// Frames a second to ask of the camera.

@@ -10,7 +10,7 @@ use super::course::Course;
 use super::{ConductError, Conductor, ProtocolSummary, operator_only};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
-use crate::store::{Participant, Reader, SessionLine};
+use crate::store::{DeviceEvent, Participant, Reader, SessionLine};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::participant::ParticipantCode;
@@ -144,9 +144,29 @@ impl Conductor {
             commitment: course.made.commitment.clone(),
             settings_detail: settings(&course),
             answers: self.answer_lines(&course).await?,
-            log: log(&course),
+            log: self.log(&course).await?,
             unblinding: unblinding(&course),
         })
+    }
+
+    /// What happened in the session, and to camera and lens since it was made.
+    async fn log(&self, course: &Course) -> Result<Vec<LogLine>, ConductError> {
+        let line = |event: &Event| LogLine {
+            at: event.wall,
+            by: event.by,
+            text: event.kind.in_words(|segment| course.setting(segment)),
+        };
+        let mut lines: Vec<LogLine> = course.events.iter().map(line).collect();
+        let made = lines.first().map(|line| line.at);
+        let devices = self.shared.store.reader().device_events(course.session()).await?;
+        let since = devices.into_iter().map(|(_, _, event)| event).filter(|event| Some(event.wall) >= made);
+        lines.extend(since.map(|DeviceEvent { wall, device, message, .. }| LogLine {
+            at: wall,
+            by: Role::System,
+            text: format!("The {device}: {message}"),
+        }));
+        lines.sort_by_key(|line| line.at);
+        Ok(lines)
     }
 
     async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
@@ -193,15 +213,6 @@ fn settings(course: &Course) -> Vec<SettingDetail> {
         }
     };
     course.state.plan().segments.iter().zip(1..).map(detail).collect()
-}
-
-fn log(course: &Course) -> Vec<LogLine> {
-    let line = |event: &Event| LogLine {
-        at: event.wall,
-        by: event.by,
-        text: event.kind.in_words(|segment| course.setting(segment)),
-    };
-    course.events.iter().map(line).collect()
 }
 
 fn unblinding(course: &Course) -> Option<Unblinding> {

@@ -1,6 +1,7 @@
 //! Lenses: focal power, and what drives it. Knows no image.
 
 mod dynamics;
+mod emulated;
 pub mod emulator;
 mod focal_power;
 pub mod optotune;
@@ -85,6 +86,8 @@ pub struct LensHealth {
     pub simulated: bool,
     /// Whether commands are being taken.
     pub working: bool,
+    /// Whether it works, but not as it should: the message says why, and the operator is to be warned.
+    pub caution: bool,
     /// One sentence: what is the case and, if it is bad, what to do.
     pub message: Arc<str>,
 }

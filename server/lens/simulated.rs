@@ -166,7 +166,8 @@ impl Lens for SimulatedLens {
             (None, SimulatedFault::Drops) => "commands get lost on the way (simulated fault)".into(),
             (None, _) => "follows commands; no real glass moves".into(),
         };
-        LensHealth { name: self.name.clone(), simulated: true, working: failure.is_none(), message: message.into() }
+        let (name, working) = (self.name.clone(), failure.is_none());
+        LensHealth { name, simulated: true, working, caution: false, message: message.into() }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::emulated::EmulatedLens;
 use super::optotune::OptotuneLens;
 use super::simulated::SimulatedLens;
 use super::{Lens, LensError};
@@ -9,8 +10,9 @@ use crate::clock::Clock;
 use crate::options::Options;
 
 /// Opens the lens that `spec` names: `simulated` (options `fault`, see [`super::SimulatedFault`], `delay` and
-/// `settling`, milliseconds), `optotune:auto` or
-/// `optotune:/dev/...` (options `min` and `max`, the dioptres to use, `low` and `high`, the temperature limits in °C).
+/// `settling`, milliseconds), `emulated` (options `latency`, `delay`, `settling`, `hysteresis`, `temperature`, `fault`: see
+/// [`super::emulator::Model`]), `optotune:auto` or `optotune:/dev/...` (options `min` and `max`, the dioptres to use, `low`
+/// and `high`, the temperature limits in °C).
 ///
 /// # Errors
 /// When the specification makes no sense, or its device cannot be used; says what to do.
@@ -18,9 +20,10 @@ pub fn open(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensErro
     let (device, options) = Options::split(spec)?;
     match device.split_once(':') {
         None if device == "simulated" => Ok(Box::new(SimulatedLens::open(options, clock)?)),
+        None if device == "emulated" => Ok(Box::new(EmulatedLens::open(options, clock)?)),
         Some(("optotune", port)) => Ok(Box::new(OptotuneLens::open(port, options, clock)?)),
         _ => Err(LensError::BadSpec(format!(
-            "there is no lens '{spec}': use 'simulated', 'optotune:auto' or 'optotune:/dev/...'"
+            "there is no lens '{spec}': use 'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"
         ))),
     }
 }
@@ -46,8 +49,10 @@ mod tests {
 
     #[test]
     fn a_bad_specification_says_what_is_wrong_with_it() {
-        assert!(message("magic").contains("'simulated', 'optotune:auto' or 'optotune:/dev/...'"));
+        assert!(message("magic").contains("'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"));
         assert!(message("simulated?fault=fire").contains("choose from none, drops"));
+        assert!(message("emulated?fault=fire").contains("choose from none, garbage"));
+        assert!(message("emulated?hysteresis=9").contains("must be from 0 to 5 dpt"));
         assert!(message("simulated?size=3").contains("no option 'size'; there are: fault, delay, settling"));
     }
 }

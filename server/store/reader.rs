@@ -7,7 +7,10 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRo
 use sqlx::{Row, migrate::Migrate};
 
 use super::sessions::{parsed, stamp};
-use super::{DATABASE, MIGRATOR, Participant, PathPoint, RunClocks, SessionLine, SessionStatus, StoreError, moment};
+use super::{
+    DATABASE, DeviceEvent, MIGRATOR, Participant, PathPoint, RunClocks, SessionLine, SessionStatus, Stamp, StoreError,
+    moment,
+};
 use crate::ids::SessionId;
 
 /// A database open for reading. Clone freely.
@@ -123,6 +126,30 @@ impl Reader {
         let rows = sqlx::query("SELECT run, wall, monotonic_ns FROM runs").fetch_all(&self.pool).await?;
         let clocks = rows.iter().map(|row| Ok((row.try_get("run")?, stamp(row)?)));
         Ok(RunClocks(clocks.collect::<Result<_, StoreError>>()?))
+    }
+
+    /// What befell camera and lens in `session`, each with its number and the run it was in: from the start of every run
+    /// that served it, so that the state in which it began is told, to its end.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn device_events(&self, session: SessionId) -> Result<Vec<(i64, i64, DeviceEvent)>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
+             WHERE run IN (SELECT run FROM events WHERE session = ?1) AND NOT EXISTS (
+                 SELECT 1 FROM events AS e WHERE e.session = ?1 AND e.kind IN ('completed', 'aborted')
+                     AND (e.run, e.monotonic_ns) < (d.run, d.monotonic_ns))
+             ORDER BY number",
+        )
+        .bind(session.to_string())
+        .fetch_all(&self.pool)
+        .await?;
+        let event = |row: &SqliteRow| {
+            let Stamp { wall, at } = stamp(row)?;
+            let (device, working, message) = (row.try_get("device")?, row.try_get("working")?, row.try_get("message")?);
+            Ok((row.try_get("number")?, row.try_get("run")?, DeviceEvent { wall, at, device, working, message }))
+        };
+        rows.iter().map(event).collect()
     }
 
     /// The focal path of `session`: about `points` steps of each setting, evenly spread over its steps.

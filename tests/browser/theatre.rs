@@ -30,6 +30,13 @@ pub fn server() -> Server {
     start(Arc::new(tempfile::tempdir().unwrap()), "127.0.0.1:0")
 }
 
+/// A browser on the operator's page of `server`.
+pub async fn operator<'a>(driver: &'a Driver, server: &Server) -> Browser<'a> {
+    let browser = driver.browser().await;
+    browser.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
+    browser
+}
+
 fn start(data: Arc<TempDir>, address: &str) -> Server {
     let protocols = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser");
     // Few frames: the camera and two browsers share the machine.

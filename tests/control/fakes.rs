@@ -158,7 +158,13 @@ impl Lens for FakeLens {
 
     fn health(&self) -> LensHealth {
         let working = self.0.lock().unwrap().failure.is_none();
-        LensHealth { name: "fake lens".into(), simulated: true, working, message: "as the test says".into() }
+        LensHealth {
+            name: "fake lens".into(),
+            simulated: true,
+            working,
+            caution: false,
+            message: "as the test says".into(),
+        }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {

@@ -3,11 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::path::Path;
+use std::time::Duration;
 
+use parfocal::clock::Clock;
 use parfocal::ids::SessionId;
 use parfocal::store::export::verify::{Check, Verdict, verify};
 use parfocal::store::export::{ExportError, export, export_zip};
-use parfocal::store::{Reader, telemetry};
+use parfocal::store::{DeviceEvent, Reader, telemetry};
 use parfocal::trial::view::{Action, Role};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -255,4 +257,48 @@ async fn an_emergency_unblinding_is_flagged_in_the_export() {
     let row = &rows(&out, "sessions")[0];
     assert_eq!((row["unblinded"].as_str(), row["status"].as_str()), ("while-under-way", "aborted"));
     assert_eq!(json(&out, "datapackage.json")["parfocal"]["unblinded"], "while-under-way");
+}
+
+#[tokio::test]
+async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
+    let data = tempfile::tempdir().unwrap();
+    let bench = Bench::start(data.path()).await;
+    let befalls = async |working: bool, message: &str| {
+        bench.clock.advance(Duration::from_secs(2));
+        let (wall, at, device) = (bench.clock.wall(), bench.clock.now(), "lens".to_owned());
+        let event = DeviceEvent { wall, at, device, working, message: message.to_owned() };
+        bench.store.device_event(&event).await.unwrap();
+    };
+    befalls(true, "follows commands").await;
+    bench.wait(Duration::from_secs(1)).await;
+    let session = bench.begin("paper").await;
+    befalls(false, "the lens does not answer; trying again").await;
+    befalls(true, "follows commands again").await;
+    bench.wait(Duration::from_secs(1)).await;
+    let abort = Action::Abort { reason: "the lens broke".to_owned() };
+    bench.conductor.act(Role::Operator, session, abort).await.unwrap();
+    befalls(false, "unplugged when all was over").await;
+
+    let log = bench.conductor.session_detail(session).await.unwrap().log;
+    let log: Vec<&str> = log.iter().map(|line| line.text.as_str()).collect();
+    let expected = [
+        "Session made",
+        "Session started",
+        "The lens: the lens does not answer; trying again",
+        "The lens: follows commands again",
+        "Session aborted: the lens broke",
+    ];
+    assert_eq!(log, expected);
+
+    let out = data.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+    let devices = rows(&out, "devices");
+    let devices: Vec<_> = devices.iter().map(|row| (row["working"].as_str(), row["message"].as_str())).collect();
+    let expected = [
+        ("true", "follows commands"),
+        ("false", "the lens does not answer; trying again"),
+        ("true", "follows commands again"),
+    ];
+    assert_eq!(devices, expected, "with the state in which the session began, and nothing after its end");
+    assert_eq!(failed(&verify(&out)), [""; 0]);
 }

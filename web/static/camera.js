@@ -46,7 +46,7 @@ function makeRow(setting) {
   const { label, unit, per, less, more } = SETTINGS[setting];
   const id = `camera-${setting}`;
   const field = make("input", { id, type: "number", step: "any", inputMode: "decimal" });
-  field.addEventListener("change", () => change(setting, Number(field.value) * per));
+  field.addEventListener("change", () => change(setting, field.value.trim() === "" ? Number.NaN : Number(field.value) * per));
   field.addEventListener("keydown", (event) => event.key === "Enter" && field.blur());
   const button = (text, name, step) => make("button", { type: "button", "aria-label": `${name} ${label.toLowerCase()}`, onclick: () => nudge(setting, step) }, text);
   return make(
@@ -63,6 +63,10 @@ function nudge(setting, step) {
 }
 
 async function change(setting, value) {
+  if (!Number.isFinite(value)) {
+    setText(byId("camera-trouble"), `${SETTINGS[setting].label} must be a number.`);
+    return;
+  }
   try {
     await post("/api/operator/camera", { setting, value });
     setText(byId("camera-trouble"), "");

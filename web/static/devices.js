@@ -6,10 +6,16 @@ import { make, redraw } from "./dom.js";
 export function drawDevices(list, status) {
   const loop = `${status.steps_per_second.toFixed(0)} steps/s · ${milliseconds(status.latency_p50_micros)} ms median, ${milliseconds(status.latency_p99_micros)} ms p99`;
   redraw(list, [
-    lamp(status.camera.name, `${status.camera.fps.toFixed(1)} fps`, status.camera.working ? (status.camera.simulated ? "warn" : "") : "bad", status.camera.message),
-    lamp(status.lens.name, status.lens.working ? "" : "not answering", status.lens.working ? (status.lens.simulated ? "warn" : "") : "bad", status.lens.message),
+    lamp(status.camera.name, `${status.camera.fps.toFixed(1)} fps${status.camera.lost > 0 ? ` · ${status.camera.lost} lost` : ""}`, status.camera.working ? (status.camera.simulated ? "warn" : "") : "bad", status.camera.message),
+    lamp(status.lens.name, status.lens.working ? "" : "not answering", status.lens.working ? (status.lens.simulated || status.lens.caution ? "warn" : "") : "bad", status.lens.message),
     lamp("focus loop", loop, status.held && status.held !== "paused" ? "bad" : "", status.message ?? ""),
   ]);
+}
+
+/** What camera and lens say of themselves, into the list of terms `list`. */
+export function drawDeviceWords(list, { camera, lens }) {
+  const one = (term, { name, message }) => [make("dt", {}, term), make("dd", {}, make("span", {}, `${name}: `), make("span", { className: "muted" }, message))];
+  redraw(list, [...one("Camera", camera), ...one("Lens", lens)]);
 }
 
 const milliseconds = (micros) => (micros / 1000).toFixed(2);
@@ -24,6 +30,7 @@ export function drawWarnings(box, status) {
   const warn = (text, level = "warn") => lines.push(make("p", { className: `notice-line ${level}` }, text));
   if (!status.camera.working) warn(`Camera: ${status.camera.message}`, "bad");
   if (!status.lens.working) warn(`Lens: ${status.lens.message}`, "bad");
+  else if (status.lens.caution) warn(`Lens: ${status.lens.message}`);
   if (status.held && status.held !== "paused") warn(status.message ?? "The lens is being held where it is.", "bad");
   const simulated = [status.camera.simulated && "camera", status.lens.simulated && "lens"].filter(Boolean);
   if (simulated.length > 0) warn(`Simulated ${simulated.join(" and ")}: this is not a real instrument.`);

@@ -4,7 +4,7 @@ import { get, inWords, post } from "./api.js";
 import { drawCamera } from "./camera.js";
 import { askIn, askReason } from "./dialogs.js";
 import { byId, clockText, make, redraw, setText } from "./dom.js";
-import { drawDevices, drawWarnings } from "./devices.js";
+import { drawDevices, drawDeviceWords, drawWarnings } from "./devices.js";
 import { mountViewer } from "./viewer.js";
 
 const BY_HAND = "by-hand";
@@ -21,6 +21,7 @@ let dragging = false;
 function followStatus(next) {
   status = next;
   drawDevices(byId("devices"), status);
+  drawDeviceWords(byId("device-words"), status);
   drawWarnings(byId("warnings"), status);
   drawCamera(status.camera_offer);
   drawFocus();

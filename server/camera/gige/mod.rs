@@ -17,6 +17,7 @@ use ::aravis::Aravis;
 use self::device::{Device, Wanted};
 use self::worker::Shared;
 use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
+use crate::clock::Moment;
 
 /// A machine vision camera.
 pub struct GigeCamera {
@@ -44,9 +45,19 @@ impl GigeCamera {
         let theirs = shared.clone();
         let thread = std::thread::Builder::new()
             .name("gige".into())
-            .spawn(move || worker::run(&theirs, &wanted, device))
+            .spawn(move || {
+                crate::priority::raise();
+                worker::run(&theirs, &wanted, device);
+            })
             .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
         Ok(Self { size, shared, thread: Some(thread) })
+    }
+
+    /// When the last packet of the frame that [`Camera::next_frame`] gave last was in: what the transfer took, which is the
+    /// link's doing, ends here. For measurements.
+    #[must_use]
+    pub fn whole_at(&self) -> Option<Moment> {
+        self.shared.whole_at()
     }
 }
 

@@ -31,7 +31,10 @@ pub struct Shared {
 }
 
 struct State {
-    frame: Option<Frame>,
+    /// The latest frame, and when it was whole.
+    frame: Option<(Frame, Moment)>,
+    /// When the frame that was taken last was whole.
+    taken: Option<Moment>,
     name: Arc<str>,
     fake: bool,
     /// What is the case, in words; an error is trouble.
@@ -46,6 +49,7 @@ impl Shared {
     pub fn new(clock: Arc<dyn Clock>, device: &Device) -> Self {
         let state = State {
             frame: None,
+            taken: None,
             name: Arc::from(device.name.as_str()),
             fake: device.fake,
             condition: Ok(words(device)),
@@ -63,10 +67,18 @@ impl Shared {
             .wait_timeout_while(self.state(), timeout, |state| state.frame.is_none())
             .unwrap_or_else(PoisonError::into_inner);
         match (state.frame.take(), &state.condition) {
-            (Some(frame), _) => Ok(frame),
+            (Some((frame, whole_at)), _) => {
+                state.taken = Some(whole_at);
+                Ok(frame)
+            }
             (None, Ok(_)) => Err(CameraError::Timeout(timeout)),
             (None, Err(trouble)) => Err(CameraError::Failed(trouble.to_string())),
         }
+    }
+
+    /// When the last packet of the frame that was taken last was in.
+    pub fn whole_at(&self) -> Option<Moment> {
+        self.state().taken
     }
 
     /// How the camera does.
@@ -101,11 +113,11 @@ impl Shared {
         self.state().stop
     }
 
-    /// Puts a frame up for taking; one that nobody took counts as lost.
-    fn deliver(&self, frame: Frame) {
+    /// Puts a frame, whole since `whole_at`, up for taking; one that nobody took counts as lost.
+    fn deliver(&self, frame: Frame, whole_at: Moment) {
         let now = self.clock.now();
         let mut state = self.state();
-        state.lost += u64::from(state.frame.replace(frame).is_some());
+        state.lost += u64::from(state.frame.replace((frame, whole_at)).is_some());
         state.delivered.push_back(now);
         while state.delivered.front().is_some_and(|&at| now.since(at) > Duration::from_secs(1)) {
             state.delivered.pop_front();
@@ -224,14 +236,8 @@ impl<'a> Session<'a> {
         let exposed_at = self.timestamps.moment(buffer.timestamp(), arrival(buffer, self.shared.clock.as_ref(), now));
         match self.mosaic(&buffer.image_data()) {
             Some(mosaic) => {
-                let image = FrameImage::Mosaic(mosaic);
-                self.shared.deliver(Frame {
-                    number: *self.number,
-                    exposed_at,
-                    exposure: self.exposure,
-                    image,
-                    truth: None,
-                });
+                let (number, exposure, image) = (*self.number, self.exposure, FrameImage::Mosaic(mosaic));
+                self.shared.deliver(Frame { number, exposed_at, exposure, image, truth: None }, now);
             }
             None => self.shared.lose(1),
         }

@@ -2,19 +2,23 @@
 
 use std::io::BufRead;
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 
 use super::{Failure, print};
-use crate::clock::SystemClock;
-use crate::lens::emulator::{Emulator, Fault, Model};
+use crate::clock::{Clock, SystemClock};
+use crate::lens::emulator::{Emulator, Fault, LENS_DIOPTRES, Model};
+use crate::lens::{LensDynamics, Optics};
 
 const HELP: &str = "type what shall befall it, then Enter:
   unplug | plug-in | restart       its USB cable, its power
   lens out | lens in               the lens's own cable
   temperature CELSIUS              of the lens
+  latency MS                       until it answers a request
   fault NAME                       none, garbage, wrong-checksum, silent, errors, drops-commands, stranger
+  glass                            tells the focal power of the glass now, which no driver can read
 Ctrl-C ends it";
 
 /// Arguments of `parfocal lens emulate`.
@@ -23,12 +27,47 @@ pub struct Arguments {
     /// Serial number: one to four letters and digits, which follow on EMUL.
     #[arg(long, default_value = "0001", value_parser = parse_serial)]
     serial: [u8; 8],
+    /// Type of its firmware, A to F: A counts dioptres with an offset of 5.
+    #[arg(long, value_name = "LETTER", default_value = "A", value_parser = parse_firmware)]
+    firmware: u8,
+    /// Milliseconds until it answers a request.
+    #[arg(long, value_name = "MS", default_value = "1", value_parser = parse_millis)]
+    latency: Duration,
+    /// Milliseconds from a command to the first movement of the glass.
+    #[arg(long, value_name = "MS", default_value = "1", value_parser = parse_millis)]
+    delay: Duration,
+    /// Milliseconds from the first movement to within 5 % of the step.
+    #[arg(long, value_name = "MS", default_value = "15", value_parser = parse_millis)]
+    settling: Duration,
+    /// Dioptres between where the glass stands after a way up and after a way down.
+    #[arg(long, value_name = "DPT", default_value = "0.04", value_parser = parse_play)]
+    hysteresis: f64,
+    /// Temperature of the lens in °C.
+    #[arg(long, value_name = "CELSIUS", default_value = "25.5", value_parser = parse_temperature, allow_negative_numbers = true)]
+    temperature: f64,
+    /// What is wrong with it from the start: none, garbage, wrong-checksum, silent, errors, drops-commands or stranger.
+    #[arg(long, value_name = "NAME", default_value = "none")]
+    fault: Fault,
+}
+
+impl Arguments {
+    fn model(&self) -> Model {
+        Model {
+            serial: self.serial,
+            firmware: self.firmware,
+            latency: self.latency,
+            glass: LensDynamics { delay: self.delay, settling: self.settling },
+            play: self.hysteresis,
+            ..Model::default()
+        }
+    }
 }
 
 /// Serves an emulated driver until Ctrl-C or an order to end.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let model = Model { serial: arguments.serial, ..Model::default() };
-    let mut emulator = Emulator::start(model, Arc::new(SystemClock))?;
+    let mut emulator = Emulator::start(arguments.model(), Arc::new(SystemClock))?;
+    emulator.set_temperature(arguments.temperature);
+    emulator.set_fault(arguments.fault);
     print(&format!("{}\n", emulator.path().display()))?;
     eprintln!("{HELP}");
     tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(serve(&mut emulator))
@@ -42,7 +81,7 @@ async fn serve(emulator: &mut Emulator) -> Result<(), Failure> {
             _ = interrupt.recv() => return Ok(()),
             _ = terminate.recv() => return Ok(()),
             Some(line) = lines.recv() => {
-                let answer = befall(emulator, &line).map_or_else(|problem| problem, |()| "done".into());
+                let answer = befall(emulator, &line).unwrap_or_else(|problem| problem);
                 eprintln!("{answer}");
             }
         }
@@ -62,22 +101,28 @@ fn typed_lines() -> mpsc::UnboundedReceiver<String> {
     lines
 }
 
-fn befall(emulator: &mut Emulator, line: &str) -> Result<(), String> {
+/// Does what `line` says; the answer to it, or why it was not done.
+fn befall(emulator: &mut Emulator, line: &str) -> Result<String, String> {
     let words: Vec<_> = line.split_whitespace().collect();
     match words.as_slice() {
-        [] => {}
         ["unplug"] => emulator.unplug(),
         ["plug-in"] => emulator.plug_in().map_err(|error| error.to_string())?,
         ["restart"] => emulator.restart(),
         ["lens", "out"] => emulator.set_lens_present(false),
         ["lens", "in"] => emulator.set_lens_present(true),
-        ["temperature", celsius] => {
-            emulator.set_temperature(celsius.parse().map_err(|_| format!("'{celsius}' is no temperature"))?);
-        }
+        ["temperature", celsius] => emulator.set_temperature(parse_temperature(celsius)?),
+        ["latency", millis] => emulator.set_latency(parse_millis(millis)?),
         ["fault", name] => emulator.set_fault(name.parse::<Fault>()?),
+        ["glass"] => return Ok(glass(emulator)),
         _ => return Err(HELP.into()),
     }
-    Ok(())
+    Ok("done".into())
+}
+
+fn glass(emulator: &Emulator) -> String {
+    let power = emulator.glass().focal_power_at(SystemClock.now()).get();
+    let (least, most) = LENS_DIOPTRES;
+    format!("glass at {power:.4}, {:.3} dpt", least + power * (most - least))
 }
 
 /// The number behind the prefix that marks an emulated unit.
@@ -88,4 +133,30 @@ fn parse_serial(text: &str) -> Result<[u8; 8], String> {
     let mut serial = *b"EMUL0000";
     serial.iter_mut().rev().zip(text.bytes().rev()).for_each(|(place, byte)| *place = byte);
     Ok(serial)
+}
+
+fn parse_firmware(text: &str) -> Result<u8, String> {
+    match text.as_bytes() {
+        &[letter @ b'A'..=b'F'] => Ok(letter),
+        _ => Err("must be a letter from A to F".into()),
+    }
+}
+
+fn parse_millis(text: &str) -> Result<Duration, String> {
+    Ok(Duration::from_secs_f64(parse_within(text, 0.0, 10_000.0)? / 1000.0))
+}
+
+/// A hysteresis in dioptres, as the unit counts it.
+fn parse_play(text: &str) -> Result<f64, String> {
+    let play = text.parse().ok().and_then(Model::play_of);
+    play.ok_or_else(|| format!("must be a number from 0 to {}", LENS_DIOPTRES.1 - LENS_DIOPTRES.0))
+}
+
+fn parse_temperature(text: &str) -> Result<f64, String> {
+    parse_within(text, -100.0, 200.0)
+}
+
+fn parse_within(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value| (least..=most).contains(value));
+    value.ok_or_else(|| format!("must be a number from {least} to {most}, not '{text}'"))
 }

@@ -4,13 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::unit::{Fault, Model};
+use super::unit::{Fault, LENS_DIOPTRES, Model};
 use super::wire::{REQUESTS, checksum_of, framed};
 use crate::clock::Moment;
 use crate::lens::{FocalPower, Response};
 
-/// Focal power that the emulated lens can reach at all, in dioptres.
-const LENS_DIOPTRES: (f64, f64) = (5.0, 10.0);
 /// Temperature limits up to which the whole range is held, in °C; a wider span costs a little at both ends.
 const FULL_RANGE_SPAN: f64 = 20.0;
 /// Dioptres that a degree more costs, at each end.
@@ -18,7 +16,6 @@ const NARROWING: f64 = 0.02;
 const IMAX_HUNDREDTHS: u16 = 29_284;
 /// A request whose rest does not come within this time is forgotten.
 const PATIENCE: Duration = Duration::from_millis(50);
-const PLAY: f64 = 0.004;
 /// Focal power commands remembered for whoever wants to look.
 const REMEMBERED: usize = 8192;
 
@@ -49,7 +46,7 @@ impl Firmware {
     /// A unit that has just got power.
     pub fn new(model: Model) -> Self {
         Self {
-            glass: Arc::new(Response::new(model.glass, PLAY, FocalPower::MIN)),
+            glass: Arc::new(Response::new(model.glass, model.play, FocalPower::MIN)),
             model,
             fault: Fault::None,
             temperature: 25.5,
@@ -243,7 +240,8 @@ impl Firmware {
         let length = answer.len();
         match self.fault {
             Fault::Garbage => answer.iter_mut().for_each(|byte| *byte = byte.wrapping_mul(31) ^ 0x5A),
-            Fault::WrongChecksum => {
+            // The greeting has none.
+            Fault::WrongChecksum if answer != b"Ready\r\n" => {
                 if let Some(byte) = length.checked_sub(3).and_then(|at| answer.get_mut(at)) {
                     *byte ^= 0x40;
                 }

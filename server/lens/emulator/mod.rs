@@ -13,8 +13,9 @@ mod wire;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
-pub use unit::{Fault, Model};
+pub use unit::{Fault, LENS_DIOPTRES, Model};
 
 use super::Response;
 use crate::clock::{Clock, Moment};
@@ -85,6 +86,11 @@ impl Emulator {
     /// Makes `fault` the case from the next request on.
     pub fn set_fault(&self, fault: Fault) {
         self.firmware().fault = fault;
+    }
+
+    /// Lets the unit take `latency` to answer a request, from the next one on.
+    pub fn set_latency(&self, latency: Duration) {
+        self.firmware().model.latency = latency;
     }
 
     /// Heats or cools the lens.

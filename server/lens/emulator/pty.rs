@@ -41,7 +41,11 @@ impl Pty {
         tcsetattr(&driver, OptionalActions::Now, &settings)?;
         let stop = Arc::new(eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?);
         let server = Server { port: File::from(driver), stop: stop.clone(), firmware, clock };
-        let thread = std::thread::Builder::new().name("lens-emulator".into()).spawn(move || server.run())?;
+        let thread = std::thread::Builder::new().name("lens-emulator".into()).spawn(move || {
+            // A real unit has a processor to itself.
+            crate::priority::raise();
+            server.run();
+        })?;
         Ok(Self { path, stop, thread: Some(thread) })
     }
 

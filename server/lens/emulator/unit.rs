@@ -1,10 +1,15 @@
 //! Which unit is emulated, and what is wrong with it.
 
+use std::str::FromStr;
 use std::time::Duration;
 
 use crate::lens::LensDynamics;
 
+/// Focal power that the emulated lens can reach at all, in dioptres.
+pub const LENS_DIOPTRES: (f64, f64) = (5.0, 10.0);
 const GLASS: LensDynamics = LensDynamics { delay: Duration::from_millis(1), settling: Duration::from_millis(15) };
+/// Half of 0.04 of the lens's 5 dioptres.
+const PLAY: f64 = 0.004;
 
 /// What is wrong with the emulated driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -26,23 +31,40 @@ pub enum Fault {
     Stranger,
 }
 
-impl std::str::FromStr for Fault {
+impl Fault {
+    /// Every state.
+    const ALL: [Self; 7] = [
+        Self::None,
+        Self::Garbage,
+        Self::WrongChecksum,
+        Self::Silent,
+        Self::Errors,
+        Self::DropsCommands,
+        Self::Stranger,
+    ];
+
+    /// Name on the command line.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Garbage => "garbage",
+            Self::WrongChecksum => "wrong-checksum",
+            Self::Silent => "silent",
+            Self::Errors => "errors",
+            Self::DropsCommands => "drops-commands",
+            Self::Stranger => "stranger",
+        }
+    }
+}
+
+impl FromStr for Fault {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        match name {
-            "none" => Ok(Self::None),
-            "garbage" => Ok(Self::Garbage),
-            "wrong-checksum" => Ok(Self::WrongChecksum),
-            "silent" => Ok(Self::Silent),
-            "errors" => Ok(Self::Errors),
-            "drops-commands" => Ok(Self::DropsCommands),
-            "stranger" => Ok(Self::Stranger),
-            _ => Err(format!(
-                "there is no fault '{name}': choose from none, garbage, wrong-checksum, silent, errors, \
-                 drops-commands, stranger"
-            )),
-        }
+        Self::ALL.into_iter().find(|fault| fault.name() == name).ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|fault| fault.name()).collect();
+            format!("there is no fault '{name}': choose from {}", names.join(", "))
+        })
     }
 }
 
@@ -61,6 +83,18 @@ pub struct Model {
     pub old: bool,
     /// How its glass moves.
     pub glass: LensDynamics,
+    /// Half-width of its hysteresis, as a share of the lens's range.
+    pub play: f64,
+}
+
+impl Model {
+    /// [`Model::play`] of a hysteresis given as the dioptres between the way up and the way down; none outside 0 to the
+    /// whole of the range.
+    #[must_use]
+    pub fn play_of(hysteresis: f64) -> Option<f64> {
+        let range = LENS_DIOPTRES.1 - LENS_DIOPTRES.0;
+        (0.0..=range).contains(&hysteresis).then_some(hysteresis / 2.0 / range)
+    }
 }
 
 impl Default for Model {
@@ -72,6 +106,7 @@ impl Default for Model {
             ascii_errors: true,
             old: false,
             glass: GLASS,
+            play: PLAY,
         }
     }
 }

@@ -21,6 +21,13 @@ pub struct Settings {
     pub temperatures: (f64, f64),
 }
 
+impl Default for Settings {
+    /// The whole of the range, from room temperature to a lens warmed by its own coil.
+    fn default() -> Self {
+        Self { min_dioptre: None, max_dioptre: None, temperatures: (20.0, 40.0) }
+    }
+}
+
 /// Makes the device behind `link` ready for commands.
 pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Device, Trouble> {
     greet(link, path)?;
@@ -56,7 +63,11 @@ pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Devi
 
 /// Tries twice, because the first greeting may end a request that someone else left half sent.
 fn greet(link: &mut Link, path: &Path) -> Result<(), Trouble> {
+    let known = link.is_known();
     let stranger = || {
+        if known {
+            return LensError::Gone("its replies are unreadable: check its USB cable".into());
+        }
         LensError::Refused(format!(
             "{} answers, but not as an Optotune Lens Driver 4: is this the right port?",
             path.display()

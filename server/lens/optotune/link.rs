@@ -62,6 +62,11 @@ impl<'a> Link<'a> {
         self.range = Some(range);
     }
 
+    /// Whether this is known to be the port of a lens driver.
+    pub fn is_known(&self) -> bool {
+        self.shared.state().was_connected()
+    }
+
     /// The last command that went out.
     pub const fn sent(&self) -> Option<Sent> {
         self.sent

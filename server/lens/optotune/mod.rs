@@ -28,9 +28,6 @@ use crate::options::Options;
 /// Until it is measured on the bench: see the simulated lens's figures.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
-/// In °C; room temperature to a lens warmed by its own coil.
-const TEMPERATURES: (f64, f64) = (20.0, 40.0);
-
 /// How serial numbers of emulated units begin (see [`super::emulator`]): behind those no glass moves.
 const EMULATED: &str = "EMUL";
 
@@ -79,13 +76,11 @@ impl OptotuneLens {
     /// The lens of a specification: `device` is a path, or `auto` for the one that is plugged in; options are `min` and
     /// `max`, the dioptres to use, and `low` and `high`, the temperature limits in °C.
     pub(super) fn open(device: &str, mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
+        let (low, high) = Settings::default().temperatures;
         let settings = Settings {
             min_dioptre: options.take("min")?,
             max_dioptre: options.take("max")?,
-            temperatures: (
-                options.take("low")?.unwrap_or(TEMPERATURES.0),
-                options.take("high")?.unwrap_or(TEMPERATURES.1),
-            ),
+            temperatures: (options.take("low")?.unwrap_or(low), options.take("high")?.unwrap_or(high)),
         };
         options.finish()?;
         let path = if device == "auto" { port::find(Path::new(port::BY_ID))? } else { PathBuf::from(device) };
@@ -114,12 +109,13 @@ impl Lens for OptotuneLens {
 
     fn health(&self) -> LensHealth {
         let state = self.shared.state();
+        let caution = state.device.as_ref().is_ok_and(|device| device.status.doubtful());
         let (working, message) = match (&state.device, &state.refusal) {
             (Ok(_), None) => (true, state.message.clone()),
             (Ok(_), Some(refusal)) => (false, refusal.clone()),
             (Err(trouble), _) => (false, Arc::from(format!("{trouble}; trying again"))),
         };
-        LensHealth { name: self.name.clone(), simulated: self.emulated, working, message }
+        LensHealth { name: self.name.clone(), simulated: self.emulated, working, caution, message }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {

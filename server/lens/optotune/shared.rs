@@ -77,6 +77,13 @@ pub struct Device {
     pub read_back: i16,
 }
 
+impl State {
+    /// Whether a lens driver was ever connected here.
+    pub const fn was_connected(&self) -> bool {
+        self.refreshed > 0
+    }
+}
+
 impl Shared {
     /// # Errors
     /// When the system has no event descriptor left.

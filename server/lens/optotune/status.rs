@@ -49,6 +49,12 @@ impl Status {
         self.0 & Self::UNREACHABLE != 0
     }
 
+    /// Whether commands are followed, but the focal power cannot be relied on.
+    #[must_use]
+    pub const fn doubtful(self) -> bool {
+        self.outside_temperature() || self.unreachable()
+    }
+
     /// Every condition, in words.
     #[must_use]
     pub fn words(self) -> Vec<String> {

@@ -246,7 +246,7 @@ impl Session<'_> {
 fn words(device: &Device, settings: &Settings) -> Arc<str> {
     let Device { status, temperature, range, .. } = device;
     let (low, high) = settings.temperatures;
-    if status.outside_temperature() || status.unreachable() {
+    if status.doubtful() {
         return Arc::from(format!(
             "follows commands, but at {temperature:.1} °C the focal power cannot be relied on ({}): let the lens get \
              between {low:.0} and {high:.0} °C",

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::ExportError;
-use super::description::{ANSWERS, COMMENTS, EVENTS, RUNS, SEGMENTS, SESSIONS, TELEMETRY};
+use super::description::{ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS, TELEMETRY};
 use super::folder::Folder;
 use super::table::{Row, Table};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
-use crate::store::{Answer, Comment, Reader, SessionLine, StoreError, nanoseconds};
+use crate::store::{Answer, Comment, DeviceEvent, Reader, SessionLine, StoreError, nanoseconds};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::protocol::Protocol;
@@ -69,13 +69,14 @@ impl Blinded {
 
     /// Writes all its files but the description.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
-        let tables: [(Table, Vec<Row>); 6] = [
+        let tables: [(Table, Vec<Row>); 7] = [
             (RUNS, reader.export_runs(self.session()).await?),
             (SESSIONS, vec![self.session_row()]),
             (SEGMENTS, self.segment_rows()),
             (COMMENTS, self.comment_rows()),
             (ANSWERS, self.answer_rows()),
             (EVENTS, self.event_rows()),
+            (DEVICES, device_rows(&reader.device_events(self.session()).await?)),
         ];
         let mut all = json!({});
         for (table, rows) in &tables {
@@ -238,6 +239,21 @@ impl Blinded {
         };
         self.events.iter().map(row).collect()
     }
+}
+
+fn device_rows(events: &[(i64, i64, DeviceEvent)]) -> Vec<Row> {
+    let row = |(number, run, event): &(i64, i64, DeviceEvent)| {
+        vec![
+            json!(number),
+            text(event.wall),
+            json!(run),
+            json!(nanoseconds(event.at)),
+            json!(event.device),
+            json!(event.working),
+            json!(event.message),
+        ]
+    };
+    events.iter().map(row).collect()
 }
 
 fn text(value: impl std::fmt::Display) -> Value {

@@ -155,6 +155,22 @@ pub const EVENTS: Table = Table {
     key: &["session", "number"],
 };
 
+/// Camera and lens.
+pub const DEVICES: Table = Table {
+    name: "devices",
+    description: "When camera and lens began and ceased to work, in words, and what the operator changed of the camera; from the start of each run of the server that served the session, so that the state in which the session began is told, to the session's end",
+    columns: &[
+        column("number", Integer, "", "Order of the record in the database"),
+        WALL,
+        RUN,
+        MONOTONIC,
+        column("device", String, "", "camera or lens"),
+        column("working", Boolean, "", "Whether it worked from then on"),
+        column("message", String, "", "What it said of itself, or what was changed"),
+    ],
+    key: &["number"],
+};
+
 /// Telemetry, blinded.
 pub const TELEMETRY: Table = Table {
     name: "telemetry",
@@ -208,4 +224,5 @@ pub const POLICY_STEPS: Table = Table {
 };
 
 /// Every table that an export may have.
-pub const ALL: [Table; 9] = [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, TELEMETRY, ALLOCATION, POLICY_STEPS];
+pub const ALL: [Table; 10] =
+    [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES, TELEMETRY, ALLOCATION, POLICY_STEPS];

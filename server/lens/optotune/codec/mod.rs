@@ -152,16 +152,18 @@ impl Request {
     pub fn reply(self, bytes: &[u8]) -> Result<Option<Reply>, WireError> {
         let Some((name, length)) = self.reply_form() else { return Err(WireError::Garbage) };
         let whole = bytes.get(..length + TRAILER);
-        if let Some(payload) = whole.and_then(checked) {
-            let reply = payload.strip_prefix(name).and_then(|values| self.decode(values));
-            return reply.map(Some).ok_or(WireError::Garbage);
+        let values = whole.and_then(checked).and_then(|payload| payload.strip_prefix(name));
+        if let Some(reply) = values.and_then(|values| self.decode(values)) {
+            return Ok(Some(reply));
         }
         if let Some(error) = error_reply(bytes) {
             return Err(error.into());
         }
         match whole {
             None => Ok(None),
-            Some(whole) if whole.starts_with(name) && whole.ends_with(b"\r\n") => Err(WireError::Checksum),
+            Some(whole) if whole.starts_with(name) && whole.ends_with(b"\r\n") && checked(whole).is_none() => {
+                Err(WireError::Checksum)
+            }
             Some(_) => Err(WireError::Garbage),
         }
     }
@@ -245,6 +247,8 @@ mod tests {
         assert_eq!(reply(Request::Mode, "4D4D410577280D0A"), Ok(Some(Reply::Mode(5))));
         for error in ["4531F3440D0A", "4501F3500D0A", "4E0D0A"] {
             assert_eq!(reply(Request::Status, error), Err(WireError::Device(DeviceError::Checksum)), "{error}");
+            // No longer than the reply that was waited for.
+            assert_eq!(reply(Request::FirmwareType, error), Err(WireError::Device(DeviceError::Checksum)), "{error}");
         }
     }
 

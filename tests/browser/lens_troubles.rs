@@ -1,0 +1,50 @@
+//! The operator reads in words what is wrong with a lens.
+
+use std::sync::Arc;
+
+use parfocal::clock::SystemClock;
+use parfocal::lens::emulator::{Emulator, Fault, Model};
+
+use crate::screenshots::shoot;
+use crate::support::Server;
+use crate::theatre::operator;
+use crate::webdriver::Driver;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_operator_reads_what_is_wrong_with_the_lens() {
+    let mut emulator = Emulator::start(Model::default(), Arc::new(SystemClock)).unwrap();
+    let lens = format!("optotune:{}", emulator.path().display());
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--lens", &lens]);
+    let driver = Driver::start().await;
+    let operator = operator(&driver, &server).await;
+    operator.sees("#devices", "Optotune lens").await;
+    operator.sees_no("#warnings .bad").await;
+    // A fault shows only once the lens is used.
+    operator.select("#policy", "mgm-hill-climber").await;
+    for (fault, words) in [
+        (Fault::Silent, "nothing answers at"),
+        (Fault::WrongChecksum, "checksum"),
+        (Fault::Garbage, "unreadable"),
+        (Fault::Errors, "does not know this command"),
+        (Fault::DropsCommands, "but stays at"),
+    ] {
+        emulator.set_fault(fault);
+        operator.sees("#warnings .bad", words).await;
+        emulator.set_fault(Fault::None);
+        operator.sees_no("#warnings .bad").await;
+    }
+    emulator.set_lens_present(false);
+    operator.sees("#warnings .bad", "no lens is connected").await;
+    emulator.set_lens_present(true);
+    operator.sees_no("#warnings .bad").await;
+    emulator.set_temperature(47.0);
+    operator.sees("#warnings", "at 47.0 °C").await;
+    shoot(&operator, "operator-9-hot-lens").await;
+    emulator.set_temperature(25.0);
+    emulator.unplug();
+    operator.sees("#warnings .bad", "is the driver plugged in?; trying again").await;
+    shoot(&operator, "operator-10-lens-unplugged").await;
+    emulator.plug_in().unwrap();
+    operator.sees_no("#warnings .bad").await;
+    assert_eq!(operator.text("#policy option:checked").await, "mgm-hill-climber", "focus mode is restored");
+}

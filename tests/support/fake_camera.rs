@@ -1,0 +1,66 @@
+//! Aravis's fake GigE Vision camera, a real peer on the loopback (Debian's package `aravis-tools`).
+
+use std::fs::File;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use parfocal::camera::gige::list;
+use parfocal::clock::{Clock, SystemClock};
+
+const PROGRAM: &str = "arv-fake-gv-camera-0.8";
+/// It answers to `Aravis-Fake-TEST`.
+const SERIAL: &str = "TEST";
+
+/// A fake camera. It has the machine's one GigE Vision port to itself: whoever wants one waits for their turn.
+pub struct Fake {
+    process: Child,
+    options: Vec<String>,
+    _turn: File,
+}
+
+impl Fake {
+    /// Starts it; nothing where the program is not installed.
+    pub fn start(options: &[&str]) -> Option<Self> {
+        let turn = File::create(std::env::temp_dir().join("parfocal-fake-camera.lock")).unwrap();
+        turn.lock().unwrap();
+        let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
+        let Ok(process) = Self::spawn(&options) else {
+            println!("skipped: {PROGRAM} is not installed (Debian package aravis-tools)");
+            return None;
+        };
+        let fake = Self { process, options, _turn: turn };
+        Self::wait_until_it_answers();
+        Some(fake)
+    }
+
+    fn spawn(options: &[String]) -> std::io::Result<Child> {
+        let mut command = Command::new(PROGRAM);
+        command.args(["-i", "127.0.0.1", "-s", SERIAL]).args(options).stdout(Stdio::null()).stderr(Stdio::null());
+        command.spawn()
+    }
+
+    fn wait_until_it_answers() {
+        let begun = SystemClock.now();
+        while !list().iter().any(|found| found.id.ends_with(SERIAL)) {
+            assert!(SystemClock.now().since(begun) < Duration::from_secs(20), "the fake camera never answers");
+        }
+    }
+
+    /// Takes its power away.
+    pub fn kill(&mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+
+    /// Gives it power again.
+    pub fn restart(&mut self) {
+        self.process = Self::spawn(&self.options).unwrap();
+    }
+}
+
+impl Drop for Fake {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
