@@ -158,7 +158,7 @@ pub const EVENTS: Table = Table {
 /// Camera and lens.
 pub const DEVICES: Table = Table {
     name: "devices",
-    description: "When camera and lens began and ceased to work, in words, and what the operator changed of the camera; from the start of each run of the server that served the session, so that the state in which the session began is told, to the session's end",
+    description: "When camera and lens ceased to work and, once they had for a second, worked again, in words, and what the operator changed of the camera; from the start of each run of the server that served the session, so that the state in which the session began is told, to the session's end",
     columns: &[
         column("number", Integer, "", "Order of the record in the database"),
         WALL,
