@@ -7,6 +7,7 @@ pub mod gige;
 mod pace;
 mod path;
 pub mod phantom;
+mod playback;
 mod pool;
 pub mod recorded;
 mod spec;

@@ -3,10 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::footage::FootageCamera;
 use super::phantom::{Before, PhantomCamera};
-use super::recorded::RecordedCamera;
-use super::{Camera, CameraError};
+use super::{Camera, CameraError, footage, recorded};
 use crate::clock::Clock;
 use crate::lens::Optics;
 
@@ -35,11 +33,11 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
         Some(("phantom", name)) if Before::named(name).is_some() => {
             Ok(Box::new(PhantomCamera::looking(Before::named(name).unwrap_or(Before::Hand), settings)))
         }
-        Some(("footage", path)) if !path.is_empty() => match FootageCamera::open(Path::new(path), settings) {
+        Some(("footage", path)) if !path.is_empty() => match footage::open(Path::new(path), settings) {
             Ok(camera) => Ok(Box::new(camera)),
             Err(error) => Err(CameraError::BadSource(error.to_string())),
         },
-        Some(("scan", path)) if !path.is_empty() => match RecordedCamera::open(Path::new(path), settings) {
+        Some(("scan", path)) if !path.is_empty() => match recorded::play(Path::new(path), settings) {
             Ok(camera) => Ok(Box::new(camera)),
             Err(error) => Err(CameraError::BadSource(error.to_string())),
         },

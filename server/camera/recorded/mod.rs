@@ -6,7 +6,7 @@ mod player;
 mod writing;
 
 pub use folder::{Damage, ScanFolder};
-pub use player::RecordedCamera;
+pub use player::open as play;
 pub use writing::{Recording, Shot};
 
 use std::io;
