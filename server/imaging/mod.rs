@@ -1,5 +1,6 @@
 //! Imaging: from a sensor's mosaic to what people and policies see. No thread, clock, file or socket.
 
+mod bad_reference;
 mod blur;
 mod calibration;
 mod calibration_toml;
