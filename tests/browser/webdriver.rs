@@ -1,6 +1,7 @@
 //! A browser to drive: headless Chromium through chromedriver, by the W3C `WebDriver` protocol (JSON over HTTP).
 
-use std::net::TcpListener;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -75,11 +76,19 @@ impl Driver {
 
 impl Drop for Driver {
     fn drop(&mut self) {
-        // It ends its browsers when asked to end; killed, it would leave them.
-        let _ = rustix::process::kill_process(
-            rustix::process::Pid::from_child(&self.process),
-            rustix::process::Signal::TERM,
-        );
+        // It ends its browsers when asked to; ended by a signal, it would leave them running.
+        let host = self.address.trim_start_matches("http://");
+        let asked = TcpStream::connect(host).and_then(|mut line| {
+            line.set_read_timeout(Some(Duration::from_secs(10)))?;
+            write!(
+                line,
+                "POST /shutdown HTTP/1.1\r\nHost: {host}\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{}}"
+            )?;
+            line.read_to_end(&mut Vec::new())
+        });
+        if asked.is_err() {
+            let _ = self.process.kill();
+        }
         let _ = self.process.wait();
     }
 }

@@ -11,7 +11,11 @@ const SETTINGS = {
   "frame-rate": { label: "Frame rate", unit: "fps", per: 1, less: (value) => value - 1, more: (value) => value + 1 },
 };
 
+// A value just asked for counts as the setting's until the camera had time to say what it made of it, so that quick taps add up.
+const SETTLED_MS = 2000;
+
 const rows = new Map();
+const asked = new Map();
 let offered = [];
 
 /** Draws what `offer` holds; the card is hidden where the camera offers nothing. */
@@ -59,7 +63,7 @@ function makeRow(setting) {
 
 function nudge(setting, step) {
   const now = find(setting);
-  if (now) change(setting, Math.min(Math.max(step(now.value), now.min), now.max));
+  if (now) change(setting, Math.min(Math.max(step(asked.get(setting) ?? now.value), now.min), now.max));
 }
 
 async function change(setting, value) {
@@ -67,12 +71,14 @@ async function change(setting, value) {
     setText(byId("camera-trouble"), `${SETTINGS[setting].label} must be a number.`);
     return;
   }
+  asked.set(setting, value);
+  const forget = () => asked.get(setting) === value && asked.delete(setting);
   try {
     await post("/api/operator/camera", { setting, value });
     setText(byId("camera-trouble"), "");
-    const now = find(setting);
-    if (now) now.value = value; // until the camera says what it made of it, so that quick taps add up
+    setTimeout(forget, SETTLED_MS);
   } catch (error) {
+    forget();
     setText(byId("camera-trouble"), error.status === 422 ? inBounds(setting) : inWords(error));
   }
 }
