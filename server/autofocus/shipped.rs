@@ -1,6 +1,6 @@
 //! The learned policies that ship with the program, and those that people train themselves.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::belief::BeliefTracker;
@@ -70,17 +70,45 @@ pub fn with_shipped(registry: Registry) -> Registry {
     })
 }
 
+/// Why weights in a folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// There are none.
+    #[error("there are no weights in {}: none of {names}", folder.display())]
+    Empty {
+        /// The folder.
+        folder: PathBuf,
+        /// Files that could be there.
+        names: String,
+    },
+    /// Some cannot be used.
+    #[error("the weights {} cannot be used: {reason}", file.display())]
+    Unfit {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
 /// `registry` with the learned policies whose weights lie in `folder` as `NAME.safetensors` in the place of those that
-/// ship; damaged ones are listed with the reason and not available.
-#[must_use]
-pub fn with_folder(registry: Registry, folder: &Path) -> Registry {
-    SHIPPED.iter().fold(registry, |registry, Shipped { name, summary, design, .. }| {
-        let file = folder.join(format!("{name}.safetensors"));
-        match std::fs::read(&file) {
-            Ok(bytes) => put(registry, name, summary, *design, bytes.into()),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => registry,
-            Err(error) => registry.without(name, summary, &format!("cannot read {}: {error}", file.display())),
-        }
+/// ship; those of which there are none stay.
+///
+/// # Errors
+/// When there are none at all, or some are damaged or cannot be read.
+pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, FolderError> {
+    let file_of = |name: &str| folder.join(format!("{name}.safetensors"));
+    let there: Vec<_> = SHIPPED.iter().filter(|shipped| file_of(shipped.name).exists()).collect();
+    if there.is_empty() {
+        let names: Vec<_> = SHIPPED.iter().map(|shipped| format!("{}.safetensors", shipped.name)).collect();
+        return Err(FolderError::Empty { folder: folder.to_owned(), names: names.join(", ") });
+    }
+    there.into_iter().try_fold(registry, |registry, Shipped { name, summary, design, .. }| {
+        let file = file_of(name);
+        let unfit = |reason: String| FolderError::Unfit { file: file.clone(), reason };
+        let bytes = std::fs::read(&file).map_err(|error| unfit(error.to_string()))?;
+        build(*design, &bytes).map_err(|error| unfit(error.to_string()))?;
+        Ok(put(registry, name, summary, *design, bytes.into()))
     })
 }
 
@@ -119,12 +147,15 @@ mod tests {
     }
 
     #[test]
-    fn damaged_weights_in_a_folder_are_told_and_missing_ones_leave_what_ships() {
+    fn damaged_and_missing_weights_in_a_folder_are_told_and_others_stay() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("mgm-learned.safetensors"), b"damaged").unwrap();
-        let registry = with_folder(with_shipped(Registry::default()), folder.path());
-        let error = registry.build(&PolicyName::new("mgm-learned")).err().unwrap().to_string();
-        assert!(error.contains("the weights are damaged"), "{error}");
-        assert!(registry.build(&PolicyName::new("parfocal")).is_ok());
+        let with = || with_folder(with_shipped(Registry::default()), folder.path());
+        assert!(with().err().unwrap().to_string().contains("mgm-learned.safetensors"));
+        let file = folder.path().join("mgm-learned.safetensors");
+        std::fs::write(&file, b"damaged").unwrap();
+        let error = with().err().unwrap().to_string();
+        assert!(error.contains("mgm-learned.safetensors") && error.contains("the weights are damaged"), "{error}");
+        std::fs::copy("policies/mgm-learned.safetensors", &file).unwrap();
+        assert!(with().unwrap().build(&PolicyName::new("parfocal")).is_ok());
     }
 }

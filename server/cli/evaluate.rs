@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     tch::set_num_threads(1);
     let mut registry = Registry::standard();
     if let Some(folder) = &arguments.weights {
-        registry = shipped::with_folder(registry, folder);
+        registry = shipped::with_folder(registry, folder)?;
     }
     let policies = policies(&arguments.policies, &registry);
     let registry = policies.iter().fold(registry, scripted::with_file);

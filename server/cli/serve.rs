@@ -19,7 +19,7 @@ use tracing_subscriber::EnvFilter;
 use super::Failure;
 use super::announce::{announcement, reachable};
 use super::{calibration, devices};
-use crate::autofocus::{PolicyName, Registry, scripted};
+use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Library, Parts};
@@ -58,6 +58,9 @@ pub struct Arguments {
     /// A policy from a `TorchScript` file, `file:PATH`: to be chosen, also in protocols, by that name. May be repeated.
     #[arg(long = "policy", value_name = "file:PATH")]
     policies: Vec<String>,
+    /// Folder with weights (`NAME.safetensors`) of your own training to take in the place of those that ship.
+    #[arg(long, value_name = "DIR")]
+    weights: Option<PathBuf>,
     /// Calibration of the sensor, a TOML file or a folder of `parfocal calibrate`; without it, that of a typical unit.
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
@@ -152,6 +155,9 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 /// The policies that ship and those from files, each tried once.
 fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
     let mut registry = Registry::standard();
+    if let Some(folder) = &arguments.weights {
+        registry = shipped::with_folder(registry, folder)?;
+    }
     for name in arguments.policies.iter().map(|name| PolicyName::new(name)) {
         registry = scripted::with_file(registry, &name);
         registry.build(&name)?;

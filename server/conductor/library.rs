@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     fn known() -> Vec<PolicyName> {
-        ["fixed", "mgm-hill-climber", "mlr-hill-climber"].map(PolicyName::new).to_vec()
+        ["fixed", "mgm-hill-climber", "mgm-learned", "cnn-learned"].map(PolicyName::new).to_vec()
     }
 
     #[test]

@@ -44,7 +44,7 @@ async fn six_sessions_are_a_balanced_set_and_the_seventh_begins_another() {
     assert!(next[0].seed != set[0].seed && next[0].set_index == 0);
     for position in 0..6 {
         let policies: Vec<&str> = set.iter().map(|session| session.segments[position].1.as_str()).collect();
-        for policy in ["fixed", "mgm-hill-climber", "mlr-hill-climber"] {
+        for policy in ["mgm-hill-climber", "mgm-learned", "cnn-learned"] {
             assert_eq!(policies.iter().filter(|name| **name == policy).count(), 2, "position {position}");
         }
     }

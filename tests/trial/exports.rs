@@ -81,7 +81,7 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
     // The protocol names the policies compared, as it must; nothing else names any.
     for file in files(&out).iter().filter(|file| *file != "protocol.toml") {
         let text = std::fs::read_to_string(out.join(file)).unwrap();
-        for tell in ["mgm", "mlr", "fixed", "12.5"] {
+        for tell in ["mgm", "cnn", "hill-climber", "12.5"] {
             assert!(!text.contains(tell), "{file} has '{tell}'");
         }
     }

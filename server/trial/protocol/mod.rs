@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     fn known() -> Vec<PolicyName> {
-        ["fixed", "mgm-hill-climber", "mlr-hill-climber"].map(PolicyName::new).to_vec()
+        ["fixed", "mgm-hill-climber", "mgm-learned", "cnn-learned"].map(PolicyName::new).to_vec()
     }
 
     fn error(source: &str) -> String {
@@ -176,7 +176,7 @@ mod tests {
         let line = text.lines().position(|line| line.contains("\"mgm-hill\"")).unwrap() + 1;
         let said = error(&text);
         assert!(said.starts_with(&format!("trial.toml, line {line}: key 'policies'")), "{said}");
-        assert!(said.contains("'mgm-hill'") && said.contains("mlr-hill-climber"), "{said}");
+        assert!(said.contains("'mgm-hill'") && said.contains("cnn-learned"), "{said}");
     }
 
     #[test]
