@@ -10,9 +10,11 @@
 use tch::{Device, Kind, Tensor, nn};
 
 use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
-use super::spectrum::{FEATURES, features};
+use super::registration::{CHANGES, changes};
+use super::spectrum::{FEATURES, Spectrum, features, spectrum};
 use super::weights::{self, WeightsError};
 use super::{Decision, Observation, Policy};
+use crate::imaging::Patch;
 
 /// Most focal power a frame: a lens can jump, but a surgeon should not see it.
 pub const MAX_MOVE: f64 = 0.1;
@@ -20,28 +22,43 @@ pub const MAX_MOVE: f64 = 0.1;
 pub const LEAST_MOVE: f64 = 0.012;
 
 /// What the tracker remembers of the frame before.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Trace {
-    last: Option<([f32; FEATURES], f32)>,
+    last: Option<Box<Frame>>,
     asked: Option<f32>,
 }
 
+#[derive(Debug, Clone)]
+struct Frame {
+    patch: Patch,
+    spectrum: Spectrum,
+    features: [f32; FEATURES],
+    focal_power: f32,
+}
+
 impl Trace {
-    /// The network's input for a frame with these features, seen at `focal_power`.
-    pub fn input(&mut self, features: &[f32; FEATURES], focal_power: f64) -> [f32; BELIEF_INPUT] {
+    /// The network's input for a frame that shows `patch`, seen at `focal_power`.
+    pub fn input(&mut self, patch: &Patch, focal_power: f64) -> [f32; BELIEF_INPUT] {
+        let spectrum = spectrum(patch);
+        let features = features(patch, &spectrum);
         let focal_power = focal_power as f32;
-        let (before, stood) = self.last.unwrap_or((*features, focal_power));
+        let now = Box::new(Frame { patch: *patch, spectrum, features, focal_power });
+        let before = self.last.as_ref().unwrap_or(&now);
         let mut input = [0.0; BELIEF_INPUT];
-        for index in 0..FEATURES {
-            input[index] = features[index];
-            input[FEATURES + index] = 4.0 * (features[index] - before[index]);
+        let (appearance, rest) = input.split_at_mut(FEATURES);
+        appearance.copy_from_slice(&features);
+        let (difference, rest) = rest.split_at_mut(FEATURES);
+        for (index, change) in difference.iter_mut().enumerate() {
+            *change = 4.0 * (features[index] - before.features[index]);
         }
-        spread_over_bins(f64::from(focal_power), &mut input[2 * FEATURES..2 * FEATURES + BINS]);
-        let moved = &mut input[2 * FEATURES + BINS..];
+        let (registered, rest) = rest.split_at_mut(CHANGES);
+        registered.copy_from_slice(&changes((&before.patch, &before.spectrum), (&now.patch, &now.spectrum)));
+        let (stands, moved) = rest.split_at_mut(BINS);
+        spread_over_bins(f64::from(focal_power), stands);
         moved[0] = 2.0 * (focal_power - 0.5);
-        moved[1] = 10.0 * (focal_power - stood);
+        moved[1] = 10.0 * (focal_power - before.focal_power);
         moved[2] = 10.0 * (self.asked.unwrap_or(focal_power) - focal_power);
-        self.last = Some((*features, focal_power));
+        self.last = Some(now);
         input
     }
 
@@ -106,7 +123,7 @@ impl BeliefTracker {
     }
 
     fn believe(&mut self, seen: &Observation<'_>) -> Vec<f32> {
-        let input = self.trace.input(&features(seen.patch), seen.focal_power.get());
+        let input = self.trace.input(seen.patch, seen.focal_power.get());
         let input = Tensor::from_slice(&input).view([1, 1, BELIEF_INPUT as i64]);
         let (logits, memory) = tch::no_grad(|| self.network.forward(&input, &self.memory));
         self.memory = memory;

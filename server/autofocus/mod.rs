@@ -6,6 +6,7 @@ mod hill_climber;
 pub mod learned;
 mod metrics;
 pub mod networks;
+mod registration;
 mod registry;
 pub mod scripted;
 pub mod shipped;

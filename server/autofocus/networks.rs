@@ -4,6 +4,7 @@
 use tch::nn::{self, Module, ModuleT, RNN};
 use tch::{Device, Kind, Tensor};
 
+use super::registration::CHANGES;
 use super::spectrum::FEATURES;
 use crate::imaging::PATCH_SIDE;
 
@@ -17,9 +18,9 @@ pub const ENCODING: usize = 8;
 pub const BINS: usize = 41;
 /// Units of the belief tracker's memory.
 pub const MEMORY: usize = 192;
-/// What the belief tracker sees of a frame: features, their change, where the lens stood (softly, one in [`BINS`]), and
-/// three numbers on how it moved.
-pub const BELIEF_INPUT: usize = 2 * FEATURES + BINS + 3;
+/// What the belief tracker sees of a frame: features, their change, the change over what this frame and the last have in common,
+/// where the lens stood (softly, one in [`BINS`]), and three numbers on how it moved.
+pub const BELIEF_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
 
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;

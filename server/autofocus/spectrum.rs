@@ -27,6 +27,20 @@ const HALF: usize = PATCH_SIDE / 2;
 
 type Matrix = [[f32; COLUMNS]; PATCH_SIDE];
 
+/// The transform of a patch less its mean under a Hann window: rows are frequencies 0..=31 down the patch, the first 17
+/// columns frequencies 0..=16 along it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectrum {
+    /// Real parts.
+    pub real: Matrix,
+    /// Imaginary parts.
+    pub imaginary: Matrix,
+    /// The patch's mean.
+    mean: f32,
+    /// Its variance.
+    variance: f32,
+}
+
 /// Waves for the transform, times the Hann window along their axis.
 struct Tables {
     /// cos and sin of 2 pi row column / 32 for the first [`COLUMNS`] frequencies.
@@ -37,6 +51,8 @@ struct Tables {
     full_sin: [[f32; PATCH_SIDE]; PATCH_SIDE],
     /// Band of each (row frequency, column frequency), `BANDS` for none.
     band: [[usize; COLUMNS]; PATCH_SIDE],
+    /// Frequency pairs in each band.
+    count: [f32; BANDS],
 }
 
 static TABLES: LazyLock<Tables> = LazyLock::new(|| {
@@ -49,12 +65,15 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     let full = |f: fn(f64) -> f64| -> [[f32; PATCH_SIDE]; PATCH_SIDE] {
         std::array::from_fn(|k| std::array::from_fn(|row| window[row] * f(wave(row, k)) as f32))
     };
+    let band: [[usize; COLUMNS]; PATCH_SIDE] = std::array::from_fn(|ky| std::array::from_fn(|kx| band(ky, kx)));
+    let members = |which| band.iter().flatten().filter(|&&band| band == which).count() as f32;
     Tables {
         cos: table(f64::cos),
         sin: table(f64::sin),
         full_cos: full(f64::cos),
         full_sin: full(f64::sin),
-        band: std::array::from_fn(|ky| std::array::from_fn(|kx| band(ky, kx))),
+        band,
+        count: std::array::from_fn(members),
     }
 });
 
@@ -69,27 +88,45 @@ fn band(ky: usize, kx: usize) -> usize {
     edges.windows(2).position(|pair| (pair[0]..pair[1]).contains(&radius)).unwrap_or(BANDS)
 }
 
-/// The patch's features, each of the order of 1.
+/// A patch's features, each of the order of 1.
 #[must_use]
-pub fn features(patch: &Patch) -> [f32; FEATURES] {
-    let tables = &*TABLES;
-    let mean = patch.0.iter().sum::<f32>() / patch.0.len() as f32;
-    let (energy, count) = band_energies(&patch.0, mean, tables);
-    let variance = patch.0.iter().map(|value| (value - mean).powi(2)).sum::<f32>() / patch.0.len() as f32;
+pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
+    let energy = band_energies(spectrum);
     let mut out = [0.0; FEATURES];
     for band in 0..BANDS {
         // 30: far below a gray level's noise, so that an empty band gives a finite value.
-        out[band] = 0.25 * ((energy[band] / count[band] + 30.0).ln() - 9.0);
+        out[band] = 0.25 * ((energy[band] / TABLES.count[band] + 30.0).ln() - 9.0);
     }
-    out[BANDS] = 0.5 * ((variance + 0.1).ln() - 5.0);
+    out[BANDS] = 0.5 * ((spectrum.variance + 0.1).ln() - 5.0);
     out[BANDS + 1] = ((mgm(patch) + 0.5).ln() - 3.5) as f32;
     out[BANDS + 2] = 0.5 * ((mlr(patch) - 1.0 + 1e-4).ln() as f32 + 3.5);
-    out[BANDS + 3] = (mean - 128.0) / 64.0;
+    out[BANDS + 3] = (spectrum.mean - 128.0) / 64.0;
     out
 }
 
+/// The transform of a patch.
+#[must_use]
+pub fn spectrum(patch: &Patch) -> Spectrum {
+    let mean = column_sums(patch, |value| value).iter().sum::<f32>() / patch.0.len() as f32;
+    let variance = column_sums(patch, |value| (value - mean).powi(2)).iter().sum::<f32>() / patch.0.len() as f32;
+    let mut spectrum = transform(&patch.0, mean, &TABLES);
+    spectrum.variance = variance;
+    spectrum
+}
+
+/// Sum of `term` down each column: as many sums side by side as vectors hold.
+fn column_sums(patch: &Patch, term: impl Fn(f32) -> f32) -> [f32; PATCH_SIDE] {
+    let mut sums = [0.0; PATCH_SIDE];
+    for line in patch.0.chunks_exact(PATCH_SIDE) {
+        for (sum, &value) in sums.iter_mut().zip(line) {
+            *sum += term(value);
+        }
+    }
+    sums
+}
+
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn band_energies(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables) -> ([f32; BANDS], [f32; BANDS]) {
+fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables) -> Spectrum {
     let mut real = [[0.0f32; COLUMNS]; PATCH_SIDE];
     let mut imaginary = [[0.0f32; COLUMNS]; PATCH_SIDE];
     for (row, line) in patch.chunks_exact(PATCH_SIDE).enumerate() {
@@ -101,9 +138,10 @@ fn band_energies(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tab
             }
         }
     }
-    let (mut energy, mut count) = ([0.0f32; BANDS], [0.0f32; BANDS]);
+    let mut out =
+        Spectrum { real: [[0.0; COLUMNS]; PATCH_SIDE], imaginary: [[0.0; COLUMNS]; PATCH_SIDE], mean, variance: 0.0 };
     for ky in 0..PATCH_SIDE {
-        let (mut re, mut im) = ([0.0f32; COLUMNS], [0.0f32; COLUMNS]);
+        let (re, im) = (&mut out.real[ky], &mut out.imaginary[ky]);
         for row in 0..PATCH_SIDE {
             let (cos, sin) = (tables.full_cos[ky][row], tables.full_sin[ky][row]);
             for k in 0..COLUMNS {
@@ -111,15 +149,20 @@ fn band_energies(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tab
                 im[k] += real[row][k] * sin + imaginary[row][k] * cos;
             }
         }
-        for k in 0..=HALF {
-            let band = tables.band[ky][k];
-            if band < BANDS {
-                energy[band] += re[k] * re[k] + im[k] * im[k];
-                count[band] += 1.0;
-            }
+    }
+    out
+}
+
+fn band_energies(spectrum: &Spectrum) -> [f32; BANDS] {
+    // One more than there are bands takes what belongs to none.
+    let mut energy = [0.0f32; BANDS + 1];
+    for (ky, bands) in TABLES.band.iter().enumerate() {
+        let (real, imaginary) = (&spectrum.real[ky], &spectrum.imaginary[ky]);
+        for kx in 0..=HALF {
+            energy[bands[kx]] += real[kx] * real[kx] + imaginary[kx] * imaginary[kx];
         }
     }
-    (energy, count)
+    std::array::from_fn(|band| energy[band])
 }
 
 #[cfg(test)]
@@ -135,7 +178,7 @@ mod tests {
     #[test]
     fn a_wave_lights_up_its_own_band() {
         for (frequency, band) in [(2.0, 0), (5.0, 4), (10.0, 8), (14.0, 11)] {
-            let found = features(&wave(frequency));
+            let found = features(&wave(frequency), &spectrum(&wave(frequency)));
             let brightest = (0..BANDS).max_by(|&a, &b| found[a].total_cmp(&found[b])).unwrap();
             assert!(brightest.abs_diff(band) <= 1, "{frequency}: {brightest}");
         }
@@ -146,7 +189,7 @@ mod tests {
         // A wave of amplitude A at frequency (5, 0) under a Hann window (weights 1/4, 1/2, 1/4 on neighbouring
         // frequencies along each axis) has |X|² = (A/2 · 512² · ...)²: summed over the half plane, with both signs of
         // the row frequency, (A/2 · 32 · 32)² · (3/8)² by Parseval.
-        let (energy, _) = band_energies(&wave(5.0).0, 128.0, &TABLES);
+        let energy = band_energies(&transform(&wave(5.0).0, 128.0, &TABLES));
         let expected = (25.0f32 * 1024.0 * 0.375).powi(2);
         let found = energy.iter().sum::<f32>();
         assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");

@@ -25,7 +25,7 @@ enum Compute {
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`; with `-paper` behind one of the first three, by the
-    /// paper's recipe.
+    /// paper's recipe; with `-refined` behind one of the last two, what follows with `--from` its weights.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]
@@ -45,6 +45,9 @@ pub struct Arguments {
     /// Go on where the run folder's checkpoint stands.
     #[arg(long)]
     resume: bool,
+    /// Weights (safetensors) of the same policy to begin with in the place of random ones.
+    #[arg(long, value_name = "FILE", conflicts_with = "resume")]
+    from: Option<PathBuf>,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -71,6 +74,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         eprintln!(
             "note: the checkpoint was made by parfocal {version}; what follows may differ from what it would have given"
         );
+    }
+    if let Some(file) = &arguments.from {
+        run.begin_from(file)?;
     }
     let stop = interrupt::flag(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());

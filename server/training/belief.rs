@@ -16,7 +16,6 @@ use super::scan::Variety;
 use super::session::{Session, lead_astray};
 use crate::autofocus::belief::{Trace, median, spread_over_bins, target};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
-use crate::autofocus::spectrum::features;
 
 /// How a belief tracker is trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -142,8 +141,8 @@ impl BeliefTrainer {
         let mut believed = vec![0.0f32; count * BINS];
         for t in 0..window {
             for (index, seat) in self.seats.iter_mut().enumerate() {
-                let seen = features(&seat.session.observe());
-                let input = seat.trace.input(&seen, seat.session.focal_power().get());
+                let patch = seat.session.observe();
+                let input = seat.trace.input(&patch, seat.session.focal_power().get());
                 now[index * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
                 inputs[(index * window + t) * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
             }

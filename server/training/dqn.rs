@@ -15,7 +15,7 @@ use tch::{Device, Reduction, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
-use super::dqn_batch::{Batch, bellman, gains};
+use super::dqn_batch::{Batch, Returns, bellman, gains};
 use super::dqn_recipe::{DqnRecipe, Target};
 use super::optimiser::{Flat, Optimiser};
 use super::replay::{Frames, Replay, Seen, Step};
@@ -24,6 +24,7 @@ use super::session::{Session, lead_astray};
 use super::values::Values;
 use crate::autofocus::learned::{Sight, action_step, best_action, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
+use crate::autofocus::weights::{self, WeightsError};
 
 /// A training in progress.
 pub struct DqnTrainer {
@@ -71,6 +72,16 @@ impl DqnTrainer {
         let replay = Replay::new(recipe.replay, recipe.scans);
         let (updates, frames) = (0, 0);
         Self { recipe, clips, online, target, target_variables, optimiser, seats, replay, rng, updates, frames }
+    }
+
+    /// Begins with the weights in `bytes` (safetensors) in the place of random ones.
+    ///
+    /// # Errors
+    /// When they are damaged or another network's.
+    pub fn begin_from(&mut self, bytes: &[u8]) -> Result<(), WeightsError> {
+        weights::load(&self.online.store, bytes)?;
+        self.target_variables.approach(self.optimiser.flat(), 1.0);
+        Ok(())
     }
 
     /// The variables of the network that is trained.
@@ -237,18 +248,19 @@ impl DqnTrainer {
         let values = Self::values(&self.online, batch, encodings);
         let device = self.device();
         match self.recipe.target {
-            Target::Lookahead => {
-                let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[at])).collect();
+            Target::Lookahead { restless } => {
+                let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[at], restless)).collect();
                 let wanted = Tensor::from_slice(&wanted).view([-1, ACTIONS as i64]).to_device(device);
                 values.smooth_l1_loss(&wanted, Reduction::Mean, 1.0)
             }
-            Target::Bellman { discount, steps, double } => {
+            Target::Bellman { discount, steps, double, regret } => {
                 let target = tch::no_grad(|| Self::values(&self.target, batch, &self.target.encode(&batch.frames)));
                 let picker = if double { values.detach() } else { target.shallow_clone() };
                 let next = target.gather(1, &picker.argmax(1, true), false).view([-1]);
                 let mut next_values = vec![0.0f32; batch.states.len()];
                 next.copy_data(&mut next_values, batch.states.len());
-                let (taken, wanted) = bellman(batch, &next_values, discount, steps, self.recipe.window);
+                let returns = Returns { discount, steps, regret };
+                let (taken, wanted) = bellman(batch, &next_values, returns, self.recipe.window);
                 let (rows, actions): (Vec<i64>, Vec<i64>) = taken.into_iter().unzip();
                 let chosen = values.index_select(0, &Tensor::from_slice(&rows).to_device(device));
                 let actions = Tensor::from_slice(&actions).view([-1, 1]).to_device(device);

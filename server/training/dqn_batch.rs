@@ -9,6 +9,7 @@
 use tch::{Device, Tensor};
 
 use super::replay::{Frames, Step};
+use super::rollout::IN_FOCUS;
 use crate::autofocus::STEP;
 use crate::autofocus::learned::{action_step, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
@@ -50,19 +51,62 @@ fn reach(step: &Step) -> usize {
     usize::from(step.age).min(HISTORY - 1)
 }
 
-/// What each action would gain at the next frame over standing still, in steps.
-pub(super) fn gains(step: &Step) -> [f32; ACTIONS] {
+/// What each action would gain at the next frame over standing still, in steps; and what moving earns by itself, up to `restless`
+/// steps where the picture is well out of focus: only who moves learns where to go.
+pub(super) fn gains(step: &Step, restless: f64) -> [f32; ACTIONS] {
     let (stands, best) = (FocalPower::nearest(f64::from(step.focal_power)), f64::from(step.next_optimum));
     let error = |action| (stands.moved(action_step(action)).get() - best).abs();
-    std::array::from_fn(|action| ((error(1) - error(action)) / STEP) as f32)
+    let lost = (error(1) / IN_FOCUS - 0.5).clamp(0.0, 1.0);
+    std::array::from_fn(|action| {
+        let moves = action_step(action) != 0.0;
+        ((error(1) - error(action)) / STEP + if moves { restless * lost } else { 0.0 }) as f32
+    })
 }
 
-/// The states whose successors `steps` frames on are in the batch, as (row, action taken), and their targets.
+/// How Bellman's equation is applied: the fields of [`super::dqn_recipe::Target::Bellman`] that rewards depend on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Returns {
+    pub discount: f64,
+    pub steps: usize,
+    pub regret: bool,
+}
+
+impl Returns {
+    /// The return of the frames from `at` on, up to the state `steps` later, whose value is `next_value`.
+    fn of(&self, steps: &[Step], at: usize, next_value: f64) -> f64 {
+        let end = at + self.steps;
+        let mut sum = 0.0;
+        for (ahead, pair) in steps[at..=end].windows(2).enumerate() {
+            let error = f64::from((pair[0].next_optimum - pair[1].focal_power).abs());
+            sum -= self.discount.powi(ahead as i32) * error;
+        }
+        let later = self.discount.powi(self.steps as i32);
+        if !self.regret {
+            return later.mul_add(next_value, sum);
+        }
+        let shaped = sum + later * self.oracle(&steps[end]) - self.oracle(&steps[at]);
+        // Mean regret a frame, roughly, whatever the horizon.
+        later.mul_add(next_value, shaped * (1.0 - self.discount) / STEP)
+    }
+
+    /// What an oracle that steps towards the optimum would yet get from where `step` stands, were the optimum to stay.
+    fn oracle(&self, step: &Step) -> f64 {
+        let mut error = f64::from((step.next_optimum - step.focal_power).abs());
+        let (mut sum, mut weight) = (0.0, 1.0);
+        while error > STEP {
+            error -= STEP;
+            sum -= weight * error;
+            weight *= self.discount;
+        }
+        sum
+    }
+}
+
+/// The states whose successors some steps on are in the batch, as (row, action taken), and their targets.
 pub(super) fn bellman(
     batch: &Batch,
     next_values: &[f32],
-    discount: f64,
-    steps: usize,
+    returns: Returns,
     window: usize,
 ) -> (Vec<(i64, i64)>, Vec<f32>) {
     let mut row_of = vec![None; batch.steps.len()];
@@ -71,17 +115,12 @@ pub(super) fn bellman(
     }
     let (mut taken, mut wanted) = (Vec::new(), Vec::new());
     for (row, &at) in batch.states.iter().enumerate() {
-        let end = at + steps;
+        let end = at + returns.steps;
         let same_scan = end / window == at / window
-            && usize::from(batch.steps[end].age) == usize::from(batch.steps[at].age) + steps;
+            && usize::from(batch.steps[end].age) == usize::from(batch.steps[at].age) + returns.steps;
         let Some(last) = same_scan.then(|| row_of[end]).flatten() else { continue };
-        let mut sum = discount.powi(steps as i32) * f64::from(next_values[last]);
-        for ahead in 0..steps {
-            let (now, next) = (&batch.steps[at + ahead], &batch.steps[at + ahead + 1]);
-            sum -= discount.powi(ahead as i32) * f64::from((now.next_optimum - next.focal_power).abs());
-        }
         taken.push((row as i64, i64::from(batch.steps[at].action)));
-        wanted.push(sum as f32);
+        wanted.push(returns.of(&batch.steps, at, f64::from(next_values[last])) as f32);
     }
     (taken, wanted)
 }

@@ -17,10 +17,20 @@ pub enum Target {
         steps: usize,
         /// Whether the online network picks the action that the target network values.
         double: bool,
+        /// Whether rewards are counted in steps a frame and against what an oracle would get from the same place: the policy that
+        /// is best stays the same, since that is shaping by a potential (Ng, Harada, Russell 1999), but what no policy can
+        /// know, how far away the optimum is, no longer drowns what an action changes.
+        #[serde(default)]
+        regret: bool,
     },
     /// What each of the three actions would have gained over standing still at the next frame, in steps; known in
     /// simulation for all three whichever was taken.
-    Lookahead,
+    Lookahead {
+        /// What moving earns by itself where the picture is well out of focus, in steps: who stands still cannot tell on which
+        /// side the optimum lies.
+        #[serde(default)]
+        restless: f64,
+    },
 }
 
 /// How a DQN policy is trained.

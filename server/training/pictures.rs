@@ -58,7 +58,7 @@ pub fn sharp_phantom(split: Split, index: u64) -> GrayImage {
 }
 
 /// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds; half of all with a
-/// contrast that varies from place to place, and one in four soft, as optics, demosaicing and compression leave footage.
+/// contrast that varies from place to place, and half of all soft, as optics, demosaicing and compression leave footage.
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.
@@ -70,8 +70,8 @@ pub fn varied(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
             if index % 2 == 0 {
                 vary_contrast(&mut picture, 0.2 + 0.2 * (index / 2 % 6) as f32, seed);
             }
-            if index % 4 == 1 {
-                picture = gaussian_blur(&picture, 0.3 + 0.1 * (index / 4 % 9) as f64);
+            if index % 4 < 2 {
+                picture = gaussian_blur(&picture, 0.3 + 0.1 * (index / 4 % 10) as f64);
             }
             Clip::still(picture).map(Arc::new)
         })

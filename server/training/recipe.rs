@@ -23,15 +23,17 @@ pub struct Recipe {
     pub belief: Option<BeliefRecipe>,
 }
 
-/// The recipes that ship: ours by the policy's name, the paper's with `-paper` behind it.
-const SHIPPED: [(&str, &str); 7] = [
+/// The recipes that ship: ours by the policy's name, what comes after it with `-refined` behind it, the paper's with `-paper`.
+const SHIPPED: [(&str, &str); 9] = [
     ("mgm-learned", include_str!("recipes/mgm-learned.toml")),
     ("mlr-learned", include_str!("recipes/mlr-learned.toml")),
     ("cnn-learned", include_str!("recipes/cnn-learned.toml")),
+    ("cnn-learned-refined", include_str!("recipes/cnn-learned-refined.toml")),
     ("mgm-learned-paper", include_str!("recipes/mgm-learned-paper.toml")),
     ("mlr-learned-paper", include_str!("recipes/mlr-learned-paper.toml")),
     ("cnn-learned-paper", include_str!("recipes/cnn-learned-paper.toml")),
     ("parfocal", include_str!("recipes/parfocal.toml")),
+    ("parfocal-refined", include_str!("recipes/parfocal-refined.toml")),
 ];
 
 /// The text of the recipe that ships under `name`.
@@ -113,7 +115,7 @@ mod tests {
     fn every_shipped_recipe_is_sound_and_makes_its_policy() {
         for name in names() {
             let recipe = Recipe::parse(shipped(name).unwrap()).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert_eq!(recipe.policy, name.trim_end_matches("-paper"));
+            assert_eq!(recipe.policy, name.trim_end_matches("-paper").trim_end_matches("-refined"));
         }
     }
 

@@ -44,6 +44,14 @@ pub enum TrainError {
         /// Why.
         source: std::io::Error,
     },
+    /// The weights to begin with cannot be used.
+    #[error("cannot begin with the weights {}: {reason}", path.display())]
+    Weights {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// The weights came out damaged: the training diverged.
     #[error("the training diverged: {0}; lower the learning rate")]
     Diverged(String),
@@ -79,6 +87,8 @@ pub struct Run {
     curve: Vec<(u64, f64, Option<f64>)>,
     best: f64,
     other_version: Option<String>,
+    /// Weights it began with, if not with random ones.
+    origin: Option<String>,
 }
 
 impl Run {
@@ -112,14 +122,30 @@ impl Run {
             _ => return Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", recipe.policy))),
         };
         let folder = folder.to_owned();
-        let (curve, best, other_version) = (Vec::new(), f64::INFINITY, None);
-        let mut run = Self { recipe, design, seed, folder, learner, validation, curve, best, other_version };
+        let (curve, best, other_version, origin) = (Vec::new(), f64::INFINITY, None, None);
+        let mut run = Self { recipe, design, seed, folder, learner, validation, curve, best, other_version, origin };
         if resume {
             run.restore()?;
         } else {
             run.open_folder()?;
         }
         Ok(run)
+    }
+
+    /// Begins with the weights in `file` in the place of random ones.
+    ///
+    /// # Errors
+    /// When they cannot be read, or are damaged or another policy's.
+    pub fn begin_from(&mut self, file: &Path) -> Result<(), TrainError> {
+        let unfit = |reason: String| TrainError::Weights { path: file.to_owned(), reason };
+        let bytes = fs::read(file).map_err(|error| unfit(error.to_string()))?;
+        match &mut self.learner {
+            Learner::Dqn(dqn) => dqn.begin_from(&bytes),
+            Learner::Belief(belief) => weights::load(&belief.store, &bytes),
+        }
+        .map_err(|error| unfit(error.to_string()))?;
+        self.origin = Some(file.display().to_string());
+        Ok(())
     }
 
     /// Updates done.
@@ -241,7 +267,7 @@ impl Run {
     /// What whoever uses the weights should know of them.
     fn card(&self, row: &Row) -> String {
         format!(
-            "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`.\n\n\
+            "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, beginning with {}.\n\n\
              On {} validation scans: mean absolute focal power error {:.4} ± {:.4}, in focus {:.1} %.\n\n\
              Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
              and layouts. Not a medical device.\n",
@@ -249,6 +275,7 @@ impl Run {
             VERSION,
             self.seed,
             self.updates(),
+            self.origin.as_ref().map_or("random weights".to_owned(), |file| format!("the weights {file}")),
             self.validation.count,
             row.mae,
             row.sd,
@@ -284,6 +311,9 @@ impl Run {
         note("recipe", self.recipe_text());
         note("seed", self.seed.to_string());
         note("best", self.best.to_string());
+        if let Some(origin) = &self.origin {
+            note("origin", origin.clone());
+        }
         let curve: Vec<String> = self
             .curve
             .iter()
@@ -306,6 +336,7 @@ impl Run {
         self.other_version = (version != VERSION).then(|| version.to_owned());
         self.seed = checkpoint.number("seed")?;
         self.best = checkpoint.number("best")?;
+        self.origin = checkpoint.notes.get("origin").cloned();
         for line in checkpoint.notes.get("curve").into_iter().flat_map(|curve| curve.lines()) {
             let mut parts = line.split(',');
             let mut next = || parts.next().unwrap_or_default().to_owned();

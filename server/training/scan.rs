@@ -38,6 +38,10 @@ pub struct ScanSettings {
     pub flicker: f64,
     /// Contrast and brightness: gray becomes `gain * gray + offset`.
     pub exposure: (f64, f64),
+    /// Share of the light that comes from something in view that moves by itself, as fluids, instruments and reflections do.
+    pub veil: f64,
+    /// Standard deviation, in gray levels, of a pattern that stays with the sensor.
+    pub pattern: f64,
 }
 
 impl ScanSettings {
@@ -61,6 +65,8 @@ impl Default for ScanSettings {
             tremor: 0.0,
             flicker: 0.0,
             exposure: (1.0, 0.0),
+            veil: 0.0,
+            pattern: 0.0,
         }
     }
 }
@@ -76,7 +82,12 @@ pub struct Scan {
     time: usize,
     focus: Walk,
     crop: [Walk; 2],
+    /// Where the veil lies on the clip, if there is one.
+    veil: Option<[Walk; 2]>,
+    /// The sensor's pattern, a gray level a pixel; empty if there is none.
+    pattern: Vec<f32>,
     course: ChaCha8Rng,
+    veil_course: ChaCha8Rng,
     noise: ChaCha8Rng,
     defocus: Defocus,
 }
@@ -89,13 +100,33 @@ impl Scan {
         let sigma0 = course.random_range(settings.blur.0..=settings.blur.1);
         let focus = Walk::new((0.0, 1.0), settings.focus, &mut course);
         let Area { left, top, right, bottom } = clip.area();
-        let crop = [(left, right), (top, bottom)]
-            .map(|(low, high)| Walk::new((low as f64, (high - PATCH_SIDE) as f64), settings.crop, &mut course));
+        let room = [(left, right), (top, bottom)].map(|(low, high)| (low as f64, (high - PATCH_SIDE) as f64));
+        let crop = room.map(|room| Walk::new(room, settings.crop, &mut course));
         let time = if clip.len() > 1 { course.random_range(0..2 * clip.len()) } else { 0 };
-        let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
+        let mut noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
+        let mut veil_course = ChaCha8Rng::seed_from_u64(seed ^ 0x7665_696c);
+        let veil = (settings.veil > 0.0).then(|| room.map(|room| Walk::new(room, settings.crop, &mut veil_course)));
+        let pixels = if settings.pattern > 0.0 { PATCH_SIDE * PATCH_SIDE } else { 0 };
+        let pattern = (0..pixels).map(|_| settings.pattern as f32 * cheap_normal(&mut noise)).collect();
         let tremor = settings.tremor * standard_normal(&mut course);
         let contrast = (settings.flicker * standard_normal(&mut course)).exp();
-        Self { clip, settings, sigma0, tremor, contrast, time, focus, crop, course, noise, defocus: Defocus::default() }
+        let defocus = Defocus::default();
+        Self {
+            clip,
+            settings,
+            sigma0,
+            tremor,
+            contrast,
+            time,
+            focus,
+            crop,
+            veil,
+            pattern,
+            course,
+            veil_course,
+            noise,
+            defocus,
+        }
     }
 
     /// The optimal focal power at this frame.
@@ -113,8 +144,14 @@ impl Scan {
     /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.
     pub fn observe(&mut self, focal_power: FocalPower) -> Patch {
         let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
-        let corner = (self.crop[0].position() as isize, self.crop[1].position() as isize);
-        let mut patch = self.defocus.patch(self.clip.at(self.time), corner, sigma, self.settings.spot);
+        let mut patch = self.look(corner(&self.crop), sigma);
+        if let Some(at) = self.veil.as_ref().map(corner) {
+            let share = self.settings.veil as f32;
+            let veil = self.look(at, sigma);
+            for (value, veiled) in patch.0.iter_mut().zip(veil.0) {
+                *value += share * (veiled - *value);
+            }
+        }
         let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
         expose(&mut patch, gain, self.contrast as f32, offset);
         if self.settings.noise > 0.0 {
@@ -122,8 +159,15 @@ impl Scan {
                 *value += self.settings.noise as f32 * cheap_normal(&mut self.noise);
             }
         }
+        for (value, pattern) in patch.0.iter_mut().zip(&self.pattern) {
+            *value += pattern;
+        }
         digitise(&mut patch);
         patch
+    }
+
+    fn look(&mut self, corner: (isize, isize), sigma: f64) -> Patch {
+        self.defocus.patch(self.clip.at(self.time), corner, sigma, self.settings.spot)
     }
 
     /// Goes on to the next frame.
@@ -131,9 +175,14 @@ impl Scan {
         self.time += 1;
         self.focus.advance(&mut self.course);
         self.crop.iter_mut().for_each(|walk| walk.advance(&mut self.course));
+        self.veil.iter_mut().flatten().for_each(|walk| walk.advance(&mut self.veil_course));
         self.tremor = self.settings.tremor * standard_normal(&mut self.course);
         self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
     }
+}
+
+fn corner(walks: &[Walk; 2]) -> (isize, isize) {
+    (walks[0].position() as isize, walks[1].position() as isize)
 }
 
 /// Scales what differs from the patch's mean by `contrast`, and all by `gain`.
@@ -168,22 +217,24 @@ pub struct Variety {
 }
 
 impl Variety {
-    /// Settings for one scan: with probability `share` varied in speed, spot, noise and exposure.
+    /// Settings for one scan: with probability `share` varied in speed, spot, noise, exposure and what else is in view.
     pub fn draw(&self, rng: &mut impl Rng) -> ScanSettings {
         let mut settings = ScanSettings::reference();
         if !rng.random_bool(self.share) {
             return settings;
         }
         let factor = |rng: &mut _, spread: f64| (spread * standard_normal(rng)).exp();
-        settings.focus.speed *= factor(rng, 0.3);
+        settings.focus.speed *= factor(rng, 0.45);
         settings.focus.memory *= factor(rng, 0.4);
-        settings.crop.speed *= 0.7 * factor(rng, 0.8);
+        settings.crop.speed *= factor(rng, 1.2);
         settings.crop.memory *= factor(rng, 0.4);
         settings.spot = if rng.random_bool(0.5) { Spot::Disc } else { Spot::Gaussian };
         settings.tremor = if rng.random_bool(0.5) { rng.random_range(0.0..0.6) } else { 0.0 };
         settings.flicker = if rng.random_bool(0.7) { rng.random_range(0.0..0.2) } else { 0.0 };
         settings.noise = if rng.random_bool(0.7) { rng.random_range(0.0..4.0) } else { 0.0 };
         let gain: f64 = rng.random_range(0.3..1.3);
+        settings.veil = if rng.random_bool(0.3) { rng.random_range(0.0..0.4) } else { 0.0 };
+        settings.pattern = if rng.random_bool(0.4) { rng.random_range(0.0..3.0) } else { 0.0 };
         settings.exposure = (gain, rng.random_range(-0.5..1.0) * 120.0 * (1.0 - gain));
         settings
     }

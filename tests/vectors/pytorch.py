@@ -72,7 +72,7 @@ with torch.no_grad():
     fill(cnn)
     patches = wave(8 * 1024, 0.113, 100.0, 128.0).view(8, 1024)
     values = cnn(patches, wave(8, 0.7, 1.0))
-    inputs, units, bins = 80, 192, 41
+    inputs, units, bins = 87, 192, 41
     belief = Belief(inputs, units, bins)
     fill(belief)
     logits = belief(wave(2 * 5 * inputs, 0.29, 1.0).view(2, 5, inputs))
