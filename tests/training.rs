@@ -48,6 +48,17 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
 }
 
 #[test]
+fn what_begins_with_weights_begins_with_what_they_know() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = Run::start(small("mgm-learned", 1), 7, Vec::new(), folder.path(), false, tch::Device::Cpu).unwrap();
+    run.begin_from(Path::new("policies/mgm-learned.safetensors")).unwrap();
+    assert!(run.go(&SystemClock, &|| false, &mut |_| ()).unwrap());
+    // After a single update: the shipped weights' error, where random ones stand at 0.25.
+    assert!(run.best() < 0.15, "{}", run.best());
+    assert!(std::fs::read_to_string(folder.path().join("MODEL_CARD.md")).unwrap().contains("the weights policies/mgm"));
+}
+
+#[test]
 fn training_resumed_is_training_never_stopped() {
     for policy in ["mgm-learned", "cnn-learned", "parfocal"] {
         let recipe = small(policy, 2 * LEG);
@@ -95,6 +106,10 @@ fn bad_input_is_answered_with_one_sentence() {
     let recipe = folder.path().join("recipe.toml");
     std::fs::write(&recipe, shipped("mgm-learned").unwrap().replace("warm_up", "warmup")).unwrap();
     let recipe = recipe.to_str().unwrap();
+    let few = folder.path().join("few.toml");
+    std::fs::write(&few, shipped("mgm-learned").unwrap().replace("pictures = 960", "pictures = 3")).unwrap();
+    let few = few.to_str().unwrap();
+    let foreign = "policies/parfocal.safetensors";
     for (arguments, told) in [
         (vec!["evaluate", "--policies", "nonsense", "--count", "1"], "there is no policy 'nonsense'"),
         (vec!["evaluate", "--footage", "/no/such.mp4"], "there is no such file"),
@@ -102,6 +117,12 @@ fn bad_input_is_answered_with_one_sentence() {
         (vec!["train", "parfocal", "--out", out, "--device", "cuda"], "use --device cpu"),
         (vec!["train", "mgm-learned", "--out", out, "--config", recipe], "unknown field `warmup`"),
         (vec!["train", "parfocal", "--out", out, "--resume"], "cannot use the checkpoint"),
+        (
+            vec!["train", "mgm-learned", "--out", out, "--config", few, "--from", foreign],
+            "the weights are of another network",
+        ),
+        (vec!["evaluate", "--weights", out, "--count", "1"], "there are no weights in"),
+        (vec!["serve", "--weights", out], "there are no weights in"),
     ] {
         let output = parfocal(&arguments);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -3,6 +3,7 @@
 pub mod belief;
 pub mod checkpoint;
 pub mod clip;
+mod curves;
 pub mod defocus;
 pub mod dqn;
 mod dqn_batch;

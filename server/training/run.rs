@@ -1,8 +1,7 @@
 //! One training from beginning to end: legs of updates, validations, checkpoints, and the best weights so far, in a run
 //! folder.
-#![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "curves need single precision")]
+#![allow(clippy::cast_possible_truncation, reason = "event files hold single precision")]
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +11,7 @@ use tch::Device;
 use super::belief::BeliefTrainer;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
+use super::curves::curves;
 use super::dqn::DqnTrainer;
 use super::evaluate::{Benchmark, Outcome, Row, evaluate};
 use super::pictures::{Split, varied};
@@ -87,6 +87,8 @@ pub struct Run {
     curve: Vec<(u64, f64, Option<f64>)>,
     best: f64,
     other_version: Option<String>,
+    /// What it trains on, in words.
+    data: String,
     /// Weights it began with, if not with random ones.
     origin: Option<String>,
 }
@@ -106,7 +108,13 @@ impl Run {
         device: Device,
     ) -> Result<Self, TrainError> {
         let design = design(&recipe)?;
+        // Read first: drawing pictures takes a while, and a checkpoint that is not there should be told at once.
+        let checkpoint = if resume { Some(Checkpoint::read(&folder.join(CHECKPOINT))?) } else { None };
         let unfit = |error: super::clip::ClipError| TrainError::Recipe(error.to_string());
+        let data = match footage.len() {
+            0 => format!("{} drawn pictures and brain phantoms", recipe.pictures),
+            count => format!("{count} clips of footage"),
+        };
         let clips = if footage.is_empty() { varied(Split::Training, recipe.pictures).map_err(unfit)? } else { footage };
         let held_out = varied(Split::Validation, recipe.pictures.min(60)).map_err(unfit)?;
         let count = held_out.len();
@@ -123,11 +131,11 @@ impl Run {
         };
         let folder = folder.to_owned();
         let (curve, best, other_version, origin) = (Vec::new(), f64::INFINITY, None, None);
-        let mut run = Self { recipe, design, seed, folder, learner, validation, curve, best, other_version, origin };
-        if resume {
-            run.restore()?;
-        } else {
-            run.open_folder()?;
+        let mut run =
+            Self { recipe, design, seed, folder, learner, validation, curve, best, other_version, data, origin };
+        match checkpoint {
+            Some(checkpoint) => run.restore(&checkpoint)?,
+            None => run.open_folder()?,
         }
         Ok(run)
     }
@@ -267,7 +275,8 @@ impl Run {
     /// What whoever uses the weights should know of them.
     fn card(&self, row: &Row) -> String {
         format!(
-            "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, beginning with {}.\n\n\
+            "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, beginning with {}, \
+             on {}.\n\n\
              On {} validation scans: mean absolute focal power error {:.4} ± {:.4}, in focus {:.1} %.\n\n\
              Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
              and layouts. Not a medical device.\n",
@@ -276,6 +285,7 @@ impl Run {
             self.seed,
             self.updates(),
             self.origin.as_ref().map_or("random weights".to_owned(), |file| format!("the weights {file}")),
+            self.data,
             self.validation.count,
             row.mae,
             row.sd,
@@ -327,8 +337,7 @@ impl Run {
         Ok(checkpoint.write(&self.folder.join(CHECKPOINT))?)
     }
 
-    fn restore(&mut self) -> Result<(), TrainError> {
-        let checkpoint = Checkpoint::read(&self.folder.join(CHECKPOINT))?;
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), TrainError> {
         if checkpoint.notes.get("recipe") != Some(&self.recipe_text()) {
             return Err(CheckpointError::Unfit("it was made by another recipe".to_owned()).into());
         }
@@ -345,8 +354,8 @@ impl Run {
             }
         }
         match &mut self.learner {
-            Learner::Dqn(dqn) => dqn.restore(&checkpoint)?,
-            Learner::Belief(belief) => belief.restore(&checkpoint)?,
+            Learner::Dqn(dqn) => dqn.restore(checkpoint)?,
+            Learner::Belief(belief) => belief.restore(checkpoint)?,
         }
         Ok(())
     }
@@ -367,28 +376,4 @@ fn design(recipe: &Recipe) -> Result<Design, TrainError> {
         ))
     };
     shipped::design(&recipe.policy).ok_or_else(unknown)
-}
-
-/// Loss (grey) and validation error (blue) over updates, each from 0 to its largest value.
-fn curves(curve: &[(u64, f64, Option<f64>)]) -> String {
-    let end = curve.last().map_or(1, |point| point.0).max(1) as f64;
-    let line = |points: Vec<(u64, f64)>, colour: &str, name: &str| {
-        let most = points.iter().map(|point| point.1).fold(1e-9, f64::max);
-        let mut text = String::new();
-        for (updates, value) in points {
-            let _ = write!(text, "{:.1},{:.1} ", 20.0 + 760.0 * updates as f64 / end, 280.0 - 240.0 * value / most);
-        }
-        format!(
-            "<polyline points=\"{text}\" fill=\"none\" stroke=\"{colour}\"/>\
-             <text x=\"{}\" y=\"20\" fill=\"{colour}\">{name}, at most {most:.3}</text>",
-            if colour == "grey" { 20 } else { 400 }
-        )
-    };
-    let loss = line(curve.iter().map(|point| (point.0, point.1)).collect(), "grey", "loss");
-    let mae = line(curve.iter().filter_map(|point| Some((point.0, point.2?))).collect(), "blue", "validation MAE");
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 800 300\" font-family=\"sans-serif\" font-size=\"12\">\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>{loss}{mae}\
-         <text x=\"780\" y=\"296\" text-anchor=\"end\">{end} updates</text></svg>\n"
-    )
 }
