@@ -65,7 +65,10 @@ pub fn with_shipped(registry: Registry) -> Registry {
         let Shipped { name, summary, design, weights } = shipped;
         match weights {
             None => registry.without(name, summary, "its weights are missing: make them with `parfocal train`"),
-            Some(bytes) => put(registry, name, summary, *design, Arc::from(*bytes)),
+            Some(bytes) => match build(*design, bytes) {
+                Ok(_) => put(registry, name, summary, *design, Arc::from(*bytes)),
+                Err(error) => registry.without(name, summary, &format!("{error}; put sound weights in their place")),
+            },
         }
     })
 }
@@ -112,14 +115,10 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
     })
 }
 
+/// `registry` with a policy of weights that were found sound a moment ago; should libtorch fail all the same, the lens stays
+/// where it is.
 fn put(registry: Registry, name: &str, summary: &'static str, design: Design, bytes: Arc<[u8]>) -> Registry {
-    match build(design, &bytes) {
-        Err(error) => registry.without(name, summary, &format!("{error}; put sound weights in their place")),
-        // The same bytes were sound a moment ago; should libtorch fail all the same, the lens stays where it is.
-        Ok(_) => {
-            registry.with(name, summary, move || build(design, &bytes).unwrap_or_else(|_| Box::new(Fixed::default())))
-        }
-    }
+    registry.with(name, summary, move || build(design, &bytes).unwrap_or_else(|_| Box::new(Fixed::default())))
 }
 
 /// A policy of `design` with the weights in `bytes` (safetensors).

@@ -11,7 +11,7 @@ use tch::{Device, Kind, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
-use super::optimiser::{Optimiser, Rule};
+use super::optimiser::{Optimiser, Rule, half_cosine};
 use super::scan::Variety;
 use super::session::{Session, lead_astray};
 use crate::autofocus::belief::{Trace, median, spread_over_bins, target};
@@ -123,10 +123,8 @@ impl BeliefTrainer {
         let (logits, _) = self.network.forward(&batch.inputs, &before);
         let loss = -(logits.log_softmax(-1, Kind::Float) * batch.beliefs).sum_dim_intlist(-1, false, Kind::Float);
         let loss = loss.mean(Kind::Float);
-        let done = self.updates as f64 / self.recipe.updates as f64;
-        let floor = self.recipe.final_rate;
         let warm = (self.updates as f64 / 200.0).min(1.0);
-        let rate = floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos());
+        let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.minimise(&loss, self.recipe.clip, warm * rate);
         self.updates += 1;
         self.replace_finished();

@@ -17,7 +17,7 @@ use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
 use super::dqn_batch::{Batch, Returns, bellman, gains};
 use super::dqn_recipe::{DqnRecipe, Target};
-use super::optimiser::{Flat, Optimiser};
+use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::replay::{Frames, Replay, Seen, Step};
 use super::scan::Variety;
 use super::session::{Session, lead_astray};
@@ -152,9 +152,7 @@ impl DqnTrainer {
         let encodings = self.online.encode(&batch.frames);
         let loss = self.loss(&batch, &encodings);
         let gradient = self.online.gradient(self.optimiser.flat(), &loss, &encodings, &batch.frames);
-        let done = (self.updates as f64 / self.recipe.updates as f64).min(1.0);
-        let floor = self.recipe.final_rate;
-        let rate = floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
+        let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.descend(gradient, self.recipe.clip, rate);
         if matches!(self.recipe.target, Target::Bellman { .. }) {
             self.target_variables.approach(self.optimiser.flat(), self.recipe.target_share);

@@ -22,6 +22,12 @@ pub enum Rule {
     },
 }
 
+/// Share of the learning rate after the share `done` of a training: a half cosine from 1 to `floor`.
+#[must_use]
+pub fn half_cosine(done: f64, floor: f64) -> f64 {
+    floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos())
+}
+
 /// A store's variables as views of one tensor, in the order of their names: what is done to all of them is one operation.
 #[derive(Debug)]
 pub struct Flat {
