@@ -20,8 +20,8 @@ use parfocal::training::dqn::DqnTrainer;
 use parfocal::training::pictures::{Split, varied};
 use parfocal::training::recipe::{Recipe, shipped};
 use parfocal::training::replay::{Replay, Seen, Step};
-use parfocal::training::scan::Variety;
 use parfocal::training::session::Session;
+use parfocal::training::variety::Variety;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -12,8 +12,8 @@ use tch::{Device, Kind, Tensor, nn};
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
 use super::optimiser::{Optimiser, Rule, half_cosine};
-use super::scan::Variety;
 use super::session::{Session, lead_astray};
+use super::variety::Variety;
 use crate::autofocus::belief::{Trace, median, spread_over_bins, target};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
 

@@ -49,10 +49,18 @@ impl Defocus {
     /// The patch whose top left pixel is `(x, y)` of `image` (which must not be empty), blurred by a spot of standard
     /// deviation `sigma` pixels (at most 8; more counts as 8). Outside the image its border pixels go on.
     pub fn patch(&mut self, image: &GrayImage, (x, y): (isize, isize), sigma: f64, spot: Spot) -> Patch {
+        self.patch_of(sigma, spot, |reach, side, source| {
+            gather(image, (x - reach as isize, y - reach as isize), side, source);
+        })
+    }
+
+    /// The same of a scene that `look` shows: it is called with how many pixels around the patch matter, how many that makes
+    /// a row, and where to put them, row after row.
+    pub fn patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
         let sigma = sigma.clamp(0.0, 8.0);
         let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
         let side = PATCH_SIDE + 2 * reach;
-        self.gather(image, x - reach as isize, y - reach as isize, side);
+        look(reach, side, &mut self.source);
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
         match spot {
             _ if reach == 0 => patch.0.copy_from_slice(&self.source[..PATCH_SIDE * PATCH_SIDE]),
@@ -68,18 +76,19 @@ impl Defocus {
         }
         patch
     }
+}
 
-    fn gather(&mut self, image: &GrayImage, left: isize, top: isize, side: usize) {
-        let (width, height) = (image.width as isize, image.height as isize);
-        for (row, target) in self.source.chunks_exact_mut(side).take(side).enumerate() {
-            let y = (top + row as isize).clamp(0, height - 1) as usize;
-            let line = &image.data[y * image.width..(y + 1) * image.width];
-            if left >= 0 && left + side as isize <= width {
-                target.copy_from_slice(&line[left as usize..left as usize + side]);
-            } else {
-                for (column, value) in target.iter_mut().enumerate() {
-                    *value = line[(left + column as isize).clamp(0, width - 1) as usize];
-                }
+/// Fills `source`, `side` pixels a row, from `image`'s `(left, top)` on.
+fn gather(image: &GrayImage, (left, top): (isize, isize), side: usize, source: &mut [f32]) {
+    let (width, height) = (image.width as isize, image.height as isize);
+    for (row, target) in source.chunks_exact_mut(side).take(side).enumerate() {
+        let y = (top + row as isize).clamp(0, height - 1) as usize;
+        let line = &image.data[y * image.width..(y + 1) * image.width];
+        if left >= 0 && left + side as isize <= width {
+            target.copy_from_slice(&line[left as usize..left as usize + side]);
+        } else {
+            for (column, value) in target.iter_mut().enumerate() {
+                *value = line[(left + column as isize).clamp(0, width - 1) as usize];
             }
         }
     }

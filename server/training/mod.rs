@@ -26,4 +26,6 @@ pub mod session;
 pub mod statistics;
 pub mod tensorboard;
 pub mod texture;
+pub mod unrest;
 mod values;
+pub mod variety;

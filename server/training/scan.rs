@@ -15,6 +15,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::clip::{Area, Clip};
 use super::defocus::{Defocus, Spot};
+use super::unrest::{Restlessness, Unrest};
 use crate::camera::walk::{Motion, Walk, standard_normal};
 use crate::imaging::{PATCH_SIDE, Patch};
 use crate::lens::FocalPower;
@@ -42,6 +43,8 @@ pub struct ScanSettings {
     pub veil: f64,
     /// Standard deviation, in gray levels, of a pattern that stays with the sensor.
     pub pattern: f64,
+    /// How restless the scene is, if it is.
+    pub unrest: Option<Restlessness>,
 }
 
 impl ScanSettings {
@@ -67,6 +70,7 @@ impl Default for ScanSettings {
             exposure: (1.0, 0.0),
             veil: 0.0,
             pattern: 0.0,
+            unrest: None,
         }
     }
 }
@@ -86,8 +90,10 @@ pub struct Scan {
     veil: Option<[Walk; 2]>,
     /// The sensor's pattern, a gray level a pixel; empty if there is none.
     pattern: Vec<f32>,
+    unrest: Option<Unrest>,
     course: ChaCha8Rng,
     veil_course: ChaCha8Rng,
+    unrest_course: ChaCha8Rng,
     noise: ChaCha8Rng,
     defocus: Defocus,
 }
@@ -108,6 +114,8 @@ impl Scan {
         let veil = (settings.veil > 0.0).then(|| room.map(|room| Walk::new(room, settings.crop, &mut veil_course)));
         let pixels = if settings.pattern > 0.0 { PATCH_SIDE * PATCH_SIDE } else { 0 };
         let pattern = (0..pixels).map(|_| settings.pattern as f32 * cheap_normal(&mut noise)).collect();
+        let mut unrest_course = ChaCha8Rng::seed_from_u64(seed ^ 0x756e_7265_7374);
+        let unrest = settings.unrest.map(|unrest| Unrest::new(unrest, &mut unrest_course));
         let tremor = settings.tremor * standard_normal(&mut course);
         let contrast = (settings.flicker * standard_normal(&mut course)).exp();
         let defocus = Defocus::default();
@@ -122,8 +130,10 @@ impl Scan {
             crop,
             veil,
             pattern,
+            unrest,
             course,
             veil_course,
+            unrest_course,
             noise,
             defocus,
         }
@@ -166,8 +176,14 @@ impl Scan {
         patch
     }
 
-    fn look(&mut self, corner: (isize, isize), sigma: f64) -> Patch {
-        self.defocus.patch(self.clip.at(self.time), corner, sigma, self.settings.spot)
+    fn look(&mut self, corner: (f64, f64), sigma: f64) -> Patch {
+        let (picture, spot) = (self.clip.at(self.time), self.settings.spot);
+        match &self.unrest {
+            None => self.defocus.patch(picture, (corner.0 as isize, corner.1 as isize), sigma, spot),
+            Some(unrest) => {
+                self.defocus.patch_of(sigma, spot, |_, side, out| unrest.gather(picture, corner, side, out))
+            }
+        }
     }
 
     /// Goes on to the next frame.
@@ -176,13 +192,14 @@ impl Scan {
         self.focus.advance(&mut self.course);
         self.crop.iter_mut().for_each(|walk| walk.advance(&mut self.course));
         self.veil.iter_mut().flatten().for_each(|walk| walk.advance(&mut self.veil_course));
+        self.unrest.iter_mut().for_each(|unrest| unrest.advance(&mut self.unrest_course));
         self.tremor = self.settings.tremor * standard_normal(&mut self.course);
         self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
     }
 }
 
-fn corner(walks: &[Walk; 2]) -> (isize, isize) {
-    (walks[0].position() as isize, walks[1].position() as isize)
+fn corner(walks: &[Walk; 2]) -> (f64, f64) {
+    (walks[0].position(), walks[1].position())
 }
 
 /// Scales what differs from the patch's mean by `contrast`, and all by `gain`.
@@ -207,37 +224,6 @@ fn digitise(patch: &mut Patch) {
 fn cheap_normal(rng: &mut impl Rng) -> f32 {
     let sum: i32 = rng.random::<u32>().to_le_bytes().iter().map(|&byte| i32::from(byte)).sum();
     (sum - 510) as f32 * (1.0 / 147.8)
-}
-
-/// How scans for training differ from one another, so that a policy does not learn one rig by heart.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Variety {
-    /// How much of the variety to apply: 0 gives reference scans, 1 all of it.
-    pub share: f64,
-}
-
-impl Variety {
-    /// Settings for one scan: with probability `share` varied in speed, spot, noise, exposure and what else is in view.
-    pub fn draw(&self, rng: &mut impl Rng) -> ScanSettings {
-        let mut settings = ScanSettings::reference();
-        if !rng.random_bool(self.share) {
-            return settings;
-        }
-        let factor = |rng: &mut _, spread: f64| (spread * standard_normal(rng)).exp();
-        settings.focus.speed *= factor(rng, 0.45);
-        settings.focus.memory *= factor(rng, 0.4);
-        settings.crop.speed *= factor(rng, 1.2);
-        settings.crop.memory *= factor(rng, 0.4);
-        settings.spot = if rng.random_bool(0.5) { Spot::Disc } else { Spot::Gaussian };
-        settings.tremor = if rng.random_bool(0.5) { rng.random_range(0.0..0.6) } else { 0.0 };
-        settings.flicker = if rng.random_bool(0.7) { rng.random_range(0.0..0.2) } else { 0.0 };
-        settings.noise = if rng.random_bool(0.7) { rng.random_range(0.0..4.0) } else { 0.0 };
-        let gain: f64 = rng.random_range(0.3..1.3);
-        settings.veil = if rng.random_bool(0.3) { rng.random_range(0.0..0.4) } else { 0.0 };
-        settings.pattern = if rng.random_bool(0.4) { rng.random_range(0.0..3.0) } else { 0.0 };
-        settings.exposure = (gain, rng.random_range(-0.5..1.0) * 120.0 * (1.0 - gain));
-        settings
-    }
 }
 
 #[cfg(test)]

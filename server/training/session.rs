@@ -7,7 +7,8 @@ use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
 use super::clip::Clip;
-use super::scan::{Scan, Variety};
+use super::scan::Scan;
+use super::variety::Variety;
 use crate::imaging::Patch;
 use crate::lens::FocalPower;
 

@@ -1,0 +1,171 @@
+//! A scene that does not keep still under the crop: it stretches, turns and shears, and its contrast comes and goes from
+//! place to place. Between two frames of tissue much the same is seen, but never quite the same.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "pixel arithmetic on small numbers"
+)]
+
+use rand::Rng;
+
+use crate::camera::walk::{Motion, Walk, standard_normal};
+use crate::imaging::{GrayImage, PATCH_SIDE};
+
+/// Knots of the contrast's field along each axis; beyond them it repeats.
+const KNOTS: usize = 32;
+/// Most that lengths and angles differ from the picture's own.
+const MOST_STRAIN: f64 = 0.15;
+
+/// How restless a scene is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Restlessness {
+    /// How fast it is deformed: standard deviation of the strain a frame.
+    pub strain: f64,
+    /// Standard deviation of the logarithm of the contrast from place to place.
+    pub contrast: f64,
+    /// Pixels from place to place.
+    pub cell: f64,
+    /// How fast the contrast's field moves over the scene, in cells a frame.
+    pub drift: f64,
+}
+
+/// What is the matter with a scene at a frame.
+#[derive(Debug, Clone)]
+pub struct Unrest {
+    /// What is added to the unit matrix that takes a place in the patch to one in the picture, row after row.
+    strain: [Walk; 4],
+    drift: [Walk; 2],
+    cell: f32,
+    /// The contrast at each knot.
+    gains: Vec<f32>,
+}
+
+impl Unrest {
+    /// An unrest of `restlessness`, its course drawn from `rng`.
+    pub fn new(restlessness: Restlessness, rng: &mut impl Rng) -> Self {
+        let motion = |speed| Motion { speed, memory: 6.0 };
+        let strain = [(); 4].map(|()| Walk::new((-MOST_STRAIN, MOST_STRAIN), motion(restlessness.strain), rng));
+        let knots = KNOTS as f64;
+        let drift = [(); 2].map(|()| Walk::new((0.0, 8.0 * knots), motion(restlessness.drift), rng));
+        let gain = |_| (restlessness.contrast * standard_normal(rng)).exp() as f32;
+        let gains = (0..KNOTS * KNOTS).map(gain).collect();
+        Self { strain, drift, cell: restlessness.cell as f32, gains }
+    }
+
+    /// Goes on to the next frame.
+    pub fn advance(&mut self, rng: &mut impl Rng) {
+        self.strain.iter_mut().chain(&mut self.drift).for_each(|walk| walk.advance(rng));
+    }
+
+    /// Fills `out`, `side` pixels a row, with what is seen of `image` around a patch whose top left pixel lies at `corner`.
+    /// Outside the image its border pixels go on.
+    pub fn gather(&self, image: &GrayImage, corner: (f64, f64), side: usize, out: &mut [f32]) {
+        let middle = 0.5 * side as f32;
+        let centre = [corner.0, corner.1].map(|at| at as f32 + 0.5 * PATCH_SIDE as f32);
+        let strain = self.strain.each_ref().map(|walk| walk.position() as f32);
+        let drift = self.drift.each_ref().map(|walk| walk.position() as f32);
+        let mut sum = 0.0;
+        for (row, line) in out.chunks_exact_mut(side).take(side).enumerate() {
+            let y = row as f32 - middle;
+            for (column, value) in line.iter_mut().enumerate() {
+                let x = column as f32 - middle;
+                let shifted = [0, 2].map(|row| strain[row] * x + strain[row + 1] * y);
+                let at = (centre[0] + x + shifted[0], centre[1] + y + shifted[1]);
+                *value = between(image, at);
+                sum += *value;
+            }
+        }
+        let mean = sum / (side * side) as f32;
+        for (row, line) in out.chunks_exact_mut(side).take(side).enumerate() {
+            let y = (centre[1] + row as f32 - middle) / self.cell + drift[1];
+            for (column, value) in line.iter_mut().enumerate() {
+                let x = (centre[0] + column as f32 - middle) / self.cell + drift[0];
+                *value = (mean + self.gain(x, y) * (*value - mean)).clamp(0.0, 255.0);
+            }
+        }
+    }
+
+    /// The contrast at a place, in knots.
+    fn gain(&self, x: f32, y: f32) -> f32 {
+        let (left, top) = (x.floor(), y.floor());
+        let knot = |column: i32, row: i32| {
+            let wrap = |at: i32| at.rem_euclid(KNOTS as i32) as usize;
+            self.gains[wrap(row) * KNOTS + wrap(column)]
+        };
+        let (column, row) = (left as i32, top as i32);
+        mix(
+            (knot(column, row), knot(column + 1, row)),
+            (knot(column, row + 1), knot(column + 1, row + 1)),
+            (x - left, y - top),
+        )
+    }
+}
+
+/// The value of `image` between its pixels' middles.
+fn between(image: &GrayImage, (x, y): (f32, f32)) -> f32 {
+    let (x, y) = (x.clamp(0.0, (image.width - 1) as f32), y.clamp(0.0, (image.height - 1) as f32));
+    let (left, top) = (x as usize, y as usize);
+    let (right, bottom) = ((left + 1).min(image.width - 1), (top + 1).min(image.height - 1));
+    let at = |column: usize, row: usize| image.data[row * image.width + column];
+    mix((at(left, top), at(right, top)), (at(left, bottom), at(right, bottom)), (x - left as f32, y - top as f32))
+}
+
+fn mix(upper: (f32, f32), lower: (f32, f32), (right, down): (f32, f32)) -> f32 {
+    let (upper, lower) = (upper.0 + right * (upper.1 - upper.0), lower.0 + right * (lower.1 - lower.0));
+    upper + down * (lower - upper)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// Gray levels that rise by 1 a pixel along and 2 a pixel down.
+    fn slope() -> GrayImage {
+        let data = (0..96 * 96).map(|i| (i % 96 + 2 * (i / 96)) as f32 * 0.5).collect();
+        GrayImage { width: 96, height: 96, data }
+    }
+
+    #[test]
+    fn without_unrest_the_picture_is_seen_as_it_is() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let still = Restlessness { strain: 0.0, contrast: 0.0, cell: 8.0, drift: 0.0 };
+        let mut unrest = Unrest::new(still, &mut rng);
+        for walk in &mut unrest.strain {
+            *walk = Walk::new((0.0, 0.0), Motion { speed: 0.0, memory: 1.0 }, &mut rng);
+        }
+        let mut seen = vec![0.0; 32 * 32];
+        unrest.gather(&slope(), (20.0, 30.5), 32, &mut seen);
+        for (index, value) in seen.iter().enumerate() {
+            let (x, y) = (20.0 + (index % 32) as f32, 30.5 + (index / 32) as f32);
+            assert!((value - 0.5 * (x + 2.0 * y)).abs() < 1e-3, "{index}: {value}");
+        }
+    }
+
+    #[test]
+    fn a_stretched_slope_is_flatter() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let still = Restlessness { strain: 0.0, contrast: 0.0, cell: 8.0, drift: 0.0 };
+        let mut unrest = Unrest::new(still, &mut rng);
+        let at = |place, rng: &mut _| Walk::new((place, place), Motion { speed: 0.0, memory: 1.0 }, rng);
+        unrest.strain = [-0.1, 0.0, 0.0, 0.1].map(|strain| at(strain, &mut rng));
+        let mut seen = vec![0.0; 32 * 32];
+        unrest.gather(&slope(), (20.0, 30.0), 32, &mut seen);
+        assert!((seen[33] - seen[32] - 0.45).abs() < 1e-3);
+        assert!((seen[64] - seen[32] - 1.1).abs() < 1e-3);
+    }
+
+    #[test]
+    fn contrast_varies_by_its_strength() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let unrest = Unrest::new(Restlessness { strain: 0.0, contrast: 0.3, cell: 4.0, drift: 0.1 }, &mut rng);
+        let logs: Vec<f64> = unrest.gains.iter().map(|gain| f64::from(gain.ln())).collect();
+        let sd = (logs.iter().map(|log| log * log).sum::<f64>() / logs.len() as f64).sqrt();
+        assert!((sd - 0.3).abs() < 0.03, "{sd}");
+        assert!((unrest.gain(3.0, 5.0) - unrest.gains[5 * KNOTS + 3]).abs() < 1e-6);
+    }
+}
