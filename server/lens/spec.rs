@@ -21,7 +21,7 @@ pub fn open(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensErro
     match device.split_once(':') {
         None if device == "simulated" => Ok(Box::new(SimulatedLens::open(options, clock)?)),
         None if device == "emulated" => Ok(Box::new(EmulatedLens::open(options, clock)?)),
-        Some(("optotune", port)) => Ok(Box::new(OptotuneLens::open(port, options, clock)?)),
+        Some(("optotune", port)) if !port.is_empty() => Ok(Box::new(OptotuneLens::open(port, options, clock)?)),
         _ => Err(LensError::BadSpec(format!(
             "there is no lens '{spec}': use 'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"
         ))),
@@ -49,7 +49,9 @@ mod tests {
 
     #[test]
     fn a_bad_specification_says_what_is_wrong_with_it() {
-        assert!(message("magic").contains("'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"));
+        for spec in ["magic", "optotune:"] {
+            assert!(message(spec).contains("'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"));
+        }
         assert!(message("simulated?fault=fire").contains("choose from none, drops"));
         assert!(message("emulated?fault=fire").contains("choose from none, garbage"));
         assert!(message("emulated?hysteresis=9").contains("must be from 0 to 5 dpt"));
