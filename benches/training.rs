@@ -21,6 +21,7 @@ use parfocal::training::pictures::{Split, varied};
 use parfocal::training::recipe::{Recipe, shipped};
 use parfocal::training::replay::{Replay, Seen, Step};
 use parfocal::training::session::Session;
+use parfocal::training::trainer::Trainer;
 use parfocal::training::variety::Variety;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

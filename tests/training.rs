@@ -8,12 +8,12 @@ use std::process::{Command, Output};
 use parfocal::clock::SystemClock;
 use parfocal::training::checkpoint::Checkpoint;
 use parfocal::training::recipe::{Recipe, shipped};
-use parfocal::training::run::{LEG, Run};
+use parfocal::training::run::{Beginning, LEG, Run};
 
 /// The recipe that ships for `policy`, small.
 fn small(policy: &str, updates: u64) -> Recipe {
     let mut recipe = Recipe::parse(shipped(policy).unwrap()).unwrap();
-    (recipe.pictures, recipe.validate_every) = (6, updates);
+    (recipe.pictures, recipe.validate_every, recipe.benchmark) = (6, updates, 2);
     if let Some(dqn) = &mut recipe.dqn {
         (dqn.scans, dqn.frames_an_update, dqn.warm_up, dqn.replay) = (8, 16, 1000, 4000);
         (dqn.windows, dqn.window, dqn.updates) = (8, 16, updates);
@@ -26,9 +26,9 @@ fn small(policy: &str, updates: u64) -> Recipe {
 }
 
 /// Trains for at most `legs` legs; returns whether the training is complete.
-fn train(recipe: &Recipe, folder: &Path, legs: u64, resume: bool) -> bool {
+fn train(recipe: &Recipe, folder: &Path, legs: u64, beginning: &Beginning) -> bool {
     tch::set_num_threads(1);
-    let mut run = Run::start(recipe.clone(), 7, Vec::new(), folder, resume, tch::Device::Cpu).unwrap();
+    let mut run = Run::start(recipe.clone(), 7, Vec::new(), folder, beginning, tch::Device::Cpu).unwrap();
     let left = Cell::new(legs);
     run.go(&SystemClock, &|| left.replace(left.get().saturating_sub(1)) == 0, &mut |_| ()).unwrap()
 }
@@ -40,7 +40,7 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     if let Some(belief) = &mut recipe.belief {
         belief.scans = 32;
     }
-    assert!(train(&recipe, folder.path(), u64::MAX, false));
+    assert!(train(&recipe, folder.path(), u64::MAX, &Beginning::Nothing));
     let curves = std::fs::read_to_string(folder.path().join("curves.csv")).unwrap();
     let mae: f64 = curves.trim_end().rsplit(',').next().unwrap().parse().unwrap();
     // `fixed` has 0.25: the mean distance of a uniformly spread optimum from the middle.
@@ -50,12 +50,26 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
 #[test]
 fn what_begins_with_weights_begins_with_what_they_know() {
     let folder = tempfile::tempdir().unwrap();
-    let mut run = Run::start(small("mgm-learned", 1), 7, Vec::new(), folder.path(), false, tch::Device::Cpu).unwrap();
-    run.begin_from(Path::new("policies/mgm-learned.safetensors")).unwrap();
+    let recipe = small("mgm-learned", 1);
+    let start = |file: &str| {
+        let beginning = Beginning::Weights(file.into());
+        Run::start(recipe.clone(), 7, Vec::new(), folder.path(), &beginning, tch::Device::Cpu)
+    };
+    // Another policy's weights are refused, and leave nothing behind.
+    assert!(
+        start("policies/parfocal.safetensors").err().unwrap().to_string().contains("cannot begin with the weights")
+    );
+    assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    let mut run = start("policies/mgm-learned.safetensors").unwrap();
     assert!(run.go(&SystemClock, &|| false, &mut |_| ()).unwrap());
     // After a single update: the shipped weights' error, where random ones stand at 0.25.
     assert!(run.best() < 0.15, "{}", run.best());
-    assert!(std::fs::read_to_string(folder.path().join("MODEL_CARD.md")).unwrap().contains("the weights policies/mgm"));
+    let card = std::fs::read_to_string(folder.path().join("MODEL_CARD.md")).unwrap();
+    assert!(card.contains("the weights policies/mgm"));
+    assert_eq!(
+        card.matches("scans of the reference benchmark (seed 2023): mean absolute focal power error 0.").count(),
+        1
+    );
 }
 
 #[test]
@@ -63,16 +77,18 @@ fn training_resumed_is_training_never_stopped() {
     for policy in ["mgm-learned", "cnn-learned", "parfocal"] {
         let recipe = small(policy, 2 * LEG);
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        assert!(train(&recipe, whole.path(), u64::MAX, false));
-        assert!(!train(&recipe, parts.path(), 1, false));
-        let start = || Run::start(recipe.clone(), 7, Vec::new(), parts.path(), true, tch::Device::Cpu).unwrap();
+        assert!(train(&recipe, whole.path(), u64::MAX, &Beginning::Nothing));
+        assert!(!train(&recipe, parts.path(), 1, &Beginning::Nothing));
+        let start = || {
+            Run::start(recipe.clone(), 7, Vec::new(), parts.path(), &Beginning::Checkpoint, tch::Device::Cpu).unwrap()
+        };
         assert_eq!(start().other_version(), None);
         let file = parts.path().join("checkpoint.safetensors");
         let mut checkpoint = Checkpoint::read(&file).unwrap();
         checkpoint.notes.insert("version".to_owned(), "0.0.9".to_owned());
         checkpoint.write(&file).unwrap();
         assert_eq!(start().other_version(), Some("0.0.9"));
-        assert!(train(&recipe, parts.path(), u64::MAX, true));
+        assert!(train(&recipe, parts.path(), u64::MAX, &Beginning::Checkpoint));
         for file in ["curves.csv", &format!("{policy}.safetensors")] {
             let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();
             assert!(read(&whole) == read(&parts), "{policy}: {file} differs");

@@ -46,7 +46,7 @@ const SHIPPED: [Shipped; 4] = [
     },
     Shipped {
         name: "parfocal",
-        summary: "tracks a belief about the optimum and goes to its median",
+        summary: "tracks a belief about the optimum and goes where it is most likely in focus",
         design: Design::Belief,
         weights: Some(include_bytes!("../../policies/parfocal.safetensors")),
     },

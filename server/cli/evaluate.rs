@@ -11,7 +11,6 @@ use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::ScanFolder;
 use crate::training::evaluate::{Benchmark, COUNT, FRAMES, Outcome, SEED, ScanSet, compare, evaluate};
 use crate::training::footage;
-use crate::training::pictures::{Split, reference};
 use crate::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
 use crate::training::report::Report;
 use crate::training::scan::ScanSettings;
@@ -144,12 +143,12 @@ fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
         clips.extend(footage::clips(path)?);
     }
     let (seed, count) = (arguments.seed, arguments.count.unwrap_or(COUNT));
-    let mut settings = ScanSettings::default();
-    if clips.is_empty() {
-        clips = reference(Split::Test, count.min(COUNT) as u64)?;
-        settings = ScanSettings::reference();
-    }
-    let set = Box::new(Benchmark { clips, settings, seed, count, frames: FRAMES });
+    let set = if clips.is_empty() {
+        Benchmark { seed, ..Benchmark::reference(count)? }
+    } else {
+        Benchmark { clips, settings: ScanSettings::default(), seed, count, frames: FRAMES }
+    };
+    let set = Box::new(set);
     Ok(Scans { set, seed, between: None })
 }
 

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{Failure, interrupt};
 use crate::clock::SystemClock;
 use crate::training::recipe::{Recipe, names, shipped};
-use crate::training::run::{LEG, Run};
+use crate::training::run::{Beginning, LEG, Run};
 use crate::training::{footage, run::Progress};
 
 /// Where to compute.
@@ -69,14 +69,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         clips.extend(footage::clips(path)?);
     }
     let total = recipe.updates();
-    let mut run = Run::start(recipe, arguments.seed, clips, &arguments.out, arguments.resume, device)?;
+    let beginning = match &arguments.from {
+        Some(file) => Beginning::Weights(file.clone()),
+        None if arguments.resume => Beginning::Checkpoint,
+        None => Beginning::Nothing,
+    };
+    let mut run = Run::start(recipe, arguments.seed, clips, &arguments.out, &beginning, device)?;
     if let Some(version) = run.other_version() {
         eprintln!(
             "note: the checkpoint was made by parfocal {version}; what follows may differ from what it would have given"
         );
-    }
-    if let Some(file) = &arguments.from {
-        run.begin_from(file)?;
     }
     let stop = interrupt::flag(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());

@@ -13,8 +13,9 @@ use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
 use super::optimiser::{Optimiser, Rule, half_cosine};
 use super::session::{Session, lead_astray};
+use super::trainer::Trainer;
 use super::variety::Variety;
-use crate::autofocus::belief::{Trace, median, spread_over_bins, target};
+use crate::autofocus::belief::{Trace, best, spread_over_bins, target};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
 
 /// How a belief tracker is trained.
@@ -45,8 +46,7 @@ pub struct BeliefRecipe {
 pub struct BeliefTrainer {
     recipe: BeliefRecipe,
     clips: Vec<Arc<Clip>>,
-    /// The variables of the network.
-    pub store: nn::VarStore,
+    store: nn::VarStore,
     network: BeliefNetwork,
     optimiser: Optimiser,
     seats: Vec<Seat>,
@@ -72,63 +72,15 @@ impl BeliefTrainer {
     #[must_use]
     pub fn new(recipe: BeliefRecipe, clips: Vec<Arc<Clip>>, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let rng = ChaCha8Rng::seed_from_u64(seed);
         let store = nn::VarStore::new(device);
         let network = BeliefNetwork::new(&store.root());
         let optimiser = Optimiser::new(recipe.optimiser, &store);
-        let seats = (0..recipe.scans).map(|_| Seat::draw(&recipe, &clips, &mut rng)).collect();
+        let seats = Vec::new();
         let memory = network.blank(recipe.scans, device);
-        Self { recipe, clips, store, network, optimiser, seats, memory, rng, updates: 0 }
-    }
-
-    /// Updates done.
-    #[must_use]
-    pub const fn updates(&self) -> u64 {
-        self.updates
-    }
-
-    /// Begins all scans anew, drawn from `seed`.
-    pub fn begin_leg(&mut self, seed: u64) {
-        self.rng = ChaCha8Rng::seed_from_u64(seed);
-        for (index, seat) in self.seats.iter_mut().enumerate() {
-            *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
-            // Scans end one after another, not all at once.
-            seat.windows_left = 1 + index % self.recipe.windows_a_scan;
-        }
-        self.memory = self.network.blank(self.recipe.scans, self.store.device());
-    }
-
-    /// Adds all that [`BeliefTrainer::restore`] needs, between two legs.
-    pub fn save(&self, checkpoint: &mut Checkpoint) {
-        checkpoint.put_store("network", &self.store);
-        self.optimiser.save(checkpoint);
-        checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
-    }
-
-    /// Takes back what [`BeliefTrainer::save`] added.
-    ///
-    /// # Errors
-    /// When the checkpoint is of another training.
-    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        checkpoint.fill_store("network", &self.store)?;
-        self.optimiser.restore(checkpoint)?;
-        self.updates = checkpoint.number("updates")?;
-        Ok(())
-    }
-
-    /// Steers all scans through one window, learns from it, and returns the mean cross-entropy.
-    pub fn update(&mut self) -> f64 {
-        let before = self.memory.shallow_clone();
-        let batch = self.collect();
-        let (logits, _) = self.network.forward(&batch.inputs, &before);
-        let loss = -(logits.log_softmax(-1, Kind::Float) * batch.beliefs).sum_dim_intlist(-1, false, Kind::Float);
-        let loss = loss.mean(Kind::Float);
-        let warm = (self.updates as f64 / 200.0).min(1.0);
-        let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
-        self.optimiser.minimise(&loss, self.recipe.clip, warm * rate);
-        self.updates += 1;
-        self.replace_finished();
-        loss.double_value(&[])
+        let mut trainer = Self { recipe, clips, store, network, optimiser, seats, memory, rng, updates: 0 };
+        trainer.begin_leg(seed);
+        trainer
     }
 
     fn collect(&mut self) -> Batch {
@@ -150,7 +102,7 @@ impl BeliefTrainer {
             logits.view([-1, BINS as i64]).softmax(-1, Kind::Float).copy_data(&mut believed, count * BINS);
             for (index, seat) in self.seats.iter_mut().enumerate() {
                 let stands = seat.session.focal_power().get();
-                let mut aim = target(stands, median(&believed[index * BINS..][..BINS]));
+                let mut aim = target(stands, best(&believed[index * BINS..][..BINS]));
                 if seat.session.wanders {
                     aim = lead_astray(aim, &mut self.rng);
                 }
@@ -175,6 +127,55 @@ impl BeliefTrainer {
                 let _ = self.memory.select(1, index as i64).fill_(0.0);
             }
         }
+    }
+}
+
+impl Trainer for BeliefTrainer {
+    fn store(&self) -> &nn::VarStore {
+        &self.store
+    }
+
+    fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    fn begin_leg(&mut self, seed: u64) {
+        self.rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |index| {
+            let mut seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+            // Scans end one after another, not all at once.
+            seat.windows_left = 1 + index % self.recipe.windows_a_scan;
+            seat
+        };
+        self.seats = (0..self.recipe.scans).map(&mut draw).collect();
+        self.memory = self.network.blank(self.recipe.scans, self.store.device());
+    }
+
+    fn update(&mut self) -> f64 {
+        let before = self.memory.shallow_clone();
+        let batch = self.collect();
+        let (logits, _) = self.network.forward(&batch.inputs, &before);
+        let loss = -(logits.log_softmax(-1, Kind::Float) * batch.beliefs).sum_dim_intlist(-1, false, Kind::Float);
+        let loss = loss.mean(Kind::Float);
+        let warm = (self.updates as f64 / 200.0).min(1.0);
+        let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
+        self.optimiser.minimise(&loss, self.recipe.clip, warm * rate);
+        self.updates += 1;
+        self.replace_finished();
+        loss.double_value(&[])
+    }
+
+    fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.put_store("network", &self.store);
+        self.optimiser.save(checkpoint);
+        checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        checkpoint.fill_store("network", &self.store)?;
+        self.optimiser.restore(checkpoint)?;
+        self.updates = checkpoint.number("updates")?;
+        Ok(())
     }
 }
 

@@ -20,6 +20,7 @@ use super::dqn_recipe::{DqnRecipe, Target};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::replay::{Frames, Replay, Seen, Step};
 use super::session::{Session, lead_astray};
+use super::trainer::Trainer;
 use super::values::Values;
 use super::variety::Variety;
 use crate::autofocus::learned::{Sight, action_step, best_action, scaled_focal_power};
@@ -55,110 +56,18 @@ impl DqnTrainer {
     #[must_use]
     pub fn new(sight: Sight, recipe: DqnRecipe, clips: Vec<Arc<Clip>>, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let rng = ChaCha8Rng::seed_from_u64(seed);
         let (online, mut target) = (Values::new(sight, device), Values::new(sight, device));
         target.store.freeze();
         let optimiser = Optimiser::new(recipe.optimiser, &online.store);
         let mut target_variables = Flat::of(&target.store);
         target_variables.approach(optimiser.flat(), 1.0);
-        let seats = (0..recipe.scans)
-            .map(|_| {
-                let mut seat = Seat::draw(&recipe, &clips, &mut rng);
-                // Scans end one after another, not all at once.
-                seat.frames_left = rng.random_range(1..=recipe.frames_a_scan);
-                seat
-            })
-            .collect();
         let replay = Replay::new(recipe.replay, recipe.scans);
-        let (updates, frames) = (0, 0);
-        Self { recipe, clips, online, target, target_variables, optimiser, seats, replay, rng, updates, frames }
-    }
-
-    /// Begins with the weights in `bytes` (safetensors) in the place of random ones.
-    ///
-    /// # Errors
-    /// When they are damaged or another network's.
-    pub fn begin_from(&mut self, bytes: &[u8]) -> Result<(), WeightsError> {
-        weights::load(&self.online.store, bytes)?;
-        self.target_variables.approach(self.optimiser.flat(), 1.0);
-        Ok(())
-    }
-
-    /// The variables of the network that is trained.
-    #[must_use]
-    pub const fn store(&self) -> &nn::VarStore {
-        &self.online.store
-    }
-
-    /// Updates done.
-    #[must_use]
-    pub const fn updates(&self) -> u64 {
-        self.updates
-    }
-
-    /// Frames played.
-    #[must_use]
-    pub const fn frames(&self) -> u64 {
-        self.frames
-    }
-
-    /// Share of random actions at present.
-    #[must_use]
-    pub fn epsilon(&self) -> f64 {
-        self.recipe.epsilon(self.frames)
-    }
-
-    /// Begins all scans anew, drawn from `seed`.
-    pub fn begin_leg(&mut self, seed: u64) {
-        self.rng = ChaCha8Rng::seed_from_u64(seed);
-        for seat in &mut self.seats {
-            *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
-            // Scans end one after another, not all at once.
-            seat.frames_left = self.rng.random_range(1..=self.recipe.frames_a_scan);
-        }
-    }
-
-    /// Adds all that [`DqnTrainer::restore`] needs, between two legs.
-    pub fn save(&self, checkpoint: &mut Checkpoint) {
-        checkpoint.put_store("network", &self.online.store);
-        checkpoint.put_store("target", &self.target.store);
-        self.optimiser.save(checkpoint);
-        self.replay.save(checkpoint);
-        checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
-        checkpoint.notes.insert("frames".to_owned(), self.frames.to_string());
-    }
-
-    /// Takes back what [`DqnTrainer::save`] added.
-    ///
-    /// # Errors
-    /// When the checkpoint is of another training.
-    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        checkpoint.fill_store("network", &self.online.store)?;
-        checkpoint.fill_store("target", &self.target.store)?;
-        self.optimiser.restore(checkpoint)?;
-        self.replay.restore(checkpoint)?;
-        self.updates = checkpoint.number("updates")?;
-        self.frames = checkpoint.number("frames")?;
-        Ok(())
-    }
-
-    /// Plays some frames, learns from one batch, and returns its loss.
-    pub fn update(&mut self) -> f64 {
-        let goal = self.frames.max(self.recipe.warm_up) + self.recipe.frames_an_update as u64;
-        while self.frames < goal {
-            tch::no_grad(|| self.play_a_frame());
-        }
-        let batch = self.batch();
-        let encodings = self.online.encode(&batch.frames);
-        let loss = self.loss(&batch, &encodings);
-        let gradient = self.online.gradient(self.optimiser.flat(), &loss, &encodings, &batch.frames);
-        let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
-        self.optimiser.descend(gradient, self.recipe.clip, rate);
-        if matches!(self.recipe.target, Target::Bellman { .. }) {
-            self.target_variables.approach(self.optimiser.flat(), self.recipe.target_share);
-        }
-        self.updates += 1;
-        loss.double_value(&[])
+        let (seats, updates, frames) = (Vec::new(), 0, 0);
+        let mut trainer =
+            Self { recipe, clips, online, target, target_variables, optimiser, seats, replay, rng, updates, frames };
+        trainer.begin_leg(seed);
+        trainer
     }
 
     fn device(&self) -> Device {
@@ -266,6 +175,74 @@ impl DqnTrainer {
                 chosen.smooth_l1_loss(&Tensor::from_slice(&wanted).to_device(device), Reduction::Mean, 1.0)
             }
         }
+    }
+}
+
+impl Trainer for DqnTrainer {
+    fn store(&self) -> &nn::VarStore {
+        &self.online.store
+    }
+
+    fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    fn begin_leg(&mut self, seed: u64) {
+        self.rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |_| {
+            let mut seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+            // Scans end one after another, not all at once.
+            seat.frames_left = self.rng.random_range(1..=self.recipe.frames_a_scan);
+            seat
+        };
+        self.seats = (0..self.recipe.scans).map(&mut draw).collect();
+    }
+
+    fn update(&mut self) -> f64 {
+        let goal = self.frames.max(self.recipe.warm_up) + self.recipe.frames_an_update as u64;
+        while self.frames < goal {
+            tch::no_grad(|| self.play_a_frame());
+        }
+        let batch = self.batch();
+        let encodings = self.online.encode(&batch.frames);
+        let loss = self.loss(&batch, &encodings);
+        let gradient = self.online.gradient(self.optimiser.flat(), &loss, &encodings, &batch.frames);
+        let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
+        self.optimiser.descend(gradient, self.recipe.clip, rate);
+        if matches!(self.recipe.target, Target::Bellman { .. }) {
+            self.target_variables.approach(self.optimiser.flat(), self.recipe.target_share);
+        }
+        self.updates += 1;
+        loss.double_value(&[])
+    }
+
+    fn epsilon(&self) -> Option<f64> {
+        Some(self.recipe.epsilon(self.frames))
+    }
+
+    fn begin_from(&mut self, bytes: &[u8]) -> Result<(), WeightsError> {
+        weights::load(&self.online.store, bytes)?;
+        self.target_variables.approach(self.optimiser.flat(), 1.0);
+        Ok(())
+    }
+
+    fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.put_store("network", &self.online.store);
+        checkpoint.put_store("target", &self.target.store);
+        self.optimiser.save(checkpoint);
+        self.replay.save(checkpoint);
+        checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
+        checkpoint.notes.insert("frames".to_owned(), self.frames.to_string());
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        checkpoint.fill_store("network", &self.online.store)?;
+        checkpoint.fill_store("target", &self.target.store)?;
+        self.optimiser.restore(checkpoint)?;
+        self.replay.restore(checkpoint)?;
+        self.updates = checkpoint.number("updates")?;
+        self.frames = checkpoint.number("frames")?;
+        Ok(())
     }
 }
 

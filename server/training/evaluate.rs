@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::clip::Clip;
+use super::clip::{Clip, ClipError};
+use super::pictures::{Split, reference};
 use super::rollout::{FocalTimeScan, Path, PathFigures, roll_out, roll_out_oracle};
 use super::scan::{Scan, ScanSettings};
 use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
@@ -50,6 +51,15 @@ pub struct Benchmark {
 }
 
 impl Benchmark {
+    /// The first `count` scans of the reference benchmark.
+    ///
+    /// # Errors
+    /// None in practice: its pictures are large enough.
+    pub fn reference(count: usize) -> Result<Self, ClipError> {
+        let clips = reference(Split::Test, count.min(COUNT) as u64)?;
+        Ok(Self { clips, settings: ScanSettings::reference(), seed: SEED, count, frames: FRAMES })
+    }
+
     /// Scan `index`, at its beginning.
     #[must_use]
     pub fn scan(&self, index: usize) -> Scan {

@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::belief::BeliefRecipe;
 use super::dqn_recipe::DqnRecipe;
+use super::error::TrainError;
+use super::evaluate::COUNT;
+use crate::autofocus::shipped::{Design, design};
 
 /// All that a training is made by, besides its seed and its footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -15,12 +18,19 @@ pub struct Recipe {
     pub pictures: u64,
     /// Updates from one validation to the next; a checkpoint is written with each.
     pub validate_every: u64,
+    /// Scans of the reference benchmark that the best weights are run on in the end, for their model card; 0: none.
+    #[serde(default = "whole_benchmark")]
+    pub benchmark: usize,
     /// How, for the paper's networks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dqn: Option<DqnRecipe>,
     /// How, for the belief tracker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub belief: Option<BeliefRecipe>,
+}
+
+const fn whole_benchmark() -> usize {
+    COUNT
 }
 
 /// The recipes that ship: ours by the policy's name, what comes after it with `-refined` behind it, the paper's with `-paper`.
@@ -57,6 +67,20 @@ impl Recipe {
         let recipe: Self = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
         recipe.check()?;
         Ok(recipe)
+    }
+
+    /// What the policy is made of.
+    ///
+    /// # Errors
+    /// When it is none that is learned.
+    pub fn design(&self) -> Result<Design, TrainError> {
+        let unknown = || {
+            TrainError::Recipe(format!(
+                "'{}' is no learned policy; there are mgm-learned, mlr-learned, cnn-learned and parfocal",
+                self.policy
+            ))
+        };
+        design(&self.policy).ok_or_else(unknown)
     }
 
     fn check(&self) -> Result<(), String> {

@@ -8,16 +8,17 @@ use std::sync::Arc;
 
 use tch::Device;
 
-use super::belief::BeliefTrainer;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
-use super::curves::curves;
-use super::dqn::DqnTrainer;
+use super::curves::{self, Point};
+use super::error::TrainError;
 use super::evaluate::{Benchmark, Outcome, Row, evaluate};
+use super::model_card::{self, Made};
 use super::pictures::{Split, varied};
 use super::recipe::Recipe;
 use super::scan::ScanSettings;
 use super::tensorboard::EventFile;
+use super::trainer::{Trainer, trainer};
 use crate::autofocus::shipped::{self, Design};
 use crate::autofocus::{PolicyName, Registry, weights};
 use crate::clock::Clock;
@@ -25,43 +26,8 @@ use crate::clock::Clock;
 /// Updates between two moments at which a training may stop. All scans begin anew at each, so that none need be saved.
 pub const LEG: u64 = 100;
 const CHECKPOINT: &str = "checkpoint.safetensors";
+const CARD: &str = "MODEL_CARD.md";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-
-/// Why a training could not start or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainError {
-    /// The recipe does not fit the policy.
-    #[error("{0}")]
-    Recipe(String),
-    /// A checkpoint cannot be used.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// The run folder cannot be written.
-    #[error("cannot write to {}: {source}", path.display())]
-    Folder {
-        /// The file or folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The weights to begin with cannot be used.
-    #[error("cannot begin with the weights {}: {reason}", path.display())]
-    Weights {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
-    /// The weights came out damaged: the training diverged.
-    #[error("the training diverged: {0}; lower the learning rate")]
-    Diverged(String),
-}
-
-/// A learner of either kind.
-enum Learner {
-    Dqn(Box<DqnTrainer>),
-    Belief(Box<BeliefTrainer>),
-}
 
 /// What a caller is told after each leg.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,15 +42,26 @@ pub struct Progress {
     pub validation: Option<f64>,
 }
 
+/// What a training begins with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Beginning {
+    /// Random weights.
+    Nothing,
+    /// The weights in a file (safetensors) of the same policy.
+    Weights(PathBuf),
+    /// The checkpoint in its run folder.
+    Checkpoint,
+}
+
 /// A training in a run folder.
 pub struct Run {
     recipe: Recipe,
     design: Design,
     seed: u64,
     folder: PathBuf,
-    learner: Learner,
+    trainer: Box<dyn Trainer>,
     validation: Benchmark,
-    curve: Vec<(u64, f64, Option<f64>)>,
+    curve: Vec<Point>,
     best: f64,
     other_version: Option<String>,
     /// What it trains on, in words.
@@ -94,21 +71,22 @@ pub struct Run {
 }
 
 impl Run {
-    /// A training by `recipe` in `folder`; from its checkpoint where `resume` is set. Trains on `footage`, or on drawn
-    /// pictures where there is none, with its networks on `device`.
+    /// A training by `recipe` in `folder`, on `footage`, or on drawn pictures where there is none, with its networks on
+    /// `device`.
     ///
     /// # Errors
-    /// When the recipe fits no policy, the folder cannot be written, or there is no fitting checkpoint to resume.
+    /// When the recipe fits no policy, the folder cannot be written, or what it should begin with cannot be used.
     pub fn start(
         recipe: Recipe,
         seed: u64,
         footage: Vec<Arc<Clip>>,
         folder: &Path,
-        resume: bool,
+        beginning: &Beginning,
         device: Device,
     ) -> Result<Self, TrainError> {
-        let design = design(&recipe)?;
+        let design = recipe.design()?;
         // Read first: drawing pictures takes a while, and a checkpoint that is not there should be told at once.
+        let resume = matches!(beginning, Beginning::Checkpoint);
         let checkpoint = if resume { Some(Checkpoint::read(&folder.join(CHECKPOINT))?) } else { None };
         let unfit = |error: super::clip::ClipError| TrainError::Recipe(error.to_string());
         let data = match footage.len() {
@@ -120,19 +98,18 @@ impl Run {
         let count = held_out.len();
         let validation =
             Benchmark { clips: held_out, settings: ScanSettings::reference(), seed: 1, count, frames: 250 };
-        let learner = match (design, &recipe.dqn, &recipe.belief) {
-            (Design::Values(sight), Some(dqn), _) => {
-                Learner::Dqn(Box::new(DqnTrainer::new(sight, dqn.clone(), clips, seed, device)))
-            }
-            (Design::Belief, _, Some(belief)) => {
-                Learner::Belief(Box::new(BeliefTrainer::new(belief.clone(), clips, seed, device)))
-            }
-            _ => return Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", recipe.policy))),
-        };
+        let mut trainer = trainer(design, &recipe, clips, seed, device)?;
+        let mut origin = None;
+        if let Beginning::Weights(file) = beginning {
+            let unfit = |reason: String| TrainError::Weights { path: file.clone(), reason };
+            let bytes = fs::read(file).map_err(|error| unfit(error.to_string()))?;
+            trainer.begin_from(&bytes).map_err(|error| unfit(error.to_string()))?;
+            origin = Some(file.display().to_string());
+        }
         let folder = folder.to_owned();
-        let (curve, best, other_version, origin) = (Vec::new(), f64::INFINITY, None, None);
+        let (curve, best, other_version) = (Vec::new(), f64::INFINITY, None);
         let mut run =
-            Self { recipe, design, seed, folder, learner, validation, curve, best, other_version, data, origin };
+            Self { recipe, design, seed, folder, trainer, validation, curve, best, other_version, data, origin };
         match checkpoint {
             Some(checkpoint) => run.restore(&checkpoint)?,
             None => run.open_folder()?,
@@ -140,29 +117,10 @@ impl Run {
         Ok(run)
     }
 
-    /// Begins with the weights in `file` in the place of random ones.
-    ///
-    /// # Errors
-    /// When they cannot be read, or are damaged or another policy's.
-    pub fn begin_from(&mut self, file: &Path) -> Result<(), TrainError> {
-        let unfit = |reason: String| TrainError::Weights { path: file.to_owned(), reason };
-        let bytes = fs::read(file).map_err(|error| unfit(error.to_string()))?;
-        match &mut self.learner {
-            Learner::Dqn(dqn) => dqn.begin_from(&bytes),
-            Learner::Belief(belief) => weights::load(&belief.store, &bytes),
-        }
-        .map_err(|error| unfit(error.to_string()))?;
-        self.origin = Some(file.display().to_string());
-        Ok(())
-    }
-
     /// Updates done.
     #[must_use]
     pub fn updates(&self) -> u64 {
-        match &self.learner {
-            Learner::Dqn(dqn) => dqn.updates(),
-            Learner::Belief(belief) => belief.updates(),
-        }
+        self.trainer.updates()
     }
 
     /// Lowest mean absolute error in a validation so far.
@@ -206,10 +164,14 @@ impl Run {
             if due {
                 self.save()?;
             }
-            tell(&Progress { updates, loss, epsilon: self.epsilon(), validation });
+            tell(&Progress { updates, loss, epsilon: self.trainer.epsilon(), validation });
         }
         self.save()?;
-        Ok(self.updates() >= end)
+        let complete = self.updates() >= end;
+        if complete {
+            self.report()?;
+        }
+        Ok(complete)
     }
 
     /// One leg: as many updates as lie before the next multiple of [`LEG`], on scans that begin anew.
@@ -217,80 +179,72 @@ impl Run {
         let goal = (self.updates() / LEG + 1).saturating_mul(LEG).min(end);
         // A stream of its own for each leg: what follows depends on the seed and on how far the training is, no more.
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(self.updates());
-        match &mut self.learner {
-            Learner::Dqn(dqn) => dqn.begin_leg(seed),
-            Learner::Belief(belief) => belief.begin_leg(seed),
-        }
+        self.trainer.begin_leg(seed);
         let (mut sum, mut count) = (0.0, 0.0);
         while self.updates() < goal {
-            sum += match &mut self.learner {
-                Learner::Dqn(dqn) => dqn.update(),
-                Learner::Belief(belief) => belief.update(),
-            };
+            sum += self.trainer.update();
             count += 1.0;
         }
         sum / f64::max(count, 1.0)
     }
 
-    fn epsilon(&self) -> Option<f64> {
-        match &self.learner {
-            Learner::Dqn(dqn) => Some(dqn.epsilon()),
-            Learner::Belief(_) => None,
-        }
-    }
-
     /// The present weights, with where they come from.
     fn weights(&self) -> Result<Vec<u8>, TrainError> {
-        let store = match &self.learner {
-            Learner::Dqn(dqn) => dqn.store(),
-            Learner::Belief(belief) => &belief.store,
-        };
         let made =
             format!("{}, seed {}, {} updates, parfocal {}", self.recipe.policy, self.seed, self.updates(), VERSION);
-        weights::save(store, &made).map_err(|error| TrainError::Diverged(error.to_string()))
+        weights::save(self.trainer.store(), &made).map_err(|error| TrainError::Diverged(error.to_string()))
     }
 
     /// Runs the present weights on the validation scans; keeps them if they are the best so far.
     fn validate(&mut self) -> Result<f64, TrainError> {
         let bytes = self.weights()?;
-        let design = self.design;
-        shipped::build(design, &bytes).map_err(|error| TrainError::Diverged(error.to_string()))?;
-        let name = PolicyName::new(&self.recipe.policy);
-        let copy = bytes.clone();
-        let registry = Registry::default().with(name.as_str(), "in training", move || {
-            shipped::build(design, &copy).unwrap_or_else(|_| Box::new(crate::autofocus::Fixed::default()))
-        });
-        let outcomes = evaluate(&registry, &[name], &self.validation, &|_| ())
-            .map_err(|error| TrainError::Diverged(error.to_string()))?;
-        let row = outcomes.last().map(Outcome::row);
-        let mae = row.as_ref().map_or(f64::INFINITY, |row| row.mae);
-        if let Some(row) = row.filter(|_| mae < self.best) {
-            self.best = mae;
-            self.write(&format!("{}.safetensors", self.recipe.policy), &bytes)?;
-            self.write("MODEL_CARD.md", self.card(&row).as_bytes())?;
+        let row = self.figures(bytes.clone(), &self.validation)?;
+        if row.mae < self.best {
+            self.best = row.mae;
+            self.write(&self.weights_file(), &bytes)?;
+            let made = Made {
+                policy: &self.recipe.policy,
+                seed: self.seed,
+                updates: self.updates(),
+                origin: self.origin.as_deref(),
+                data: &self.data,
+            };
+            self.write(CARD, model_card::validated(&made, &row, self.validation.count).as_bytes())?;
         }
-        Ok(mae)
+        Ok(row.mae)
     }
 
-    /// What whoever uses the weights should know of them.
-    fn card(&self, row: &Row) -> String {
-        format!(
-            "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, beginning with {}, \
-             on {}.\n\n\
-             On {} validation scans: mean absolute focal power error {:.4} ± {:.4}, in focus {:.1} %.\n\n\
-             Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
-             and layouts. Not a medical device.\n",
-            self.recipe.policy,
-            VERSION,
-            self.seed,
-            self.updates(),
-            self.origin.as_ref().map_or("random weights".to_owned(), |file| format!("the weights {file}")),
-            self.data,
-            self.validation.count,
-            row.mae,
-            row.sd,
-            100.0 * row.in_focus,
-        )
+    /// Runs the best weights on the reference benchmark, for their model card.
+    fn report(&self) -> Result<(), TrainError> {
+        let count = self.recipe.benchmark;
+        if count == 0 || !self.best.is_finite() {
+            return Ok(());
+        }
+        let read = |name: &str| {
+            let path = self.folder.join(name);
+            fs::read(&path).map_err(|source| TrainError::Folder { path, source })
+        };
+        let benchmark = Benchmark::reference(count).map_err(|error| TrainError::Recipe(error.to_string()))?;
+        let row = self.figures(read(&self.weights_file())?, &benchmark)?;
+        let card = model_card::benchmarked(&String::from_utf8_lossy(&read(CARD)?), &row, count);
+        self.write(CARD, card.as_bytes())
+    }
+
+    /// The figures of the weights in `bytes` on `scans`.
+    fn figures(&self, bytes: Vec<u8>, scans: &Benchmark) -> Result<Row, TrainError> {
+        let diverged = |error: &dyn std::fmt::Display| TrainError::Diverged(error.to_string());
+        let design = self.design;
+        shipped::build(design, &bytes).map_err(|error| diverged(&error))?;
+        let name = PolicyName::new(&self.recipe.policy);
+        let registry = Registry::default().with(name.as_str(), "in training", move || {
+            shipped::build(design, &bytes).unwrap_or_else(|_| Box::new(crate::autofocus::Fixed::default()))
+        });
+        let outcomes = evaluate(&registry, &[name], scans, &|_| ()).map_err(|error| diverged(&error))?;
+        outcomes.last().map(Outcome::row).ok_or_else(|| diverged(&"nothing was evaluated"))
+    }
+
+    fn weights_file(&self) -> String {
+        format!("{}.safetensors", self.recipe.policy)
     }
 
     fn open_folder(&self) -> Result<(), TrainError> {
@@ -312,10 +266,7 @@ impl Run {
 
     fn save(&self) -> Result<(), TrainError> {
         let mut checkpoint = Checkpoint::default();
-        match &self.learner {
-            Learner::Dqn(dqn) => dqn.save(&mut checkpoint),
-            Learner::Belief(belief) => belief.save(&mut checkpoint),
-        }
+        self.trainer.save(&mut checkpoint);
         let mut note = |name: &str, value: String| checkpoint.notes.insert(name.to_owned(), value);
         note("version", VERSION.to_owned());
         note("recipe", self.recipe_text());
@@ -324,21 +275,16 @@ impl Run {
         if let Some(origin) = &self.origin {
             note("origin", origin.clone());
         }
-        let curve: Vec<String> = self
-            .curve
-            .iter()
-            .map(|(updates, loss, mae)| {
-                format!("{updates},{loss},{}", mae.map_or(String::new(), |mae| mae.to_string()))
-            })
-            .collect();
-        self.write("curves.csv", format!("updates,loss,validation_mae\n{}\n", curve.join("\n")).as_bytes())?;
-        self.write("curves.svg", curves(&self.curve).as_bytes())?;
-        note("curve", curve.join("\n"));
+        let points = curves::text(&self.curve);
+        self.write("curves.csv", format!("updates,loss,validation_mae\n{points}\n").as_bytes())?;
+        self.write("curves.svg", curves::svg(&self.curve).as_bytes())?;
+        note("curve", points);
         Ok(checkpoint.write(&self.folder.join(CHECKPOINT))?)
     }
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), TrainError> {
-        if checkpoint.notes.get("recipe") != Some(&self.recipe_text()) {
+        let recipe = checkpoint.notes.get("recipe").map(|text| Recipe::parse(text));
+        if recipe != Some(Ok(self.recipe.clone())) {
             return Err(CheckpointError::Unfit("it was made by another recipe".to_owned()).into());
         }
         let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
@@ -346,17 +292,8 @@ impl Run {
         self.seed = checkpoint.number("seed")?;
         self.best = checkpoint.number("best")?;
         self.origin = checkpoint.notes.get("origin").cloned();
-        for line in checkpoint.notes.get("curve").into_iter().flat_map(|curve| curve.lines()) {
-            let mut parts = line.split(',');
-            let mut next = || parts.next().unwrap_or_default().to_owned();
-            if let (Ok(updates), Ok(loss)) = (next().parse(), next().parse()) {
-                self.curve.push((updates, loss, next().parse().ok()));
-            }
-        }
-        match &mut self.learner {
-            Learner::Dqn(dqn) => dqn.restore(checkpoint)?,
-            Learner::Belief(belief) => belief.restore(checkpoint)?,
-        }
+        self.curve = curves::parse(checkpoint.notes.get("curve").map_or("", String::as_str));
+        self.trainer.restore(checkpoint)?;
         Ok(())
     }
 
@@ -366,14 +303,4 @@ impl Run {
         let done = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &path));
         done.map_err(|source| TrainError::Folder { path, source })
     }
-}
-
-fn design(recipe: &Recipe) -> Result<Design, TrainError> {
-    let unknown = || {
-        TrainError::Recipe(format!(
-            "'{}' is no learned policy; there are mgm-learned, mlr-learned, cnn-learned and parfocal",
-            recipe.policy
-        ))
-    };
-    shipped::design(&recipe.policy).ok_or_else(unknown)
 }
