@@ -172,7 +172,9 @@ mod tests {
     fn the_best_place_of_known_beliefs() {
         let belief = |shares: &[(usize, f32)]| {
             let mut belief = [0.0f32; BINS];
-            shares.iter().for_each(|&(bin, share)| belief[bin] = share);
+            for &(bin, share) in shares {
+                belief[bin] = share;
+            }
             best(&belief)
         };
         assert!((belief(&[(20, 1.0)]) - 0.5).abs() < 1e-9);
