@@ -15,7 +15,7 @@ use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
 use super::registration::{CHANGES, changes};
 use super::spectrum::{FEATURES, Spectrum, features, spectrum};
 use super::weights::{self, WeightsError};
-use super::{Decision, Observation, Policy};
+use super::{Decision, IN_FOCUS, Observation, Policy};
 use crate::imaging::Patch;
 
 /// Most focal power a frame: a lens can jump, but a surgeon should not see it.
@@ -86,10 +86,9 @@ const PLACES: usize = (BINS - 1) * FINENESS + 1;
 /// What it is worth to stand `distance` from the optimum: 1 in focus, 0 out of it, with a soft edge, and less the farther, so
 /// that who does not know where the optimum is goes to the middle of where it may be.
 fn worth(distance: f64) -> f64 {
-    const EDGE: f64 = 0.1;
     const SOFTNESS: f64 = 0.02;
     const SLOPE: f64 = 0.3;
-    1.0 / (1.0 + ((distance - EDGE) / SOFTNESS).exp()) - SLOPE * distance
+    1.0 / (1.0 + ((distance - IN_FOCUS) / SOFTNESS).exp()) - SLOPE * distance
 }
 
 /// The worth of each place from one range's length below the optimum to one above it.

@@ -25,6 +25,8 @@ use crate::lens::FocalPower;
 
 /// Step of the paper's policies in focal power.
 pub const STEP: f64 = 0.05;
+/// Errors of focal power below this are in focus, as in the paper.
+pub const IN_FOCUS: f64 = 0.1;
 
 /// Decides, frame by frame, which focal power to ask for next.
 pub trait Policy: Send {

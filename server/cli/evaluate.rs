@@ -148,8 +148,7 @@ fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
     } else {
         Benchmark { clips, settings: ScanSettings::default(), seed, count, frames: FRAMES }
     };
-    let set = Box::new(set);
-    Ok(Scans { set, seed, between: None })
+    Ok(Scans { set: Box::new(set), seed, between: None })
 }
 
 fn report(arguments: &Arguments, scans: &Scans, outcomes: &[Outcome]) -> Report {

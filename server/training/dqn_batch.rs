@@ -9,10 +9,9 @@
 use tch::{Device, Tensor};
 
 use super::replay::{Frames, Step};
-use super::rollout::IN_FOCUS;
-use crate::autofocus::STEP;
 use crate::autofocus::learned::{action_step, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
+use crate::autofocus::{IN_FOCUS, STEP};
 use crate::lens::FocalPower;
 
 /// Windows as tensors, and the states in them that have a next frame.

@@ -9,7 +9,8 @@ use serde::Serialize;
 use super::evaluate::{Comparison, ORACLE, Outcome, Row};
 use super::plot::{PANEL, begin, legend, line, panel};
 use super::recorded::Between;
-use super::rollout::{IN_FOCUS, Path};
+use super::rollout::Path;
+use crate::autofocus::IN_FOCUS;
 
 /// What `evaluate` gives. The contract fixes the fields' names.
 #[derive(Debug, Clone, Serialize)]

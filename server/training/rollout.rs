@@ -2,7 +2,7 @@
 #![allow(clippy::cast_precision_loss, reason = "counts of frames are small")]
 
 use super::scan::Scan;
-use crate::autofocus::{Observation, Policy, STEP};
+use crate::autofocus::{IN_FOCUS, Observation, Policy, STEP};
 use crate::imaging::Patch;
 use crate::lens::FocalPower;
 
@@ -32,8 +32,6 @@ impl FocalTimeScan for Scan {
     }
 }
 
-/// Errors below this are in focus, as in the paper.
-pub const IN_FOCUS: f64 = 0.1;
 /// Frames a second of simulated scans: the paper's clips hold 250 frames in 10 s.
 pub const FRAMES_A_SECOND: f64 = 25.0;
 

@@ -78,28 +78,43 @@ impl Unrest {
             }
         }
         let mean = sum / (side * side) as f32;
-        for (row, line) in out.chunks_exact_mut(side).take(side).enumerate() {
-            let y = (centre[1] + row as f32 - middle) / self.cell + drift[1];
-            for (column, value) in line.iter_mut().enumerate() {
-                let x = (centre[0] + column as f32 - middle) / self.cell + drift[0];
-                *value = (mean + self.gain(x, y) * (*value - mean)).clamp(0.0, 255.0);
+        let knots = |axis: usize| {
+            let place = move |index| (centre[axis] + index as f32 - middle) / self.cell + drift[axis];
+            (0..side).map(move |index| Knots::around(place(index)))
+        };
+        let columns: Vec<Knots> = knots(0).collect();
+        for (row, line) in knots(1).zip(out.chunks_exact_mut(side)) {
+            for (column, value) in columns.iter().zip(line) {
+                *value = (mean + self.gain(column, &row) * (*value - mean)).clamp(0.0, 255.0);
             }
         }
     }
 
-    /// The contrast at a place, in knots.
-    fn gain(&self, x: f32, y: f32) -> f32 {
-        let (left, top) = (x.floor(), y.floor());
-        let knot = |column: i32, row: i32| {
-            let wrap = |at: i32| at.rem_euclid(KNOTS as i32) as usize;
-            self.gains[wrap(row) * KNOTS + wrap(column)]
-        };
-        let (column, row) = (left as i32, top as i32);
+    /// The contrast at a place.
+    fn gain(&self, column: &Knots, row: &Knots) -> f32 {
+        let (upper, lower) = (&self.gains[row.before * KNOTS..], &self.gains[row.after * KNOTS..]);
         mix(
-            (knot(column, row), knot(column + 1, row)),
-            (knot(column, row + 1), knot(column + 1, row + 1)),
-            (x - left, y - top),
+            (upper[column.before], upper[column.after]),
+            (lower[column.before], lower[column.after]),
+            (column.part, row.part),
         )
+    }
+}
+
+/// A place along an axis of the contrast's field.
+struct Knots {
+    before: usize,
+    after: usize,
+    /// Share of the way from the one to the other.
+    part: f32,
+}
+
+impl Knots {
+    /// The knots around `place`, in knots from the field's beginning.
+    fn around(place: f32) -> Self {
+        let before = place.floor();
+        let wrap = |knot: i32| knot.rem_euclid(KNOTS as i32) as usize;
+        Self { before: wrap(before as i32), after: wrap(before as i32 + 1), part: place - before }
     }
 }
 
@@ -166,6 +181,6 @@ mod tests {
         let logs: Vec<f64> = unrest.gains.iter().map(|gain| f64::from(gain.ln())).collect();
         let sd = (logs.iter().map(|log| log * log).sum::<f64>() / logs.len() as f64).sqrt();
         assert!((sd - 0.3).abs() < 0.03, "{sd}");
-        assert!((unrest.gain(3.0, 5.0) - unrest.gains[5 * KNOTS + 3]).abs() < 1e-6);
+        assert!((unrest.gain(&Knots::around(3.0), &Knots::around(5.0)) - unrest.gains[5 * KNOTS + 3]).abs() < 1e-6);
     }
 }
