@@ -44,6 +44,8 @@ async fn the_operator_reads_what_is_wrong_with_the_lens() {
     emulator.set_temperature(25.0);
     emulator.unplug();
     operator.sees("#warnings .bad", "is the driver plugged in?; trying again").await;
+    let lines = operator.run("return document.querySelectorAll('#warnings .bad').length", json!([])).await;
+    assert_eq!(lines, 1, "one trouble, one line");
     shoot(&operator, "operator-10-lens-unplugged").await;
     emulator.plug_in().unwrap();
     operator.sees_no("#warnings .bad").await;

@@ -28,10 +28,14 @@ function lamp(name, figure, state, title) {
 export function drawWarnings(box, status) {
   const lines = [];
   const warn = (text, level = "warn") => lines.push(make("p", { className: `notice-line ${level}` }, text));
-  if (!status.camera.working) warn(`Camera: ${status.camera.message}`, "bad");
+  // One trouble, one line: a failed camera or lens is also why the focus is held.
+  const cameraHolds = status.held === "camera-failed";
+  const lensHolds = status.held === "lens-failed" && !status.lens.working;
+  if (!status.camera.working) warn(`Camera: ${cameraHolds ? status.message : status.camera.message}`, "bad");
   if (!status.lens.working) warn(`Lens: ${status.lens.message}`, "bad");
   else if (status.lens.caution) warn(`Lens: ${status.lens.message}`);
-  if (status.held && status.held !== "paused") warn(status.message ?? "The lens is being held where it is.", "bad");
+  const otherwise = status.held && status.held !== "paused" && !cameraHolds && !lensHolds;
+  if (otherwise) warn(`Focus loop: ${status.message ?? "the lens is being held where it is."}`, "bad");
   const simulated = [status.camera.simulated && "camera", status.lens.simulated && "lens"].filter(Boolean);
   if (simulated.length > 0) warn(`Simulated ${simulated.join(" and ")}: this is not a real instrument.`);
   if (status.telemetry_dropped > 0) warn(`${status.telemetry_dropped} telemetry records were dropped: the disk cannot keep up. Comments and answers are not affected.`);
