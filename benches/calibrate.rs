@@ -8,7 +8,7 @@ use std::sync::Arc;
 use parfocal::autofocus::{PolicyName, Registry};
 use parfocal::imaging::GrayImage;
 use parfocal::training::clip::Clip;
-use parfocal::training::evaluate::{Benchmark, FRAMES, Outcome, evaluate};
+use parfocal::training::evaluate::{Benchmark, Conditions, FRAMES, Outcome, evaluate};
 use parfocal::training::pictures::{Split, sharp_phantom};
 use parfocal::training::scan::ScanSettings;
 use parfocal::training::texture::vary_contrast;
@@ -59,7 +59,8 @@ fn main() {
             }
             Arc::new(Clip::still(picture).unwrap())
         });
-        let benchmark = Benchmark { clips: clips.collect(), settings, seed: 1, count: COUNT, frames: FRAMES };
+        let conditions = Conditions::Same(settings);
+        let benchmark = Benchmark { clips: clips.collect(), conditions, seed: 1, count: COUNT, frames: FRAMES };
         let outcomes = evaluate(&registry, &policies, &benchmark, &|_| ()).unwrap();
         let rows: Vec<_> = outcomes.iter().skip(1).map(Outcome::row).collect();
         let deviation = rows.iter().zip(PAPER).map(|(row, (_, mae))| (row.mae / mae - 1.0).abs()).fold(0.0, f64::max);

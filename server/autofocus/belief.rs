@@ -22,6 +22,10 @@ use crate::imaging::Patch;
 pub const MAX_MOVE: f64 = 0.1;
 /// Moves below this are not worth the eye's attention.
 pub const LEAST_MOVE: f64 = 0.012;
+/// A tracker that believes itself in focus with less than this looks for the optimum: who stands still learns little.
+const ASSURANCE: f64 = 0.75;
+/// Focal power a frame that looking takes at least: enough for a change of blur to show.
+const LOOK: f64 = 0.08;
 
 /// What the tracker remembers of the frame before.
 #[derive(Debug, Clone, Default)]
@@ -114,10 +118,27 @@ pub fn best(belief: &[f32]) -> f64 {
     top.unwrap_or(PLACES / 2) as f64 / (PLACES - 1) as f64
 }
 
-/// Where to go from `focal_power` when the optimum is believed at `best`.
+/// Where to go from `focal_power` under `belief` (see [`best`]): to the best place, at most [`MAX_MOVE`] a frame and not for less than
+/// [`LEAST_MOVE`]; or, where the tracker is not assured of being in focus, [`LOOK`] at least, towards the likelier side.
 #[must_use]
-pub fn target(focal_power: f64, best: f64) -> f64 {
-    let step = (best - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
+pub fn target(focal_power: f64, belief: &[f32]) -> f64 {
+    let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
+    let (mut below, mut here, mut above) = (0.0, 0.0, 0.0);
+    for (bin, share) in belief.iter().enumerate() {
+        let distance = bin as f64 / (BINS - 1) as f64 - focal_power;
+        let side = if distance.abs() < IN_FOCUS {
+            &mut here
+        } else if distance < 0.0 {
+            &mut below
+        } else {
+            &mut above
+        };
+        *side += f64::from(*share);
+    }
+    if here < ASSURANCE && step.abs() < LOOK {
+        let look = if above > below { LOOK } else { -LOOK };
+        return (focal_power + look).clamp(0.0, 1.0);
+    }
     if step.abs() < LEAST_MOVE { focal_power } else { focal_power + step }
 }
 
@@ -157,7 +178,7 @@ impl BeliefTracker {
 impl Policy for BeliefTracker {
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         let belief = self.believe(seen);
-        let target = target(seen.focal_power.get(), best(&belief));
+        let target = target(seen.focal_power.get(), &belief);
         self.trace.ask(target);
         Decision { target, metric: None, belief: Some(belief.into()) }
     }
@@ -195,10 +216,30 @@ mod tests {
         }
     }
 
+    /// Certain that the optimum is at `place`.
+    fn certain(place: f64) -> [f32; BINS] {
+        let mut belief = [0.0; BINS];
+        spread_over_bins(place, &mut belief);
+        belief
+    }
+
     #[test]
     fn moves_are_bounded_and_small_ones_left_out() {
-        assert!((target(0.5, 0.9) - 0.6).abs() < 1e-12);
-        assert!((target(0.5, 0.51) - 0.5).abs() < 1e-12);
-        assert!((target(0.5, 0.47) - 0.47).abs() < 1e-12);
+        assert!((target(0.5, &certain(0.9)) - 0.6).abs() < 1e-12);
+        assert!((target(0.5, &certain(0.51)) - 0.5).abs() < 1e-12);
+        assert!((target(0.5, &certain(0.45)) - 0.45).abs() < 0.01);
+    }
+
+    #[test]
+    fn who_is_not_assured_looks_on_the_likelier_side() {
+        let likelier = |bin: usize| {
+            let mut belief = [1.0 / BINS as f32; BINS];
+            belief[bin] += 0.02;
+            belief
+        };
+        // The middle is best under both, and yet nothing would be learned there.
+        assert!((target(0.5, &likelier(33)) - 0.58).abs() < 1e-9);
+        assert!((target(0.5, &likelier(7)) - 0.42).abs() < 1e-9);
+        assert!((0.0..=1.0).contains(&target(0.01, &likelier(7))));
     }
 }

@@ -9,7 +9,7 @@ use super::{Failure, scan};
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::ScanFolder;
-use crate::training::evaluate::{Benchmark, COUNT, FRAMES, Outcome, SEED, ScanSet, compare, evaluate};
+use crate::training::evaluate::{Benchmark, COUNT, Conditions, FRAMES, Outcome, SEED, ScanSet, compare, evaluate};
 use crate::training::footage;
 use crate::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
 use crate::training::report::Report;
@@ -146,7 +146,7 @@ fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
     let set = if clips.is_empty() {
         Benchmark { seed, ..Benchmark::reference(count)? }
     } else {
-        Benchmark { clips, settings: ScanSettings::default(), seed, count, frames: FRAMES }
+        Benchmark { clips, conditions: Conditions::Same(ScanSettings::default()), seed, count, frames: FRAMES }
     };
     Ok(Scans { set: Box::new(set), seed, between: None })
 }

@@ -15,7 +15,7 @@ use tch::{Device, Reduction, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
-use super::dqn_batch::{Batch, Returns, bellman, gains};
+use super::dqn_batch::{Batch, Bonus, Returns, bellman, gains};
 use super::dqn_recipe::{DqnRecipe, Target};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::replay::{Frames, Replay, Seen, Step};
@@ -155,8 +155,9 @@ impl DqnTrainer {
         let values = Self::values(&self.online, batch, encodings);
         let device = self.device();
         match self.recipe.target {
-            Target::Lookahead { restless } => {
-                let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[at], restless)).collect();
+            Target::Lookahead { restless, turning } => {
+                let bonus = Bonus { restless, turning };
+                let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[..=at], bonus)).collect();
                 let wanted = Tensor::from_slice(&wanted).view([-1, ACTIONS as i64]).to_device(device);
                 values.smooth_l1_loss(&wanted, Reduction::Mean, 1.0)
             }

@@ -50,16 +50,40 @@ fn reach(step: &Step) -> usize {
     usize::from(step.age).min(HISTORY - 1)
 }
 
-/// What each action would gain at the next frame over standing still, in steps; and what moving earns by itself, up to `restless`
-/// steps where the picture is well out of focus: only who moves learns where to go.
-pub(super) fn gains(step: &Step, restless: f64) -> [f32; ACTIONS] {
+/// What moving earns by itself, in steps: the fields of [`super::dqn_recipe::Target::Lookahead`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bonus {
+    pub restless: f64,
+    pub turning: f64,
+}
+
+/// What each action would gain at the frame after the last of `steps` over standing still, in steps; and what moving earns by itself
+/// where the picture is well out of focus: only who moves learns where to go.
+pub(super) fn gains(steps: &[Step], bonus: Bonus) -> [f32; ACTIONS] {
+    let Some(step) = steps.last() else { return [0.0; ACTIONS] };
     let (stands, best) = (FocalPower::nearest(f64::from(step.focal_power)), f64::from(step.next_optimum));
-    let error = |action| (stands.moved(action_step(action)).get() - best).abs();
-    let lost = (error(1) / IN_FOCUS - 0.5).clamp(0.0, 1.0);
+    let error = (stands.get() - best).abs();
+    let lost = (error / IN_FOCUS - 0.5).clamp(0.0, 1.0);
+    let heading = heading(steps);
     std::array::from_fn(|action| {
-        let moves = action_step(action) != 0.0;
-        ((error(1) - error(action)) / STEP + if moves { restless * lost } else { 0.0 }) as f32
+        let goes = stands.moved(action_step(action)).get();
+        let moved = goes - stands.get();
+        let earns = if moved == 0.0 {
+            0.0
+        } else if moved * heading < 0.0 {
+            bonus.restless * bonus.turning
+        } else {
+            bonus.restless
+        };
+        ((error - (goes - best).abs()) / STEP + earns * lost) as f32
     })
+}
+
+/// The latest change of focal power that the state of the last of `steps` shows; 0 for none.
+fn heading(steps: &[Step]) -> f64 {
+    let changes = steps.windows(2).rev().take(HISTORY - 1).take_while(|pair| pair[1].age > pair[0].age);
+    let mut changes = changes.map(|pair| f64::from(pair[1].focal_power - pair[0].focal_power));
+    changes.find(|change| change.abs() > 1e-6).unwrap_or(0.0)
 }
 
 /// How Bellman's equation is applied: the fields of [`super::dqn_recipe::Target::Bellman`] that rewards depend on.
@@ -122,4 +146,40 @@ pub(super) fn bellman(
         wanted.push(returns.of(&batch.steps, at, f64::from(next_values[last])) as f32);
     }
     (taken, wanted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn steps(focal_powers: &[f32], next_optimum: f32) -> Vec<Step> {
+        let step = |(age, &focal_power): (usize, &f32)| Step { focal_power, next_optimum, action: 1, age: age as u16 };
+        focal_powers.iter().enumerate().map(step).collect()
+    }
+
+    /// In thousandths of a step.
+    fn gained(focal_powers: &[f32], next_optimum: f32, restless: f64, turning: f64) -> [i32; ACTIONS] {
+        gains(&steps(focal_powers, next_optimum), Bonus { restless, turning })
+            .map(|gain| (1000.0 * gain).round() as i32)
+    }
+
+    #[test]
+    fn gains_are_in_steps_nearer_to_the_next_optimum() {
+        assert_eq!(gained(&[0.5], 0.75, 0.0, 1.0), [-1000, 0, 1000]);
+        assert_eq!(gained(&[0.5], 0.48, 0.0, 1.0), [-200, 0, -1000], "past the optimum: from 0.02 to 0.03");
+        assert_eq!(gained(&[0.5], 0.48, 3.0, 1.0), [-200, 0, -1000], "in focus, moving earns nothing by itself");
+    }
+
+    #[test]
+    fn moving_earns_where_the_picture_is_out_of_focus_and_less_for_turning() {
+        let far = |focal_powers: &[f32]| gained(focal_powers, 0.9, 3.0, 0.5);
+        assert_eq!(far(&[0.5]), [2000, 0, 4000], "no move before: either way alike, but for where it leads");
+        assert_eq!(far(&[0.6, 0.55, 0.55, 0.5]), [2000, 0, 2500]);
+        assert_eq!(
+            far(&[0.45, 0.5, 0.5, 0.5]),
+            [500, 0, 4000],
+            "the latest change counts, however long the lens has stood"
+        );
+        assert_eq!(far(&[0.0])[0], 0, "the lens cannot go there");
+    }
 }

@@ -30,7 +30,14 @@ pub enum Target {
         /// side the optimum lies.
         #[serde(default)]
         restless: f64,
+        /// Share of that which a move against the last one earns: below 1, who looks for the optimum rather sweeps than trembles.
+        #[serde(default = "whole")]
+        turning: f64,
     },
+}
+
+const fn whole() -> f64 {
+    1.0
 }
 
 /// How a DQN policy is trained.

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::clip::{Clip, ClipError};
@@ -10,6 +12,7 @@ use super::pictures::{Split, reference};
 use super::rollout::{FocalTimeScan, Path, PathFigures, roll_out, roll_out_oracle};
 use super::scan::{Scan, ScanSettings};
 use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
+use super::variety::Variety;
 use crate::autofocus::{PolicyError, PolicyName, Registry};
 
 /// Name of the row that knows the next optimum.
@@ -35,13 +38,23 @@ pub trait ScanSet {
     }
 }
 
+/// How a set's simulated scans are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Conditions {
+    /// All by these settings.
+    Same(ScanSettings),
+    /// The first half as the reference's, the second half as varied as training's scans can be: what holds on both is likely
+    /// to hold elsewhere.
+    HalfVaried,
+}
+
 /// A set of simulated scans: scan `i` goes over clip `i` modulo their number.
 #[derive(Debug, Clone)]
 pub struct Benchmark {
     /// What is scanned.
     pub clips: Vec<Arc<Clip>>,
     /// How.
-    pub settings: ScanSettings,
+    pub conditions: Conditions,
     /// Seed that all scans' courses are drawn from.
     pub seed: u64,
     /// Number of scans.
@@ -57,7 +70,8 @@ impl Benchmark {
     /// None in practice: its pictures are large enough.
     pub fn reference(count: usize) -> Result<Self, ClipError> {
         let clips = reference(Split::Test, count.min(COUNT) as u64)?;
-        Ok(Self { clips, settings: ScanSettings::reference(), seed: SEED, count, frames: FRAMES })
+        let conditions = Conditions::Same(ScanSettings::reference());
+        Ok(Self { clips, conditions, seed: SEED, count, frames: FRAMES })
     }
 
     /// Scan `index`, at its beginning.
@@ -66,7 +80,12 @@ impl Benchmark {
         let clip = Arc::clone(&self.clips[index % self.clips.len()]);
         // Distinct streams for neighbouring seeds: the golden-ratio increment of SplitMix64.
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64);
-        Scan::new(clip, self.settings, seed)
+        let settings = match self.conditions {
+            Conditions::Same(settings) => settings,
+            Conditions::HalfVaried if index < self.count / 2 => ScanSettings::reference(),
+            Conditions::HalfVaried => Variety { share: 1.0 }.draw(&mut ChaCha8Rng::seed_from_u64(!seed)),
+        };
+        Scan::new(clip, settings, seed)
     }
 }
 

@@ -22,7 +22,7 @@ pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
          on {}.\n\n\
          Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
          and layouts. Not a medical device.\n\n\
-         On {count} validation scans: {}.\n",
+         On {count} validation scans, half of them varied: {}.\n",
         made.policy,
         env!("CARGO_PKG_VERSION"),
         made.seed,

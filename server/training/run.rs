@@ -12,11 +12,10 @@ use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
 use super::curves::{self, Point};
 use super::error::TrainError;
-use super::evaluate::{Benchmark, Outcome, Row, evaluate};
+use super::evaluate::{Benchmark, Conditions, FRAMES, Outcome, Row, evaluate};
 use super::model_card::{self, Made};
 use super::pictures::{Split, varied};
 use super::recipe::Recipe;
-use super::scan::ScanSettings;
 use super::tensorboard::EventFile;
 use super::trainer::{Trainer, trainer};
 use crate::autofocus::shipped::{self, Design};
@@ -95,9 +94,9 @@ impl Run {
         };
         let clips = if footage.is_empty() { varied(Split::Training, recipe.pictures).map_err(unfit)? } else { footage };
         let held_out = varied(Split::Validation, recipe.pictures.min(60)).map_err(unfit)?;
-        let count = held_out.len();
+        let count = 2 * held_out.len();
         let validation =
-            Benchmark { clips: held_out, settings: ScanSettings::reference(), seed: 1, count, frames: 250 };
+            Benchmark { clips: held_out, conditions: Conditions::HalfVaried, seed: 1, count, frames: FRAMES };
         let mut trainer = trainer(design, &recipe, clips, seed, device)?;
         let mut origin = None;
         if let Beginning::Weights(file) = beginning {
