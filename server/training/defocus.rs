@@ -13,7 +13,8 @@ use crate::imaging::{GrayImage, PATCH_SIDE, Patch};
 
 /// Widest supported reach of a kernel, in pixels either side: four times the largest sigma of the scans, 8.
 const MAX_REACH: usize = 32;
-const MAX_SIDE: usize = PATCH_SIDE + 2 * MAX_REACH;
+/// Pixels a row that the widest kernel needs.
+pub(super) const MAX_SIDE: usize = PATCH_SIDE + 2 * MAX_REACH;
 /// Below this a blur changes no grey value that a camera could tell.
 const LEAST_SIGMA: f64 = 0.15;
 

@@ -8,8 +8,10 @@
     reason = "pixel arithmetic on small numbers"
 )]
 
+use multiversion::multiversion;
 use rand::Rng;
 
+use super::defocus::MAX_SIDE;
 use crate::camera::walk::{Motion, Walk, standard_normal};
 use crate::imaging::{GrayImage, PATCH_SIDE};
 
@@ -60,44 +62,39 @@ impl Unrest {
     }
 
     /// Fills `out`, `side` pixels a row, with what is seen of `image` around a patch whose top left pixel lies at `corner`.
-    /// Outside the image its border pixels go on.
+    /// Outside the image its border pixels go on. The image has at least 2x2 pixels, `side` is at most [`MAX_SIDE`].
     pub fn gather(&self, image: &GrayImage, corner: (f64, f64), side: usize, out: &mut [f32]) {
         let middle = 0.5 * side as f32;
         let centre = [corner.0, corner.1].map(|at| at as f32 + 0.5 * PATCH_SIDE as f32);
         let strain = self.strain.each_ref().map(|walk| walk.position() as f32);
         let drift = self.drift.each_ref().map(|walk| walk.position() as f32);
-        let mut sum = 0.0;
+        let along = (1.0 + strain[0], strain[2]);
         for (row, line) in out.chunks_exact_mut(side).take(side).enumerate() {
             let y = row as f32 - middle;
-            for (column, value) in line.iter_mut().enumerate() {
-                let x = column as f32 - middle;
-                let shifted = [0, 2].map(|row| strain[row] * x + strain[row + 1] * y);
-                let at = (centre[0] + x + shifted[0], centre[1] + y + shifted[1]);
-                *value = between(image, at);
-                sum += *value;
-            }
+            let start =
+                (centre[0] - middle * along.0 + strain[1] * y, centre[1] - middle * along.1 + (1.0 + strain[3]) * y);
+            sample(image, start, along, line);
         }
-        let mean = sum / (side * side) as f32;
+        let out = &mut out[..side * side];
+        let mean = out.iter().sum::<f32>() / out.len() as f32;
         let knots = |axis: usize| {
             let place = move |index| (centre[axis] + index as f32 - middle) / self.cell + drift[axis];
             (0..side).map(move |index| Knots::around(place(index)))
         };
         let columns: Vec<Knots> = knots(0).collect();
         for (row, line) in knots(1).zip(out.chunks_exact_mut(side)) {
+            let gains = self.gains_along(&row);
             for (column, value) in columns.iter().zip(line) {
-                *value = (mean + self.gain(column, &row) * (*value - mean)).clamp(0.0, 255.0);
+                let gain = mix(gains[column.before], gains[column.after], column.part);
+                *value = (mean + gain * (*value - mean)).clamp(0.0, 255.0);
             }
         }
     }
 
-    /// The contrast at a place.
-    fn gain(&self, column: &Knots, row: &Knots) -> f32 {
-        let (upper, lower) = (&self.gains[row.before * KNOTS..], &self.gains[row.after * KNOTS..]);
-        mix(
-            (upper[column.before], upper[column.after]),
-            (lower[column.before], lower[column.after]),
-            (column.part, row.part),
-        )
+    /// The contrast at the knots along a row.
+    fn gains_along(&self, row: &Knots) -> [f32; KNOTS] {
+        let (upper, lower) = (&self.gains[row.before * KNOTS..][..KNOTS], &self.gains[row.after * KNOTS..][..KNOTS]);
+        std::array::from_fn(|knot| mix(upper[knot], lower[knot], row.part))
     }
 }
 
@@ -118,18 +115,28 @@ impl Knots {
     }
 }
 
-/// The value of `image` between its pixels' middles.
-fn between(image: &GrayImage, (x, y): (f32, f32)) -> f32 {
-    let (x, y) = (x.clamp(0.0, (image.width - 1) as f32), y.clamp(0.0, (image.height - 1) as f32));
-    let (left, top) = (x as usize, y as usize);
-    let (right, bottom) = ((left + 1).min(image.width - 1), (top + 1).min(image.height - 1));
-    let at = |column: usize, row: usize| image.data[row * image.width + column];
-    mix((at(left, top), at(right, top)), (at(left, bottom), at(right, bottom)), (x - left as f32, y - top as f32))
+/// Fills `line` with the values of `image` at places between its pixels' middles, from `start` on with a step of `along`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn sample(image: &GrayImage, start: (f32, f32), along: (f32, f32), line: &mut [f32]) {
+    let most = [image.width, image.height].map(|pixels| (pixels - 2) as i32);
+    // Where to look first and then looking: the former goes many pixels at a time.
+    let (mut corners, mut parts) = ([0u32; MAX_SIDE], [(0.0f32, 0.0f32); MAX_SIDE]);
+    for (column, (corner, part)) in corners.iter_mut().zip(&mut parts).enumerate().take(line.len()) {
+        let x = (start.0 + column as f32 * along.0).clamp(0.0, (most[0] + 1) as f32);
+        let y = (start.1 + column as f32 * along.1).clamp(0.0, (most[1] + 1) as f32);
+        let (left, top) = ((x as i32).min(most[0]), (y as i32).min(most[1]));
+        *corner = (top * (most[0] + 2) + left) as u32;
+        *part = (x - left as f32, y - top as f32);
+    }
+    for ((value, &corner), &(right, down)) in line.iter_mut().zip(&corners).zip(&parts) {
+        let from = corner as usize;
+        let (upper, lower) = (&image.data[from..from + 2], &image.data[from + image.width..from + image.width + 2]);
+        *value = mix(mix(upper[0], upper[1], right), mix(lower[0], lower[1], right), down);
+    }
 }
 
-fn mix(upper: (f32, f32), lower: (f32, f32), (right, down): (f32, f32)) -> f32 {
-    let (upper, lower) = (upper.0 + right * (upper.1 - upper.0), lower.0 + right * (lower.1 - lower.0));
-    upper + down * (lower - upper)
+fn mix(here: f32, there: f32, part: f32) -> f32 {
+    here + part * (there - here)
 }
 
 #[cfg(test)]
@@ -162,6 +169,15 @@ mod tests {
     }
 
     #[test]
+    fn beyond_the_border_its_pixels_go_on() {
+        let mut line = [0.0; 6];
+        sample(&slope(), (93.5, -2.0), (1.0, 0.0), &mut line);
+        assert_eq!(line.map(|value| (4.0 * value) as i32), [187, 189, 190, 190, 190, 190]);
+        sample(&slope(), (-1.0, 94.5), (0.0, 1.0), &mut line);
+        assert_eq!(line.map(|value| (4.0 * value) as i32), [378, 380, 380, 380, 380, 380]);
+    }
+
+    #[test]
     fn a_stretched_slope_is_flatter() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let still = Restlessness { strain: 0.0, contrast: 0.0, cell: 8.0, drift: 0.0 };
@@ -181,6 +197,8 @@ mod tests {
         let logs: Vec<f64> = unrest.gains.iter().map(|gain| f64::from(gain.ln())).collect();
         let sd = (logs.iter().map(|log| log * log).sum::<f64>() / logs.len() as f64).sqrt();
         assert!((sd - 0.3).abs() < 0.03, "{sd}");
-        assert!((unrest.gain(&Knots::around(3.0), &Knots::around(5.0)) - unrest.gains[5 * KNOTS + 3]).abs() < 1e-6);
+        assert!((unrest.gains_along(&Knots::around(5.0))[3] - unrest.gains[5 * KNOTS + 3]).abs() < 1e-6);
+        let halfway = 0.5 * (unrest.gains[5 * KNOTS + 3] + unrest.gains[6 * KNOTS + 3]);
+        assert!((unrest.gains_along(&Knots::around(5.5))[3] - halfway).abs() < 1e-6);
     }
 }
