@@ -166,11 +166,7 @@ impl Run {
             tell(&Progress { updates, loss, epsilon: self.trainer.epsilon(), validation });
         }
         self.save()?;
-        let complete = self.updates() >= end;
-        if complete {
-            self.report()?;
-        }
-        Ok(complete)
+        Ok(self.updates() >= end)
     }
 
     /// One leg: as many updates as lie before the next multiple of [`LEG`], on scans that begin anew.
@@ -214,7 +210,10 @@ impl Run {
     }
 
     /// Runs the best weights on the reference benchmark, for their model card.
-    fn report(&self) -> Result<(), TrainError> {
+    ///
+    /// # Errors
+    /// When the run folder cannot be read or written.
+    pub fn report(&self) -> Result<(), TrainError> {
         let count = self.recipe.benchmark;
         if count == 0 || !self.best.is_finite() {
             return Ok(());
