@@ -1,4 +1,5 @@
-//! The policy `parfocal`: tracks a belief about where the optimum is, and goes where the lens is most likely in focus.
+//! The policy `parfocal`: tracks a belief about where the optimum is, goes where the lens is most likely in focus, and looks around
+//! where that is in doubt.
 #![allow(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,

@@ -214,3 +214,18 @@ pub fn compare(rows: &[Row]) -> Vec<Comparison> {
     }
     comparisons
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::FocalPower;
+
+    #[test]
+    fn the_first_half_of_half_varied_scans_are_the_references() {
+        let same = Benchmark::reference(4).unwrap();
+        let varied = Benchmark { conditions: Conditions::HalfVaried, ..same.clone() };
+        let seen = |set: &Benchmark, index| Benchmark::scan(set, index).observe(FocalPower::MIDDLE);
+        let alike: Vec<bool> = (0..4).map(|index| seen(&same, index) == seen(&varied, index)).collect();
+        assert_eq!(alike, [true, true, false, false]);
+    }
+}
