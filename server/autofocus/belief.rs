@@ -69,6 +69,14 @@ impl Trace {
         input
     }
 
+    /// Where to go from `focal_power` under `belief` (see [`target`]); nowhere while the latest frame shows nothing that focus
+    /// could be told by, such as a glove or glare.
+    #[must_use]
+    pub fn aim(&self, focal_power: f64, belief: &[f32]) -> f64 {
+        let blind = self.last.as_ref().is_some_and(|frame| !frame.spectrum.shows_detail());
+        if blind { focal_power } else { target(focal_power, belief) }
+    }
+
     /// Notes the focal power that was asked for after the frame.
     pub const fn ask(&mut self, target: f64) {
         self.asked = Some(target as f32);
@@ -122,23 +130,25 @@ pub fn best(belief: &[f32]) -> f64 {
 /// Where to go from `focal_power` under `belief` (see [`best`]): to the best place, at most [`MAX_MOVE`] a frame and not for less than
 /// [`LEAST_MOVE`]; or, where the tracker is not assured of being in focus, [`LOOK`] at least, towards the likelier side.
 #[must_use]
-pub fn target(focal_power: f64, belief: &[f32]) -> f64 {
+fn target(focal_power: f64, belief: &[f32]) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
-    let (mut below, mut here, mut above) = (0.0, 0.0, 0.0);
-    for (bin, share) in belief.iter().enumerate() {
-        let distance = bin as f64 / (BINS - 1) as f64 - focal_power;
-        let side = if distance.abs() < IN_FOCUS {
-            &mut here
-        } else if distance < 0.0 {
-            &mut below
-        } else {
-            &mut above
-        };
-        *side += f64::from(*share);
-    }
-    if here < ASSURANCE && step.abs() < LOOK {
-        let look = if above > below { LOOK } else { -LOOK };
-        return (focal_power + look).clamp(0.0, 1.0);
+    if step.abs() < LOOK {
+        let (mut below, mut here, mut above) = (0.0, 0.0, 0.0);
+        for (bin, share) in belief.iter().enumerate() {
+            let distance = bin as f64 / (BINS - 1) as f64 - focal_power;
+            let side = if distance.abs() < IN_FOCUS {
+                &mut here
+            } else if distance < 0.0 {
+                &mut below
+            } else {
+                &mut above
+            };
+            *side += f64::from(*share);
+        }
+        if here < ASSURANCE {
+            let look = if above > below { LOOK } else { -LOOK };
+            return (focal_power + look).clamp(0.0, 1.0);
+        }
     }
     if step.abs() < LEAST_MOVE { focal_power } else { focal_power + step }
 }
@@ -179,7 +189,7 @@ impl BeliefTracker {
 impl Policy for BeliefTracker {
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         let belief = self.believe(seen);
-        let target = target(seen.focal_power.get(), &belief);
+        let target = self.trace.aim(seen.focal_power.get(), &belief);
         self.trace.ask(target);
         Decision { target, metric: None, belief: Some(belief.into()) }
     }

@@ -10,6 +10,7 @@
 )]
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use multiversion::multiversion;
@@ -24,6 +25,12 @@ pub const FEATURES: usize = BANDS + 4;
 /// Columns of the transform that a real patch needs: frequencies 0..=16; padded to whole vectors.
 const COLUMNS: usize = 24;
 const HALF: usize = PATCH_SIDE / 2;
+
+/// Energy far below that of a gray level's noise, so that an empty band has a finite logarithm.
+const ROUNDING: f32 = 30.0;
+/// How many times as much energy the lower third of the bands must have as the upper third for a patch to show anything. White
+/// noise has more than 2.5 times as much in one patch of a thousand.
+const LEAST_FALL: f32 = 2.5;
 
 type Matrix = [[f32; COLUMNS]; PATCH_SIDE];
 
@@ -94,14 +101,26 @@ pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
     let energy = band_energies(spectrum);
     let mut out = [0.0; FEATURES];
     for band in 0..BANDS {
-        // 30: far below a gray level's noise, so that an empty band gives a finite value.
-        out[band] = 0.25 * ((energy[band] / TABLES.count[band] + 30.0).ln() - 9.0);
+        out[band] = 0.25 * ((energy[band] / TABLES.count[band] + ROUNDING).ln() - 9.0);
     }
     out[BANDS] = 0.5 * ((spectrum.variance + 0.1).ln() - 5.0);
     out[BANDS + 1] = ((mgm(patch) + 0.5).ln() - 3.5) as f32;
     out[BANDS + 2] = 0.5 * ((mlr(patch) - 1.0 + 1e-4).ln() as f32 + 3.5);
     out[BANDS + 3] = (spectrum.mean - 128.0) / 64.0;
     out
+}
+
+impl Spectrum {
+    /// Whether the patch shows more than noise: tissue has far more energy at low frequencies than at high ones however sharp it
+    /// is, the sensor's noise and rounding have as much at all.
+    #[must_use]
+    pub fn shows_detail(&self) -> bool {
+        let energy = band_energies(self);
+        let mean = |bands: Range<usize>| {
+            energy[bands.clone()].iter().sum::<f32>() / TABLES.count[bands].iter().sum::<f32>() + ROUNDING
+        };
+        mean(0..BANDS / 3) > LEAST_FALL * mean(2 * BANDS / 3..BANDS)
+    }
 }
 
 /// The transform of a patch.
@@ -167,7 +186,11 @@ fn band_energies(spectrum: &Spectrum) -> [f32; BANDS] {
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
     use super::*;
+    use crate::camera::walk::standard_normal;
 
     fn wave(frequency: f64) -> Patch {
         Patch(std::array::from_fn(|i| {
@@ -182,6 +205,22 @@ mod tests {
             let brightest = (0..BANDS).max_by(|&a, &b| found[a].total_cmp(&found[b])).unwrap();
             assert!(brightest.abs_diff(band) <= 1, "{frequency}: {brightest}");
         }
+    }
+
+    #[test]
+    fn a_flat_patch_and_mere_noise_show_nothing_and_blurred_texture_does() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut noise =
+            |sd: f64| Patch(std::array::from_fn(|_| (90.3 + sd * standard_normal(&mut rng)).round() as f32));
+        for sd in [0.0, 0.3, 1.0, 4.0, 10.0] {
+            let seen = (0..200).filter(|_| spectrum(&noise(sd)).shows_detail()).count();
+            assert!(seen <= 2, "noise of {sd}: {seen} of 200");
+        }
+        let mut texture = noise(2.0);
+        for (value, wave) in texture.0.iter_mut().zip(wave(2.0).0) {
+            *value += 0.1 * (wave - 128.0);
+        }
+        assert!(spectrum(&texture).shows_detail());
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::optimiser::{Optimiser, Rule, half_cosine};
 use super::session::{Session, lead_astray};
 use super::trainer::Trainer;
 use super::variety::Variety;
-use crate::autofocus::belief::{Trace, spread_over_bins, target};
+use crate::autofocus::belief::{Trace, spread_over_bins};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
 
 /// How a belief tracker is trained.
@@ -102,7 +102,7 @@ impl BeliefTrainer {
             logits.view([-1, BINS as i64]).softmax(-1, Kind::Float).copy_data(&mut believed, count * BINS);
             for (index, seat) in self.seats.iter_mut().enumerate() {
                 let stands = seat.session.focal_power().get();
-                let mut aim = target(stands, &believed[index * BINS..][..BINS]);
+                let mut aim = seat.trace.aim(stands, &believed[index * BINS..][..BINS]);
                 if seat.session.wanders {
                     aim = lead_astray(aim, &mut self.rng);
                 }

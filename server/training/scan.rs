@@ -45,6 +45,8 @@ pub struct ScanSettings {
     pub pattern: f64,
     /// How restless the scene is, if it is.
     pub unrest: Option<Restlessness>,
+    /// Whether now and then something without detail covers the view: a glove, an instrument, glare.
+    pub covered: bool,
 }
 
 impl ScanSettings {
@@ -71,6 +73,7 @@ impl Default for ScanSettings {
             veil: 0.0,
             pattern: 0.0,
             unrest: None,
+            covered: false,
         }
     }
 }
@@ -91,6 +94,7 @@ pub struct Scan {
     /// The sensor's pattern, a gray level a pixel; empty if there is none.
     pattern: Vec<f32>,
     unrest: Option<Unrest>,
+    cover: Option<Cover>,
     course: ChaCha8Rng,
     veil_course: ChaCha8Rng,
     unrest_course: ChaCha8Rng,
@@ -116,6 +120,7 @@ impl Scan {
         let pattern = (0..pixels).map(|_| settings.pattern as f32 * cheap_normal(&mut noise)).collect();
         let mut unrest_course = ChaCha8Rng::seed_from_u64(seed ^ 0x756e_7265_7374);
         let unrest = settings.unrest.map(|unrest| Unrest::new(unrest, &mut unrest_course));
+        let cover = settings.covered.then(|| Cover::new(seed ^ 0x0063_6f76_6572));
         let tremor = settings.tremor * standard_normal(&mut course);
         let contrast = (settings.flicker * standard_normal(&mut course)).exp();
         let defocus = Defocus::default();
@@ -131,6 +136,7 @@ impl Scan {
             veil,
             pattern,
             unrest,
+            cover,
             course,
             veil_course,
             unrest_course,
@@ -163,7 +169,8 @@ impl Scan {
             }
         }
         let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
-        expose(&mut patch, gain, self.contrast as f32, offset);
+        let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
+        expose(&mut patch, gain, (detail * self.contrast) as f32, offset);
         if self.settings.noise > 0.0 {
             for value in &mut patch.0 {
                 *value += self.settings.noise as f32 * cheap_normal(&mut self.noise);
@@ -193,8 +200,43 @@ impl Scan {
         self.crop.iter_mut().for_each(|walk| walk.advance(&mut self.course));
         self.veil.iter_mut().flatten().for_each(|walk| walk.advance(&mut self.veil_course));
         self.unrest.iter_mut().for_each(|unrest| unrest.advance(&mut self.unrest_course));
+        self.cover.iter_mut().for_each(Cover::advance);
         self.tremor = self.settings.tremor * standard_normal(&mut self.course);
         self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
+    }
+}
+
+/// Something that covers the view for a while, and then for a while does not.
+#[derive(Debug, Clone)]
+struct Cover {
+    course: ChaCha8Rng,
+    /// The share of its contrast that is left of the picture, while it is covered.
+    detail: Option<f64>,
+    frames_left: i32,
+}
+
+impl Cover {
+    fn new(seed: u64) -> Self {
+        let mut course = ChaCha8Rng::seed_from_u64(seed);
+        let frames_left = course.random_range(0..150);
+        Self { course, detail: None, frames_left }
+    }
+
+    fn detail(&self) -> f64 {
+        self.detail.unwrap_or(1.0)
+    }
+
+    fn advance(&mut self) {
+        if self.frames_left > 0 {
+            self.frames_left -= 1;
+            return;
+        }
+        let covers = self.detail.is_none();
+        self.detail = covers.then(|| self.course.random_range(0.0..0.04));
+        // As often for a moment as for long.
+        let frames =
+            if covers { self.course.random_range(1.0f64..5.0).exp() } else { self.course.random_range(20.0..150.0) };
+        self.frames_left = frames as i32;
     }
 }
 

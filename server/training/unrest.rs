@@ -119,13 +119,14 @@ impl Knots {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn sample(image: &GrayImage, start: (f32, f32), along: (f32, f32), line: &mut [f32]) {
     let most = [image.width, image.height].map(|pixels| (pixels - 2) as i32);
+    let width = image.width as i32;
     // Where to look first and then looking: the former goes many pixels at a time.
     let (mut corners, mut parts) = ([0u32; MAX_SIDE], [(0.0f32, 0.0f32); MAX_SIDE]);
     for (column, (corner, part)) in corners.iter_mut().zip(&mut parts).enumerate().take(line.len()) {
         let x = (start.0 + column as f32 * along.0).clamp(0.0, (most[0] + 1) as f32);
         let y = (start.1 + column as f32 * along.1).clamp(0.0, (most[1] + 1) as f32);
         let (left, top) = ((x as i32).min(most[0]), (y as i32).min(most[1]));
-        *corner = (top * (most[0] + 2) + left) as u32;
+        *corner = (top * width + left) as u32;
         *part = (x - left as f32, y - top as f32);
     }
     for ((value, &corner), &(right, down)) in line.iter_mut().zip(&corners).zip(&parts) {

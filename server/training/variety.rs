@@ -38,6 +38,7 @@ impl Variety {
         settings.veil = if rng.random_bool(0.3) { rng.random_range(0.0..0.4) } else { 0.0 };
         settings.unrest = rng.random_bool(0.5).then(|| restlessness(rng));
         settings.pattern = if rng.random_bool(0.4) { rng.random_range(0.0..3.0) } else { 0.0 };
+        settings.covered = rng.random_bool(0.15);
         settings.exposure = (gain, rng.random_range(-0.5..1.0) * 120.0 * (1.0 - gain));
         settings
     }
