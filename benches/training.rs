@@ -56,7 +56,8 @@ fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, batch: usize, times: u
     let mut recipe = Recipe::parse(shipped(name).unwrap()).unwrap().dqn.unwrap();
     // A window's first seven frames have no full history, its last no successor.
     (recipe.windows, recipe.window) = (batch / TRANSITIONS, TRANSITIONS + 8);
-    (recipe.frames_an_update, recipe.warm_up, recipe.replay) = (recipe.scans, 4000, 20_000);
+    // As in `peer.py` the memory is filled once and no frame is played meanwhile.
+    (recipe.frames_an_update, recipe.warm_up, recipe.replay) = (0, 20_000, 20_000);
     let mut trainer = DqnTrainer::new(sight, recipe, clips.to_vec(), 1, tch::Device::Cpu);
     trainer.update();
     let rate = rate(times, || {

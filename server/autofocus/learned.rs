@@ -74,7 +74,8 @@ pub struct ValueNetwork {
     /// What it sees.
     pub sight: Sight,
     encoder: Option<Encoder>,
-    head: ValueHead,
+    /// What makes values of its histories.
+    pub head: ValueHead,
 }
 
 impl ValueNetwork {

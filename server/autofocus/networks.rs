@@ -34,7 +34,8 @@ pub fn compute_on_this_thread() {
 /// Three dense layers, `input` -> 256 -> 256 -> 3, `ReLU` between: the action values.
 #[derive(Debug)]
 pub struct ValueHead {
-    layers: [nn::Linear; 3],
+    /// The layers, first to last.
+    pub layers: [nn::Linear; 3],
 }
 
 impl ValueHead {

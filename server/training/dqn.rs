@@ -11,11 +11,11 @@ use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tch::{Device, Reduction, Tensor, nn};
+use tch::{Device, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::clip::Clip;
-use super::dqn_batch::{Batch, Bonus, Returns, bellman, gains};
+use super::dqn_batch::{Batch, Bonus, Returns, Wanted, bellman, lookahead, smooth_l1};
 use super::dqn_recipe::{DqnRecipe, Target};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::replay::{Frames, Replay, Seen, Step};
@@ -91,10 +91,7 @@ impl DqnTrainer {
         }
         let encodings = self.online.encode(&frames);
         let count = self.seats.len() as i64;
-        let mut flat = vec![0.0f32; encodings.numel()];
-        encodings.contiguous().view([-1]).copy_data(&mut flat, encodings.numel());
-        let width = sight.width();
-        for (seat, encoding) in self.seats.iter_mut().zip(flat.chunks_exact(width)) {
+        for (seat, encoding) in self.seats.iter_mut().zip(floats(&encodings).chunks_exact(sight.width())) {
             seat.remember(encoding);
         }
         let device = self.device();
@@ -103,10 +100,8 @@ impl DqnTrainer {
             Tensor::from_slice(&all).view([count, -1]).to_device(device)
         };
         let values = self.online.network.values(&gather(|seat| &seat.history), &gather(|seat| &seat.focal_powers));
-        let mut flat = vec![0.0f32; self.seats.len() * ACTIONS];
-        values.view([-1]).copy_data(&mut flat, self.seats.len() * ACTIONS);
         let epsilon = self.recipe.epsilon(self.frames);
-        for (index, values) in flat.chunks_exact(ACTIONS).enumerate() {
+        for (index, values) in floats(&values).chunks_exact(ACTIONS).enumerate() {
             let explore = self.rng.random_bool(epsilon);
             let action = if explore { self.rng.random_range(0..ACTIONS) } else { best_action(values) };
             self.finish_frame(index, &seen[index], action);
@@ -145,38 +140,29 @@ impl DqnTrainer {
         Batch::new(frames, steps, length, self.device())
     }
 
-    /// Values `[S, 3]` of all of the batch's states by `network`, from its encodings of the batch's frames.
-    fn values(network: &Values, batch: &Batch, encodings: &Tensor) -> Tensor {
-        let encodings = encodings.index_select(0, &batch.history).view([batch.states.len() as i64, -1]);
-        network.network.values(&encodings, &batch.focal_powers)
-    }
-
-    fn loss(&self, batch: &Batch, encodings: &Tensor) -> Tensor {
-        let values = Self::values(&self.online, batch, encodings);
-        let device = self.device();
+    /// What the values of the batch's states, which are `values` (`[S, 3]`, row by row), should be.
+    fn wanted(&self, batch: &Batch, values: &[f32]) -> Wanted {
         match self.recipe.target {
-            Target::Lookahead { restless, turning } => {
-                let bonus = Bonus { restless, turning };
-                let wanted: Vec<f32> = batch.states.iter().flat_map(|&at| gains(&batch.steps[..=at], bonus)).collect();
-                let wanted = Tensor::from_slice(&wanted).view([-1, ACTIONS as i64]).to_device(device);
-                values.smooth_l1_loss(&wanted, Reduction::Mean, 1.0)
-            }
+            Target::Lookahead { restless, turning } => lookahead(batch, Bonus { restless, turning }),
             Target::Bellman { discount, steps, double, regret } => {
-                let target = tch::no_grad(|| Self::values(&self.target, batch, &self.target.encode(&batch.frames)));
-                let picker = if double { values.detach() } else { target.shallow_clone() };
-                let next = target.gather(1, &picker.argmax(1, true), false).view([-1]);
-                let mut next_values = vec![0.0f32; batch.states.len()];
-                next.copy_data(&mut next_values, batch.states.len());
-                let returns = Returns { discount, steps, regret };
-                let (taken, wanted) = bellman(batch, &next_values, returns, self.recipe.window);
-                let (rows, actions): (Vec<i64>, Vec<i64>) = taken.into_iter().unzip();
-                let chosen = values.index_select(0, &Tensor::from_slice(&rows).to_device(device));
-                let actions = Tensor::from_slice(&actions).view([-1, 1]).to_device(device);
-                let chosen = chosen.gather(1, &actions, false).view([-1]);
-                chosen.smooth_l1_loss(&Tensor::from_slice(&wanted).to_device(device), Reduction::Mean, 1.0)
+                let encodings = tch::no_grad(|| self.target.encode(&batch.frames));
+                let later = floats(&self.target.pass(batch, &encodings).values);
+                let (later, pickers) = (later.as_chunks::<ACTIONS>().0, values.as_chunks::<ACTIONS>().0);
+                let next = |(row, values): (usize, &[f32; ACTIONS])| {
+                    values[best_action(if double { &pickers[row] } else { values })]
+                };
+                let next: Vec<f32> = later.iter().enumerate().map(next).collect();
+                bellman(batch, &next, Returns { discount, steps, regret }, self.recipe.window)
             }
         }
     }
+}
+
+/// A tensor's values, row by row.
+fn floats(tensor: &Tensor) -> Vec<f32> {
+    let mut values = vec![0.0f32; tensor.numel()];
+    tensor.contiguous().view([-1]).copy_data(&mut values, tensor.numel());
+    values
 }
 
 impl Trainer for DqnTrainer {
@@ -206,15 +192,18 @@ impl Trainer for DqnTrainer {
         }
         let batch = self.batch();
         let encodings = self.online.encode(&batch.frames);
-        let loss = self.loss(&batch, &encodings);
-        let gradient = self.online.gradient(self.optimiser.flat(), &loss, &encodings, &batch.frames);
+        let pass = self.online.pass(&batch, &encodings);
+        let values = floats(&pass.values);
+        let (loss, slopes) = smooth_l1(&values, &self.wanted(&batch, &values));
+        let slopes = Tensor::from_slice(&slopes).view_as(&pass.values).to_device(self.device());
+        let gradient = self.online.gradient(self.optimiser.flat(), &batch, &encodings, &pass, slopes);
         let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.descend(gradient, self.recipe.clip, rate);
         if matches!(self.recipe.target, Target::Bellman { .. }) {
             self.target_variables.approach(self.optimiser.flat(), self.recipe.target_share);
         }
         self.updates += 1;
-        loss.double_value(&[])
+        loss
     }
 
     fn epsilon(&self) -> Option<f64> {

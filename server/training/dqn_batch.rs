@@ -125,27 +125,49 @@ impl Returns {
     }
 }
 
-/// The states whose successors some steps on are in the batch, as (row, action taken), and their targets.
-pub(super) fn bellman(
-    batch: &Batch,
-    next_values: &[f32],
-    returns: Returns,
-    window: usize,
-) -> (Vec<(i64, i64)>, Vec<f32>) {
+/// What values should be: `None` where nothing is known of an action's.
+pub(super) type Wanted = Vec<[Option<f32>; ACTIONS]>;
+
+/// What the lookahead wants of each state: all actions' [`gains`].
+pub(super) fn lookahead(batch: &Batch, bonus: Bonus) -> Wanted {
+    batch.states.iter().map(|&at| gains(&batch.steps[..=at], bonus).map(Some)).collect()
+}
+
+/// What Bellman's equation wants of the action taken in each state whose successor some steps on is in the batch.
+/// `next_values` are the states' own, by row.
+pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Returns, window: usize) -> Wanted {
     let mut row_of = vec![None; batch.steps.len()];
     for (row, &at) in batch.states.iter().enumerate() {
         row_of[at] = Some(row);
     }
-    let (mut taken, mut wanted) = (Vec::new(), Vec::new());
-    for (row, &at) in batch.states.iter().enumerate() {
+    let wanted = |&at: &usize| {
+        let mut wanted = [None; ACTIONS];
         let end = at + returns.steps;
         let same_scan = end / window == at / window
             && usize::from(batch.steps[end].age) == usize::from(batch.steps[at].age) + returns.steps;
-        let Some(last) = same_scan.then(|| row_of[end]).flatten() else { continue };
-        taken.push((row as i64, i64::from(batch.steps[at].action)));
-        wanted.push(returns.of(&batch.steps, at, f64::from(next_values[last])) as f32);
-    }
-    (taken, wanted)
+        if let Some(last) = same_scan.then(|| row_of[end]).flatten() {
+            let value = returns.of(&batch.steps, at, f64::from(next_values[last]));
+            wanted[usize::from(batch.steps[at].action)] = Some(value as f32);
+        }
+        wanted
+    };
+    batch.states.iter().map(wanted).collect()
+}
+
+/// The mean smooth L1 loss of `values` (`[S, 3]`, row by row) where something is wanted of them, and its gradient by them:
+/// Huber's (1964), quadratic within 1.
+pub(super) fn smooth_l1(values: &[f32], wanted: &Wanted) -> (f64, Vec<f32>) {
+    let wanted = wanted.as_flattened();
+    let count = wanted.iter().flatten().count().max(1) as f64;
+    let mut loss = 0.0;
+    let slope = |(value, wanted): (&f32, &Option<f32>)| {
+        let difference = wanted.map_or(0.0, |wanted| f64::from(value - wanted));
+        let size = difference.abs();
+        loss += if size < 1.0 { 0.5 * size * size } else { size - 0.5 };
+        (difference.clamp(-1.0, 1.0) / count) as f32
+    };
+    let slopes = values.iter().zip(wanted).map(slope).collect();
+    (loss / count, slopes)
 }
 
 #[cfg(test)]
@@ -181,5 +203,12 @@ mod tests {
             "the latest change counts, however long the lens has stood"
         );
         assert_eq!(far(&[0.0])[0], 0, "the lens cannot go there");
+    }
+
+    #[test]
+    fn smooth_l1_by_hand() {
+        let (loss, slopes) = smooth_l1(&[0.5, 9.0, -2.0], &vec![[Some(0.1), None, Some(1.0)]]);
+        assert!((loss - 1.29).abs() < 1e-6);
+        assert_eq!(slopes.iter().map(|slope| (1000.0 * slope).round() as i32).collect::<Vec<_>>(), [200, 0, -500]);
     }
 }

@@ -12,6 +12,7 @@ mod encoder;
 pub mod error;
 pub mod evaluate;
 pub mod footage;
+mod head;
 mod model_card;
 pub mod optimiser;
 pub mod pictures;

@@ -1,12 +1,16 @@
-//! A value network as training runs it: on frames in their compact form, and on the processor with the encoder by hand.
+//! A value network as training runs it: on frames in their compact form, its head's gradient by hand, and on the processor its
+//! encoder's too.
 #![allow(clippy::cast_possible_wrap, reason = "small counts as tensor sizes")]
 
 use tch::{Device, Kind, Tensor, nn};
 
+use super::dqn_batch::Batch;
 use super::encoder::Encoder;
-use super::optimiser::{Flat, joined};
+use super::head::Pass;
+use super::optimiser::{Flat, parts};
 use super::replay::Frames;
 use crate::autofocus::learned::{Sight, ValueNetwork};
+use crate::autofocus::networks::HISTORY;
 use crate::imaging::PATCH_SIDE;
 
 const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
@@ -27,11 +31,11 @@ impl Values {
         Self { store, network, by_hand }
     }
 
-    /// Encodings `[N, width]` of frames. What follows can be differentiated by them even where they are made by hand.
+    /// Encodings `[N, width]` of frames, for libtorch to differentiate where they are not made by hand.
     pub fn encode(&self, frames: &Frames) -> Tensor {
         if let Some(encoder) = &self.by_hand {
             let width = self.network.sight.width() as i64;
-            return Tensor::from_slice(&encoder.encode(&frames.patches)).view([-1, width]).set_requires_grad(true);
+            return Tensor::from_slice(&encoder.encode(&frames.patches)).view([-1, width]);
         }
         let device = self.store.device();
         let frames = if frames.metrics.is_empty() {
@@ -42,17 +46,93 @@ impl Values {
         self.network.encode(&frames)
     }
 
-    /// The gradient of `loss` by all variables, which are `flat`, where `encodings` are what [`Values::encode`] made of
-    /// `frames`.
-    pub fn gradient(&self, flat: &Flat, loss: &Tensor, encodings: &Tensor, frames: &Frames) -> Tensor {
-        let Some(encoder) = &self.by_hand else { return flat.gradient(loss) };
-        // By name, the encoder's variables come before the head's.
-        let mut inputs = vec![encodings];
-        inputs.extend(&flat.variables[Encoder::VARIABLES..]);
-        let mut gradients = Tensor::run_backward(&[loss], &inputs, false, false);
-        let mut slopes = vec![0.0f32; encodings.numel()];
-        gradients[0].contiguous().copy_data(&mut slopes, encodings.numel());
-        gradients[0] = Tensor::from_slice(&encoder.gradient(&frames.patches, &slopes));
-        joined(&gradients)
+    /// Values of all of the batch's states, from the encodings of its frames.
+    pub fn pass(&self, batch: &Batch, encodings: &Tensor) -> Pass {
+        let states = tch::no_grad(|| {
+            let histories = encodings.index_select(0, &batch.history).view([batch.states.len() as i64, -1]);
+            Tensor::cat(&[&histories, &batch.focal_powers], 1)
+        });
+        Pass::through(&self.network.head, states)
+    }
+
+    /// The gradient by all variables, which are `flat`, of a loss whose gradient by the values of `pass` is `slopes`
+    /// (`[S, 3]`).
+    pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: &Pass, slopes: Tensor) -> Tensor {
+        let gradient = flat.values.empty_like();
+        let parts = parts(&gradient, &flat.variables);
+        // By name, the encoder's variables come before the head's six.
+        let (encoder, head) = parts.split_at(parts.len() - 6);
+        let by_hidden = pass.back(&self.network.head, slopes, head);
+        if encoder.is_empty() {
+            return gradient;
+        }
+        let by_states = by_hidden.mm(&self.network.head.layers[0].ws);
+        let width = self.network.sight.width() as i64;
+        let by_histories = by_states.narrow(1, 0, HISTORY as i64 * width).reshape([-1, width]);
+        let by_encodings = encodings.zeros_like().index_add_(0, &batch.history, &by_histories);
+        if let Some(by_hand) = &self.by_hand {
+            let mut slopes = vec![0.0f32; by_encodings.numel()];
+            by_encodings.view([-1]).copy_data(&mut slopes, by_encodings.numel());
+            let found = by_hand.gradient(&batch.frames.patches, &slopes);
+            gradient.narrow(0, 0, found.len() as i64).copy_(&Tensor::from_slice(&found));
+        } else {
+            // A loss whose gradient by the encodings is the one found.
+            let loss = (encodings * by_encodings).sum(Kind::Float);
+            let found = Tensor::run_backward(&[loss], &flat.variables[..encoder.len()], false, false);
+            for (part, found) in encoder.iter().zip(&found) {
+                part.shallow_clone().copy_(found);
+            }
+        }
+        gradient
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::training::replay::Step;
+
+    /// Two windows of twelve frames of noise, each with states whose history begins in it and states further on.
+    fn batch(rng: &mut ChaCha8Rng) -> Batch {
+        const WINDOW: u16 = 12;
+        let mut frames = Frames::default();
+        frames.patches.extend((0..2 * usize::from(WINDOW) * PIXELS).map(|_| rng.random_range(20..220u8)));
+        let step = |age| Step { focal_power: f32::from(age) / 50.0, next_optimum: 0.5, action: 1, age };
+        let steps = [0, 30].into_iter().flat_map(|begin| (begin..begin + WINDOW).map(step)).collect();
+        Batch::new(frames, steps, usize::from(WINDOW), Device::Cpu)
+    }
+
+    #[test]
+    fn gradients_by_hand_are_those_that_libtorch_records() {
+        tch::set_num_threads(1);
+        tch::manual_seed(3);
+        let batch = batch(&mut ChaCha8Rng::seed_from_u64(3));
+        assert!(batch.states.len() > 12, "the first window's states reach back as far as the scan goes");
+        let mut values = Values::new(Sight::Patch, Device::Cpu);
+        let flat = Flat::of(&values.store);
+        let slopes = Tensor::randn([batch.states.len() as i64, 3], (Kind::Float, Device::Cpu));
+
+        let histories = values.network.encode(&as_floats(&batch)).index_select(0, &batch.history);
+        let found = values.network.values(&histories.view([batch.states.len() as i64, -1]), &batch.focal_powers);
+        let expected = flat.gradient(&(&slopes * found).sum(Kind::Float));
+
+        for by_hand in [true, false] {
+            if !by_hand {
+                values.by_hand = None;
+            }
+            let encodings = values.encode(&batch.frames);
+            let pass = values.pass(&batch, &encodings);
+            let gradient = values.gradient(&flat, &batch, &encodings, &pass, slopes.shallow_clone());
+            let difference = (&gradient - &expected).abs().max().double_value(&[]);
+            let scale = expected.abs().max().double_value(&[]);
+            assert!(difference < 1e-4 * scale, "encoder by hand {by_hand}: {difference} of {scale}");
+        }
+    }
+
+    fn as_floats(batch: &Batch) -> Tensor {
+        Tensor::from_slice(&batch.frames.patches).view([-1, PIXELS as i64]).to_kind(Kind::Float)
     }
 }

@@ -20,9 +20,6 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// How many variables an encoder has.
-    pub const VARIABLES: usize = 2 * LAYERS.len();
-
     /// The encoder whose variables lie under `path` in `store`; `None` where there is none, or not on the processor.
     #[must_use]
     pub fn of(store: &nn::VarStore, path: &str) -> Option<Self> {
