@@ -117,6 +117,28 @@ fn the_same_seed_gives_the_same_figures_to_the_last_digit() {
 }
 
 #[test]
+fn parfocal_keeps_the_lens_still_while_there_is_nothing_to_see() {
+    let folder = tempfile::tempdir().unwrap();
+    let glove = folder.path().join("glove.png");
+    image::GrayImage::from_pixel(128, 128, image::Luma([90])).save(&glove).unwrap();
+    let output = parfocal(&[
+        "evaluate",
+        "--count",
+        "2",
+        "--policies",
+        "mgm-hill-climber,parfocal",
+        "--json",
+        "--footage",
+        glove.to_str().unwrap(),
+    ]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let travels = [1, 2].map(|row: usize| report["rows"][row]["travel"].as_f64().unwrap());
+    // A hill-climber steps at every frame.
+    assert!((travels[0] - 0.05).abs() < 1e-9 && travels[1] == 0.0, "{travels:?}");
+}
+
+#[test]
 fn bad_input_is_answered_with_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");

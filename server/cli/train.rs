@@ -89,16 +89,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         bar.set_position(progress.updates);
         bar.set_message(format!("loss {:.4}{epsilon}, validation MAE {validation:.4}", progress.loss));
     })?;
-    if whole {
-        bar.set_message("running the best weights on the reference benchmark");
-        run.report()?;
-    }
-    bar.finish_and_clear();
-    if whole {
-        println!("best validation MAE {:.4}; weights and model card in {}", run.best(), arguments.out.display());
-    } else {
+    if !whole {
+        bar.finish_and_clear();
         println!("stopped after {} of {total} updates; go on with --resume", run.updates());
+        return Ok(());
     }
+    bar.set_message("running the best weights on the reference benchmark");
+    run.report()?;
+    bar.finish_and_clear();
+    println!("best validation MAE {:.4}; weights and model card in {}", run.best(), arguments.out.display());
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 pub mod belief;
 pub mod checkpoint;
 pub mod clip;
+mod cover;
 mod curves;
 pub mod defocus;
 pub mod dqn;

@@ -136,7 +136,7 @@ impl Run {
     }
 
     /// Trains to the end, or until `stop` says so between two legs; either way leaves a checkpoint. Returns whether the
-    /// training is complete.
+    /// training is complete; [`Run::report`] then adds the benchmark's figures to the model card.
     ///
     /// # Errors
     /// When the run folder cannot be written, or the training diverged.

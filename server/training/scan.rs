@@ -14,6 +14,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::clip::{Area, Clip};
+use super::cover::Cover;
 use super::defocus::{Defocus, Spot};
 use super::unrest::{Restlessness, Unrest};
 use crate::camera::walk::{Motion, Walk, standard_normal};
@@ -203,40 +204,6 @@ impl Scan {
         self.cover.iter_mut().for_each(Cover::advance);
         self.tremor = self.settings.tremor * standard_normal(&mut self.course);
         self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
-    }
-}
-
-/// Something that covers the view for a while, and then for a while does not.
-#[derive(Debug, Clone)]
-struct Cover {
-    course: ChaCha8Rng,
-    /// The share of its contrast that is left of the picture, while it is covered.
-    detail: Option<f64>,
-    frames_left: i32,
-}
-
-impl Cover {
-    fn new(seed: u64) -> Self {
-        let mut course = ChaCha8Rng::seed_from_u64(seed);
-        let frames_left = course.random_range(0..150);
-        Self { course, detail: None, frames_left }
-    }
-
-    fn detail(&self) -> f64 {
-        self.detail.unwrap_or(1.0)
-    }
-
-    fn advance(&mut self) {
-        if self.frames_left > 0 {
-            self.frames_left -= 1;
-            return;
-        }
-        let covers = self.detail.is_none();
-        self.detail = covers.then(|| self.course.random_range(0.0..0.04));
-        // As often for a moment as for long.
-        let frames =
-            if covers { self.course.random_range(1.0f64..5.0).exp() } else { self.course.random_range(20.0..150.0) };
-        self.frames_left = frames as i32;
     }
 }
 

@@ -1,0 +1,68 @@
+//! What now and then covers the view in training: a glove, an instrument, glare; nothing can be seen to focus on.
+#![allow(clippy::cast_possible_truncation, reason = "some hundred frames at most")]
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Something that covers the view for a while, and then for a while does not.
+#[derive(Debug, Clone)]
+pub struct Cover {
+    course: ChaCha8Rng,
+    /// The share of its contrast that is left of the picture, while it is covered.
+    detail: Option<f64>,
+    frames_left: i32,
+}
+
+impl Cover {
+    /// A cover whose comings and goings are drawn from `seed`; nothing is covered yet.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        let mut course = ChaCha8Rng::seed_from_u64(seed);
+        let frames_left = course.random_range(0..150);
+        Self { course, detail: None, frames_left }
+    }
+
+    /// The share of its contrast that is left of the picture at this frame.
+    #[must_use]
+    pub fn detail(&self) -> f64 {
+        self.detail.unwrap_or(1.0)
+    }
+
+    /// Goes on to the next frame.
+    pub fn advance(&mut self) {
+        if self.frames_left > 0 {
+            self.frames_left -= 1;
+            return;
+        }
+        let covers = self.detail.is_none();
+        self.detail = covers.then(|| self.course.random_range(0.0..0.04));
+        // As often for a moment as for long.
+        let frames =
+            if covers { self.course.random_range(1.0f64..5.0).exp() } else { self.course.random_range(20.0..150.0) };
+        self.frames_left = frames as i32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_view_is_covered_now_and_then_and_free_at_first_and_mostly() {
+        let mut covered = 0u32;
+        for seed in 0..100 {
+            let mut cover = Cover::new(seed);
+            assert!((cover.detail() - 1.0).abs() < f64::EPSILON);
+            let details = (0..1000).map(|_| {
+                cover.advance();
+                cover.detail()
+            });
+            let details: Vec<f64> = details.collect();
+            assert!(details.iter().all(|detail| !(0.04..1.0).contains(detail)));
+            covered += details.iter().map(|&detail| u32::from(detail < 1.0)).sum::<u32>();
+        }
+        // Covered for (e^5 - e) / 4 = 36 frames at a time on average, free for 85.
+        let share = f64::from(covered) / 100_000.0;
+        assert!((0.25..0.35).contains(&share), "{share}");
+    }
+}
