@@ -25,7 +25,7 @@ enum Compute {
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`; with `-paper` behind one of the first three, by the
-    /// paper's recipe; with `-refined` behind one of the last two, what follows with `--from` its weights.
+    /// paper's recipe; `parfocal-refined`: what follows `parfocal`, with `--from` its weights.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]
