@@ -46,6 +46,8 @@ pub struct Spectrum {
     mean: f32,
     /// Its variance.
     variance: f32,
+    /// Energy in each band.
+    energy: [f32; BANDS],
 }
 
 /// Waves for the transform, times the Hann window along their axis.
@@ -98,7 +100,7 @@ fn band(ky: usize, kx: usize) -> usize {
 /// A patch's features, each of the order of 1.
 #[must_use]
 pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
-    let energy = band_energies(spectrum);
+    let energy = &spectrum.energy;
     let mut out = [0.0; FEATURES];
     for band in 0..BANDS {
         out[band] = 0.25 * ((energy[band] / TABLES.count[band] + ROUNDING).ln() - 9.0);
@@ -115,9 +117,8 @@ impl Spectrum {
     /// is, the sensor's noise and rounding have as much at all.
     #[must_use]
     pub fn shows_detail(&self) -> bool {
-        let energy = band_energies(self);
         let mean = |bands: Range<usize>| {
-            energy[bands.clone()].iter().sum::<f32>() / TABLES.count[bands].iter().sum::<f32>() + ROUNDING
+            self.energy[bands.clone()].iter().sum::<f32>() / TABLES.count[bands].iter().sum::<f32>() + ROUNDING
         };
         mean(0..BANDS / 3) > LEAST_FALL * mean(2 * BANDS / 3..BANDS)
     }
@@ -130,6 +131,7 @@ pub fn spectrum(patch: &Patch) -> Spectrum {
     let variance = column_sums(patch, |value| (value - mean).powi(2)).iter().sum::<f32>() / patch.0.len() as f32;
     let mut spectrum = transform(&patch.0, mean, &TABLES);
     spectrum.variance = variance;
+    spectrum.energy = band_energies(&spectrum);
     spectrum
 }
 
@@ -157,8 +159,8 @@ fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables)
             }
         }
     }
-    let mut out =
-        Spectrum { real: [[0.0; COLUMNS]; PATCH_SIDE], imaginary: [[0.0; COLUMNS]; PATCH_SIDE], mean, variance: 0.0 };
+    let blank = [[0.0; COLUMNS]; PATCH_SIDE];
+    let mut out = Spectrum { real: blank, imaginary: blank, mean, variance: 0.0, energy: [0.0; BANDS] };
     for ky in 0..PATCH_SIDE {
         let (re, im) = (&mut out.real[ky], &mut out.imaginary[ky]);
         for row in 0..PATCH_SIDE {

@@ -66,9 +66,15 @@ pub fn save(store: &nn::VarStore, made: &str) -> Result<Vec<u8>, WeightsError> {
 /// Shape and little-endian bytes of a float tensor.
 fn raw(tensor: &Tensor) -> (Vec<usize>, Vec<u8>) {
     let shape = tensor.size().iter().map(|&side| usize::try_from(side).unwrap_or(0)).collect();
+    (shape, floats(tensor).iter().flat_map(|value| value.to_le_bytes()).collect())
+}
+
+/// A float tensor's values, row by row, wherever it lies.
+#[must_use]
+pub fn floats(tensor: &Tensor) -> Vec<f32> {
     let mut values = vec![0.0f32; tensor.numel()];
     tensor.to_device(tch::Device::Cpu).contiguous().view([-1]).copy_data(&mut values, tensor.numel());
-    (shape, values.iter().flat_map(|value| value.to_le_bytes()).collect())
+    values
 }
 
 #[cfg(test)]

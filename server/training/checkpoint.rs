@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use tch::{Kind, Tensor, nn};
 
+use crate::autofocus::weights::floats;
+
 /// Why a checkpoint could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
@@ -47,9 +49,7 @@ impl Checkpoint {
 
     /// Adds a tensor's values; its shape is known to whoever takes it back.
     pub fn put_tensor(&mut self, name: &str, tensor: &Tensor) {
-        let mut values = vec![0.0f32; tensor.numel()];
-        tensor.detach().contiguous().view([-1]).copy_data(&mut values, tensor.numel());
-        self.put_floats(name, values);
+        self.put_floats(name, floats(tensor));
     }
 
     /// Adds all variables of `store` under `prefix`.

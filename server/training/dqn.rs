@@ -25,7 +25,7 @@ use super::values::Values;
 use super::variety::Variety;
 use crate::autofocus::learned::{Sight, action_step, best_action, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
-use crate::autofocus::weights::{self, WeightsError};
+use crate::autofocus::weights::{self, WeightsError, floats};
 
 /// A training in progress.
 pub struct DqnTrainer {
@@ -156,13 +156,6 @@ impl DqnTrainer {
             }
         }
     }
-}
-
-/// A tensor's values, row by row.
-fn floats(tensor: &Tensor) -> Vec<f32> {
-    let mut values = vec![0.0f32; tensor.numel()];
-    tensor.contiguous().view([-1]).copy_data(&mut values, tensor.numel());
-    values
 }
 
 impl Trainer for DqnTrainer {

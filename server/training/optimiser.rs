@@ -8,14 +8,14 @@ use super::checkpoint::{Checkpoint, CheckpointError};
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "name", deny_unknown_fields)]
 pub enum Rule {
-    /// `RMSProp` with momentum, `PyTorch`'s form: smoothing 0.99, epsilon 1e-8.
+    /// `RMSProp` with momentum, `PyTorch`'s form: smoothing 0.99, epsilon 1e-8, but under the root.
     RmsProp {
         /// Step size.
         learning_rate: f64,
         /// Momentum.
         momentum: f64,
     },
-    /// Adam (Kingma and Ba 2015) with betas 0.9 and 0.999, epsilon 1e-8.
+    /// Adam (Kingma and Ba 2015) with betas 0.9 and 0.999, epsilon 1e-8, but under the root.
     Adam {
         /// Step size.
         learning_rate: f64,
@@ -170,7 +170,7 @@ fn apply(
             let _ = squared.lerp_(&gradient.square(), 0.001);
             let _ = averaged.lerp_(gradient, 0.1);
             let (first, second) = (1.0 - 0.9f64.powi(steps), 1.0 - 0.999f64.powi(steps));
-            // The step is averaged / first / (sqrt(squared / second) + epsilon), its factors drawn together.
+            // The step is averaged / first / sqrt(squared / second + epsilon²), its factors drawn together.
             let rate = learning_rate * scale * second.sqrt() / first;
             let _ = variables.addcmul_(&(&*averaged * -rate), &inverse_root(squared, 1e-8 * second.sqrt()));
         }

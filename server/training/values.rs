@@ -11,6 +11,7 @@ use super::optimiser::{Flat, parts};
 use super::replay::Frames;
 use crate::autofocus::learned::{Sight, ValueNetwork};
 use crate::autofocus::networks::HISTORY;
+use crate::autofocus::weights::floats;
 use crate::imaging::PATCH_SIDE;
 
 const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
@@ -60,8 +61,8 @@ impl Values {
     pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: &Pass, slopes: Tensor) -> Tensor {
         let gradient = flat.values.empty_like();
         let parts = parts(&gradient, &flat.variables);
-        // By name, the encoder's variables come before the head's six.
-        let (encoder, head) = parts.split_at(parts.len() - 6);
+        // By name, the encoder's variables come before the head's, a bias and a weight a layer.
+        let (encoder, head) = parts.split_at(parts.len() - 2 * self.network.head.layers.len());
         let by_hidden = pass.back(&self.network.head, slopes, head);
         if encoder.is_empty() {
             return gradient;
@@ -71,9 +72,7 @@ impl Values {
         let by_histories = by_states.narrow(1, 0, HISTORY as i64 * width).reshape([-1, width]);
         let by_encodings = encodings.zeros_like().index_add_(0, &batch.history, &by_histories);
         if let Some(by_hand) = &self.by_hand {
-            let mut slopes = vec![0.0f32; by_encodings.numel()];
-            by_encodings.view([-1]).copy_data(&mut slopes, by_encodings.numel());
-            let found = by_hand.gradient(&batch.frames.patches, &slopes);
+            let found = by_hand.gradient(&batch.frames.patches, &floats(&by_encodings));
             gradient.narrow(0, 0, found.len() as i64).copy_(&Tensor::from_slice(&found));
         } else {
             // A loss whose gradient by the encodings is the one found.
