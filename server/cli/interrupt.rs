@@ -4,24 +4,46 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag that the first Ctrl-C raises, saying `notice`.
-///
-/// # Errors
-/// When the system has no thread or signal handler left.
-pub fn flag(notice: String) -> io::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
-        runtime.block_on(async {
-            if tokio::signal::ctrl_c().await.is_ok() {
-                eprintln!("{notice}; Ctrl-C again to leave at once");
-                flag.store(true, Ordering::Relaxed);
-                if tokio::signal::ctrl_c().await.is_ok() {
-                    std::process::exit(130);
+/// Status of a process that Ctrl-C ended, as shells have it: 128 and the signal's number.
+const INTERRUPTED: i32 = 130;
+
+/// Whether Ctrl-C was pressed, and whether anything is left to save then.
+#[derive(Debug, Clone, Default)]
+pub struct Interrupt {
+    asked: Arc<AtomicBool>,
+    saved: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    /// Begins to listen. The first Ctrl-C says `notice`.
+    ///
+    /// # Errors
+    /// When the system has no thread or signal handler left.
+    pub fn listen(notice: String) -> io::Result<Self> {
+        let interrupt = Self::default();
+        let heard = interrupt.clone();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
+            runtime.block_on(async {
+                while tokio::signal::ctrl_c().await.is_ok() {
+                    if heard.asked.swap(true, Ordering::Relaxed) || heard.saved.load(Ordering::Relaxed) {
+                        std::process::exit(INTERRUPTED);
+                    }
+                    eprintln!("{notice}; Ctrl-C again to leave at once");
                 }
-            }
-        });
-    })?;
-    Ok(stop)
+            });
+        })?;
+        Ok(interrupt)
+    }
+
+    /// Whether to stop.
+    #[must_use]
+    pub fn asked(&self) -> bool {
+        self.asked.load(Ordering::Relaxed)
+    }
+
+    /// From now on Ctrl-C ends the process at once: all there is to save is saved.
+    pub fn all_is_saved(&self) {
+        self.saved.store(true, Ordering::Relaxed);
+    }
 }

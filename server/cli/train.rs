@@ -1,12 +1,12 @@
 //! `parfocal train`: makes a learned policy from nothing, on this machine.
 
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{Failure, interrupt};
+use super::Failure;
+use super::interrupt::Interrupt;
 use crate::clock::SystemClock;
 use crate::training::recipe::{Recipe, names, shipped};
 use crate::training::run::{Beginning, LEG, Run};
@@ -80,10 +80,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "note: the checkpoint was made by parfocal {version}; what follows may differ from what it would have given"
         );
     }
-    let stop = interrupt::flag(format!("saving after at most {LEG} more updates"))?;
+    let interrupt = Interrupt::listen(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());
     let mut validation = run.best();
-    let whole = run.go(&SystemClock, &|| stop.load(Ordering::Relaxed), &mut |progress: &Progress| {
+    let whole = run.go(&SystemClock, &|| interrupt.asked(), &mut |progress: &Progress| {
         validation = progress.validation.unwrap_or(validation);
         let epsilon = progress.epsilon.map_or(String::new(), |epsilon| format!(", epsilon {epsilon:.2}"));
         bar.set_position(progress.updates);
@@ -94,7 +94,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         println!("stopped after {} of {total} updates; go on with --resume", run.updates());
         return Ok(());
     }
-    bar.set_message("running the best weights on the reference benchmark");
+    interrupt.all_is_saved();
+    if interrupt.asked() {
+        bar.finish_and_clear();
+        println!(
+            "trained and saved in {}; --resume adds the benchmark's figures to the model card",
+            arguments.out.display()
+        );
+        return Ok(());
+    }
+    bar.set_message("running the best weights on the reference benchmark; Ctrl-C leaves that out");
     run.report()?;
     bar.finish_and_clear();
     println!("best validation MAE {:.4}; weights and model card in {}", run.best(), arguments.out.display());

@@ -18,7 +18,7 @@ use tokio::sync::{Mutex, Notify, watch};
 
 pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
-pub use timeline::{SettingSpan, Timeline, TimelineComment, TimelinePoint};
+pub use timeline::{PauseSpan, SettingSpan, Timeline, TimelineComment, TimelinePoint};
 
 use crate::autofocus::Registry;
 use crate::clock::Clock;

@@ -16,6 +16,8 @@ use crate::trial::view::Said;
 pub struct Timeline {
     /// When each setting was inspected.
     pub settings: Vec<SettingSpan>,
+    /// When the session was held, with the lens where it stood.
+    pub pauses: Vec<PauseSpan>,
     /// The focal path.
     pub points: Vec<TimelinePoint>,
     /// What was said.
@@ -31,6 +33,17 @@ pub struct SettingSpan {
     pub from: f64,
     /// To, seconds; none while it lasts.
     pub to: Option<f64>,
+}
+
+/// When the session was held, by someone or by a restart of the server.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PauseSpan {
+    /// From, seconds. For a restart: when the server ended, as far as is known.
+    pub from: f64,
+    /// To, seconds; none while it lasts.
+    pub to: Option<f64>,
+    /// Why, in words.
+    pub reason: String,
 }
 
 /// A point of the focal path.
@@ -97,21 +110,24 @@ impl Conductor {
             frame: comment.frame,
             said: comment.said,
         });
+        let events: Vec<(f64, &EventKind)> =
+            events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
+        let points: Vec<TimelinePoint> = reader.focal_path(session, points).await?.into_iter().map(point).collect();
         Ok(Timeline {
-            settings: spans(&course, &events, start),
-            points: reader.focal_path(session, points).await?.into_iter().map(point).collect(),
+            settings: settings(&course, &events),
+            pauses: pauses(&events, &points),
+            points,
             comments: comments.collect(),
         })
     }
 }
 
-fn spans(course: &Course, events: &[(Timestamp, Event)], start: Timestamp) -> Vec<SettingSpan> {
+fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
     let mut spans: Vec<SettingSpan> = Vec::new();
-    for (at, event) in events {
-        let at = seconds(start, *at);
-        match event.kind {
+    for &(at, kind) in events {
+        match kind {
             EventKind::SegmentStarted { segment } => {
-                spans.push(SettingSpan { setting: course.setting(segment), from: at, to: None });
+                spans.push(SettingSpan { setting: course.setting(*segment), from: at, to: None });
             }
             EventKind::SegmentFinished { .. } | EventKind::Aborted { .. } => {
                 if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
@@ -124,6 +140,78 @@ fn spans(course: &Course, events: &[(Timestamp, Event)], start: Timestamp) -> Ve
     spans
 }
 
+/// A restart is noted when the server is back. When it had ended, the setting's clock and the last frame before tell, whichever
+/// is later.
+fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSpan> {
+    let mut spans: Vec<PauseSpan> = Vec::new();
+    // Whether a setting is being inspected; since when it went on last, and what had been inspected of it by then.
+    let (mut inspecting, mut since, mut before) = (false, 0.0, 0);
+    for &(at, kind) in events {
+        match kind {
+            EventKind::SegmentStarted { .. } => (inspecting, since, before) = (true, at, 0),
+            EventKind::SegmentFinished { .. } => inspecting = false,
+            EventKind::Paused { inspected_ms, .. } | EventKind::ServerRestarted { inspected_ms } => {
+                if spans.last().is_none_or(|span| span.to.is_some()) {
+                    let restarted = matches!(kind, EventKind::ServerRestarted { .. });
+                    let clock = since + milliseconds(inspected_ms.saturating_sub(before));
+                    let frame = points.iter().rev().map(|point| point.seconds).find(|&seconds| seconds < at);
+                    let ended = frame.map_or(clock, |frame| frame.max(clock)).min(at);
+                    let from = if restarted && inspecting { ended } else { at };
+                    spans.push(PauseSpan { from, to: None, reason: kind.in_words(|_| 0) });
+                }
+                before = *inspected_ms;
+            }
+            EventKind::Resumed | EventKind::Completed | EventKind::Aborted { .. } => {
+                if let Some(open) = spans.last_mut().filter(|span| span.to.is_none()) {
+                    open.to = Some(at);
+                }
+                since = at;
+            }
+            _ => {}
+        }
+    }
+    spans
+}
+
+#[allow(clippy::cast_precision_loss, reason = "segments last at most an hour")]
+fn milliseconds(count: u64) -> f64 {
+    count as f64 / 1000.0
+}
+
 fn seconds(from: Timestamp, to: Timestamp) -> f64 {
     to.duration_since(from).as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::SegmentId;
+
+    #[test]
+    fn a_restart_holds_from_where_the_clock_stood_and_a_pause_from_where_it_was_asked_for() {
+        let segment = SegmentId(uuid::Uuid::nil());
+        let paused = |inspected_ms| EventKind::Paused { reason: "phone".to_owned(), inspected_ms };
+        let restarted = |inspected_ms| EventKind::ServerRestarted { inspected_ms };
+        let events = [
+            (5.0, EventKind::SegmentStarted { segment }),
+            (15.0, paused(10_000)),
+            (20.0, EventKind::Resumed),
+            // Inspected for 4 s more, so until 24 s; back after 16 s; again before anyone went on.
+            (40.0, restarted(14_000)),
+            (50.0, restarted(14_000)),
+            (60.0, EventKind::Resumed),
+            (66.0, EventKind::SegmentFinished { segment, inspected_ms: 20_000 }),
+            // During the questions no clock runs.
+            (80.0, restarted(20_000)),
+        ];
+        let events: Vec<(f64, &EventKind)> = events.iter().map(|(at, kind)| (*at, kind)).collect();
+        let at = |seconds| TimelinePoint { setting: 1, seconds, frame: 1, asked: 0.5, measured: None, optimal: None };
+        let spans = |points: &[TimelinePoint]| -> Vec<(f64, Option<f64>)> {
+            pauses(&events, points).iter().map(|span| (span.from, span.to)).collect()
+        };
+        assert_eq!(spans(&[]), [(15.0, Some(20.0)), (24.0, Some(60.0)), (80.0, None)]);
+        // The clock is kept once a second; a frame shown after that tells more.
+        assert_eq!(spans(&[at(5.0), at(24.7), at(40.1)])[1], (24.7, Some(60.0)));
+        assert_eq!(pauses(&events, &[])[0].reason, "Paused: phone");
+    }
 }

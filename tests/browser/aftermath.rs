@@ -27,6 +27,9 @@ pub async fn researcher(theatre: &Theatre<'_>) -> String {
     page.click("#comment-list li:first-child button").await;
     page.sees("#timeline figcaption", "Follows me well 🧠").await;
     shoot(page, "researcher-2-blinded").await;
+    let held = "return [...document.querySelectorAll('.timeline .pause title')].map((title) => title.textContent)";
+    let held = page.run(held, json!([])).await.to_string();
+    assert!(held.contains("The server restarted"), "the timeline shows when the lens was held: {held}");
     page.click("#unblind").await;
     page.type_into("#reason", "Analysis begins").await;
     shoot(page, "researcher-3-unblinding").await;

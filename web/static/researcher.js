@@ -43,8 +43,14 @@ function choose(index) {
 }
 
 function draw() {
+  showKey();
   point = drawTimeline(byId("timeline"), timeline, { withPath, policies, choose });
   if (chosen !== null) point(chosen);
+}
+
+function showKey() {
+  const shown = { path: withPath, optimum: withPath && timeline.points.some(({ optimal }) => optimal !== null), pause: timeline.pauses.length > 0 };
+  for (const entry of byId("timeline-key").children) entry.hidden = !shown[entry.className];
 }
 
 function unblind() {

@@ -1,4 +1,4 @@
-// A session's timeline as SVG: segments shaded, focal power over time, a marker for each comment.
+// A session's timeline as SVG: segments shaded, pauses hatched, focal power over time, a marker for each comment.
 
 const SVG = "http://www.w3.org/2000/svg";
 const HEIGHT = 260;
@@ -15,7 +15,7 @@ export function drawTimeline(figure, timeline, { withPath, policies, choose }) {
   const y = (power) => HEIGHT - EDGE.bottom - power * (HEIGHT - EDGE.top - EDGE.bottom);
   const points = withPath ? timeline.points : [];
   const svg = shape("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, role: "img", "aria-label": description(timeline, withPath) });
-  svg.append(...settings(timeline.settings, policies, total, x, y), ...axes(total, width, x, y, withPath));
+  svg.append(...settings(timeline.settings, policies, total, x, y), ...pauses(timeline.pauses, total, x, y), ...axes(total, width, x, y, withPath));
   svg.append(shape("path", { class: "optimum", d: trace(points, (point) => point.optimal, x, y) }));
   svg.append(shape("path", { class: "path", d: trace(points, powerOf, x, y) }));
   const heights = timeline.comments.map((comment) => y(powerAt(points, comment.seconds)));
@@ -27,8 +27,8 @@ export function drawTimeline(figure, timeline, { withPath, policies, choose }) {
 }
 
 /** Seconds from the start to the last thing that happened. */
-function length({ settings, points, comments }) {
-  const ends = [...settings.map(({ from, to }) => to ?? from), ...comments.map(({ seconds }) => seconds)];
+function length({ settings, pauses, points, comments }) {
+  const ends = [...[...settings, ...pauses].map(({ from, to }) => to ?? from), ...comments.map(({ seconds }) => seconds)];
   return Math.max(1, points.at(-1)?.seconds ?? 0, ...ends);
 }
 
@@ -52,6 +52,19 @@ function settings(list, policies, total, x, y) {
   });
 }
 
+/** Hatched: the lens stood where it was, whatever was to drive it. */
+function pauses(list, total, x, y) {
+  if (list.length === 0) return [];
+  const hatch = shape("pattern", { id: "hatch", width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" });
+  hatch.append(shape("rect", { width: 2, height: 8 }));
+  const boxes = list.map(({ from, to, reason }) => {
+    const box = shape("rect", { class: "pause", x: x(from), y: y(1), width: Math.max(x(to ?? total) - x(from), 2), height: y(0) - y(1) });
+    box.append(shape("title", {}, reason));
+    return box;
+  });
+  return [hatch, ...boxes];
+}
+
 function axes(total, width, x, y, withPower) {
   const parts = [shape("line", { class: "axis", x1: EDGE.left, x2: width - EDGE.right, y1: y(0), y2: y(0) })];
   if (withPower) {
@@ -66,15 +79,15 @@ function axes(total, width, x, y, withPower) {
   return parts;
 }
 
-/** A line through `value` of each point, broken between settings and where there is none. */
+/** A line through `value` of each point, broken between settings, where there is none, and where frames were counted anew. */
 function trace(points, value, x, y) {
   let before = null;
   return points
     .map((point) => {
       if (value(point) === null) return (before = null), "";
-      const command = `${point.setting === before ? "L" : "M"}${x(point.seconds).toFixed(1)} ${y(value(point)).toFixed(1)}`;
-      before = point.setting;
-      return command;
+      const goesOn = before?.setting === point.setting && before.frame < point.frame;
+      before = point;
+      return `${goesOn ? "L" : "M"}${x(point.seconds).toFixed(1)} ${y(value(point)).toFixed(1)}`;
     })
     .join("");
 }
@@ -104,6 +117,7 @@ function point(figure, caption, markers, comment, index, cx, cy) {
   caption.style.top = `${cy > HEIGHT / 2 ? cy - caption.offsetHeight - 14 : cy + 14}px`;
 }
 
-function description({ settings, comments }, withPath) {
-  return `${withPath ? "Focal power over time" : "Time line"}: ${settings.length} settings, ${comments.length} comments, which follow as a list.`;
+function description({ settings, pauses, comments }, withPath) {
+  const held = pauses.length > 0 ? ` ${pauses.length} ${pauses.length > 1 ? "pauses" : "pause"},` : "";
+  return `${withPath ? "Focal power over time" : "Time line"}: ${settings.length} settings,${held} ${comments.length} comments, which follow as a list.`;
 }

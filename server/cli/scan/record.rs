@@ -3,7 +3,6 @@
 use std::io::BufRead;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -13,7 +12,8 @@ use super::{Failure, bar, print};
 use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::{FORMAT, Header, Order, Recording, VERSION};
 use crate::camera::{self, CameraSettings};
-use crate::cli::{calibration, interrupt};
+use crate::cli::calibration;
+use crate::cli::interrupt::Interrupt;
 use crate::clock::SystemClock;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens;
@@ -59,24 +59,24 @@ pub struct Arguments {
 /// # Errors
 /// When something fails; the poses before it are kept.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let stop = interrupt::flag("stopping after this pose".to_owned())?;
+    let interrupt = Interrupt::listen("stopping after this pose".to_owned())?;
     let progress = bar(arguments.poses, 0);
     let (mut bench, header) = match &arguments.lens {
         None if arguments.camera == "phantom" => phantom(arguments),
         None => {
             Err(format!("say with --lens which lens goes to each focal power before `{}`", arguments.camera).into())
         }
-        Some(lens) => devices(arguments, lens, &stop, &progress),
+        Some(lens) => devices(arguments, lens, &interrupt, &progress),
     }?;
     let mut recording = Recording::open(&arguments.out, &header)?;
     progress.set_position(recording.folder().poses().len() as u64);
     progress.reset_eta();
-    let outcome = record(&mut recording, bench.as_mut(), &|| stop.load(Ordering::Relaxed), &|| progress.inc(1));
+    let outcome = record(&mut recording, bench.as_mut(), &|| interrupt.asked(), &|| progress.inc(1));
     progress.finish_and_clear();
     let (done, out) = (recording.folder().poses().len(), arguments.out.display());
     match outcome {
         Ok(()) => print(&format!("{done} poses in {out}; look at them with `parfocal scan info {out}`\n")),
-        Err(_) if stop.load(Ordering::Relaxed) => print(&format!(
+        Err(_) if interrupt.asked() => print(&format!(
             "stopped: {done} of {} poses are kept in {out}; run the same command again to go on\n",
             arguments.poses
         )),
@@ -97,7 +97,7 @@ fn phantom(arguments: &Arguments) -> Result<(Box<dyn Bench>, Header), Failure> {
 fn devices(
     arguments: &Arguments,
     lens: &str,
-    stop: &Arc<AtomicBool>,
+    interrupt: &Interrupt,
     progress: &ProgressBar,
 ) -> Result<(Box<dyn Bench>, Header), Failure> {
     let calibration = arguments.calibration.as_deref().map(calibration::read).transpose()?;
@@ -115,7 +115,7 @@ fn devices(
     }
     let stepper = match &arguments.stepper {
         Some(command) => Stepper::Command(command.clone()),
-        None => Stepper::Asked(Box::new(asker(arguments.poses, Arc::clone(stop), progress.clone()))),
+        None => Stepper::Asked(Box::new(asker(arguments.poses, interrupt.clone(), progress.clone()))),
     };
     let (health, simulated) = (camera.health(), camera.health().simulated || lens.health().simulated);
     let mut header = header(arguments, &health.name, Some(lens.health().name.to_string()), simulated);
@@ -143,7 +143,7 @@ fn header(arguments: &Arguments, camera: &str, lens: Option<String>, simulated: 
 /// Asks on the terminal for each pose and waits for Enter.
 fn asker(
     poses: usize,
-    stop: Arc<AtomicBool>,
+    interrupt: Interrupt,
     progress: ProgressBar,
 ) -> impl FnMut(usize) -> Result<(), StepperError> + Send {
     let (sender, lines) = channel();
@@ -161,7 +161,7 @@ fn asker(
             match lines.recv_timeout(Duration::from_millis(100)) {
                 Ok(_) => return Ok(()),
                 Err(RecvTimeoutError::Disconnected) => return Err(StepperError::Unattended(pose)),
-                Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
+                Err(RecvTimeoutError::Timeout) if interrupt.asked() => {
                     return Err(StepperError::Stopped(pose));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
