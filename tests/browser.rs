@@ -26,6 +26,8 @@ mod full_disk;
 mod killed;
 #[path = "browser/lens_troubles.rs"]
 mod lens_troubles;
+#[path = "browser/outbox.rs"]
+mod outbox;
 #[path = "browser/proxy.rs"]
 mod proxy;
 #[path = "browser/screenshots.rs"]

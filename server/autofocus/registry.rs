@@ -1,9 +1,11 @@
 //! The registry: every policy by its name, the same everywhere.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use super::{Fixed, HillClimber, Policy, mgm, mlr, shipped};
 
@@ -39,6 +41,9 @@ pub struct PolicyEntry {
     pub name: PolicyName,
     /// What it does, in one sentence.
     pub summary: &'static str,
+    /// SHA-256 of its weights, in hexadecimal, if it was learned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
     /// Whether it can run now; a learned policy cannot without its weights.
     pub available: bool,
     /// Why it cannot run and what to do, if it cannot.
@@ -76,6 +81,7 @@ pub struct Registry {
 struct Registered {
     name: PolicyName,
     summary: &'static str,
+    weights: Option<String>,
     source: Source,
 }
 
@@ -118,12 +124,27 @@ impl Registry {
     }
 
     fn put(mut self, name: &str, summary: &'static str, source: Source) -> Self {
-        let new = Registered { name: PolicyName::new(name), summary, source };
+        let new = Registered { name: PolicyName::new(name), summary, weights: None, source };
         match self.policies.iter_mut().find(|old| old.name == new.name) {
             Some(old) => *old = new,
             None => self.policies.push(new),
         }
         self
+    }
+
+    /// This registry with `bytes` noted as the weights of policy `name`.
+    #[must_use]
+    pub fn weighing(mut self, name: &str, bytes: &[u8]) -> Self {
+        if let Some(policy) = self.policies.iter_mut().find(|policy| policy.name.as_str() == name) {
+            policy.weights = Some(hex::encode(Sha256::digest(bytes)));
+        }
+        self
+    }
+
+    /// The SHA-256 of each learned policy's weights.
+    #[must_use]
+    pub fn weights(&self) -> BTreeMap<PolicyName, String> {
+        self.policies.iter().filter_map(|policy| Some((policy.name.clone(), policy.weights.clone()?))).collect()
     }
 
     /// Every policy, in the contract's order.
@@ -134,7 +155,13 @@ impl Registry {
                 Source::Constructor(_) => None,
                 Source::Missing(reason) => Some(reason.to_string()),
             };
-            PolicyEntry { name: policy.name.clone(), summary: policy.summary, available: reason.is_none(), reason }
+            PolicyEntry {
+                name: policy.name.clone(),
+                summary: policy.summary,
+                weights: policy.weights.clone(),
+                available: reason.is_none(),
+                reason,
+            }
         };
         self.policies.iter().map(entry).collect()
     }

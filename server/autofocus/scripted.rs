@@ -6,7 +6,7 @@
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "small numbers in single precision")]
 
 use std::collections::VecDeque;
-use std::fs::File;
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -28,15 +28,17 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     const SUMMARY: &str = "action values from a TorchScript file";
     let Some(path) = name.as_str().strip_prefix(PREFIX) else { return registry };
     match load(Path::new(path)) {
-        Ok(module) => registry.with(name.as_str(), SUMMARY, move || Box::new(Scripted::new(Arc::clone(&module)))),
+        Ok((module, bytes)) => registry
+            .with(name.as_str(), SUMMARY, move || Box::new(Scripted::new(Arc::clone(&module))))
+            .weighing(name.as_str(), &bytes),
         Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
     }
 }
 
-/// Reads the module and tries it once.
-fn load(path: &Path) -> Result<Arc<CModule>, String> {
-    let mut file = File::open(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    let module = CModule::load_data(&mut file)
+/// Reads the module, with the file's bytes, and tries it once.
+fn load(path: &Path) -> Result<(Arc<CModule>, Vec<u8>), String> {
+    let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let module = CModule::load_data(&mut bytes.as_slice())
         .map_err(|error| format!("{} is not TorchScript: {}", path.display(), first_line(&error.to_string())))?;
     let (patches, focal_powers) = (vec![128.0; HISTORY * PATCH_SIDE * PATCH_SIDE], vec![0.5; HISTORY]);
     values(&module, &patches, &focal_powers).map_err(|reason| {
@@ -44,7 +46,7 @@ fn load(path: &Path) -> Result<Arc<CModule>, String> {
             format!("forward(patches [{HISTORY}, {SIDE}, {SIDE}], focal_powers [{HISTORY}]) -> values [{ACTIONS}]");
         format!("{} is not a policy: {reason}; it must have {signature}, all float32", path.display())
     })?;
-    Ok(Arc::new(module))
+    Ok((Arc::new(module), bytes))
 }
 
 /// The three action values; what the module is given is flat, oldest frame first.

@@ -118,7 +118,9 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
 /// `registry` with a policy of weights that were found sound a moment ago; should libtorch fail all the same, the lens stays
 /// where it is.
 fn put(registry: Registry, name: &str, summary: &'static str, design: Design, bytes: Arc<[u8]>) -> Registry {
-    registry.with(name, summary, move || build(design, &bytes).unwrap_or_else(|_| Box::new(Fixed::default())))
+    let weights = Arc::clone(&bytes);
+    let make = move || build(design, &bytes).unwrap_or_else(|_| Box::<Fixed>::default() as Box<dyn Policy>);
+    registry.with(name, summary, make).weighing(name, &weights)
 }
 
 /// A policy of `design` with the weights in `bytes` (safetensors).

@@ -95,10 +95,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let address = listener.local_addr()?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let calibration = calibration::read_or_default(arguments.calibration.as_deref())?;
-    let store = open_store(arguments, &calibration, clock.as_ref()).await?;
+    let registry = registry(arguments)?;
+    let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
     let keys = Keys::load_or_create(&arguments.data_dir)?;
     let mut random = random(arguments)?;
-    let registry = registry(arguments)?;
     let library = protocols(arguments, &registry)?;
     let reconstructor = Reconstructor::new(&calibration);
     let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), random.random())?;
@@ -165,13 +165,19 @@ fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
     Ok(registry)
 }
 
-async fn open_store(arguments: &Arguments, calibration: &Calibration, clock: &dyn Clock) -> Result<Store, Failure> {
+async fn open_store(
+    arguments: &Arguments,
+    calibration: &Calibration,
+    registry: &Registry,
+    clock: &dyn Clock,
+) -> Result<Store, Failure> {
     let run = store::Run {
         wall: clock.wall(),
         at: clock.now(),
         camera: arguments.camera.clone(),
         lens: arguments.lens.clone(),
         calibration: calibration.title(),
+        weights: registry.weights(),
         seed: arguments.seed,
     };
     Ok(Store::open(&arguments.data_dir, &run).await?)

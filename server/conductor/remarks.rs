@@ -20,7 +20,9 @@ impl Shared {
             session: new.session,
             segment,
             frame: new.frame,
+            frame_run: new.run.filter(|run| (1..=self.store.run()).contains(run)),
             client_millis: new.client_millis,
+            waited_ms: new.waited_millis.filter(|waited| *waited >= 0),
             stamp: self.stamp(),
             said: new.said,
         };

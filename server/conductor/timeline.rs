@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use super::course::Course;
 use super::{ConductError, Conductor};
 use crate::ids::SessionId;
-use crate::store::PathPoint;
+use crate::store::{Comment, PathPoint};
 use crate::trial::event::{Event, EventKind};
 use crate::trial::view::Said;
 
@@ -66,10 +66,10 @@ pub struct TimelinePoint {
 /// A comment on the timeline.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TimelineComment {
-    /// When, by the server's wall clock.
+    /// When it was kept, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
-    /// Seconds.
+    /// When it was said, seconds: what it waited on the surgeon's device is taken off.
     pub seconds: f64,
     /// Setting, from 1.
     pub setting: Option<usize>,
@@ -105,7 +105,7 @@ impl Conductor {
         let comments = reader.comments(session).await?;
         let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
             at: comment.stamp.wall,
-            seconds: seconds(start, runs.wall(run, comment.stamp.at)),
+            seconds: (seconds(start, runs.wall(run, comment.stamp.at)) - waited(&comment)).max(0.0),
             setting: comment.segment.map(|segment| course.setting(segment)),
             frame: comment.frame,
             said: comment.said,
@@ -176,6 +176,11 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
 #[allow(clippy::cast_precision_loss, reason = "segments last at most an hour")]
 fn milliseconds(count: u64) -> f64 {
     count as f64 / 1000.0
+}
+
+#[allow(clippy::cast_precision_loss, reason = "milliseconds of a session")]
+fn waited(comment: &Comment) -> f64 {
+    comment.waited_ms.unwrap_or(0) as f64 / 1000.0
 }
 
 fn seconds(from: Timestamp, to: Timestamp) -> f64 {

@@ -1,7 +1,8 @@
 //! `/live`: the WebSocket that carries pictures and state to one page.
 //!
 //! Binary messages are frames: a header's length (u16, little-endian), the header (JSON), the JPEG. Text messages are
-//! JSON with a `type`: `session` when the session changes, `status` when the devices' state does. The page answers each
+//! JSON with a `type`: `session` when the session changes, `status` when the devices' state does, `beat` now and then, so that a
+//! page can tell a link that broke without a word from one with nothing to say. The page answers each
 //! frame that it has drawn, and only then gets the next, which is by then the latest: so no queue forms anywhere, however
 //! slow the link. A page that says it is hidden gets no frames.
 
@@ -76,6 +77,7 @@ enum Said {
 enum Told<S, T> {
     Session { view: Option<S> },
     Status(T),
+    Beat,
 }
 
 /// Pictures and state, as they come (WebSocket).
@@ -125,6 +127,8 @@ struct Desk<A: Audience> {
     heartbeat: tokio::time::Interval,
     /// Heartbeats since the page was last heard.
     silent: u32,
+    /// What goes out next, whatever else there is.
+    next: Option<Message>,
 }
 
 impl<A: Audience> Desk<A> {
@@ -144,12 +148,16 @@ impl<A: Audience> Desk<A> {
             shutdown: app.shutdown.clone(),
             heartbeat,
             silent: 0,
+            next: None,
             app,
         }
     }
 
     /// The next message for the page; `Ok(None)` never comes before one is due.
     async fn next_message(&mut self, socket: &mut WebSocket) -> Result<Option<Message>, Left> {
+        if let Some(message) = self.next.take() {
+            return Ok(Some(message));
+        }
         loop {
             let message = tokio::select! {
                 () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
@@ -221,7 +229,12 @@ impl<A: Audience> Desk<A> {
 
     fn beat(&mut self) -> Result<Option<Message>, Left> {
         self.silent += 1;
-        if self.silent > 2 { Err(Left) } else { Ok(Some(Message::Ping(Bytes::new()))) }
+        if self.silent > 2 {
+            return Err(Left);
+        }
+        // Browsers answer pings by themselves and tell the page nothing of them.
+        self.next = tell(&Told::<&A::Session, &A::Status>::Beat);
+        Ok(Some(Message::Ping(Bytes::new())))
     }
 }
 

@@ -55,7 +55,7 @@ impl Audience for ForOperator {
     type Status = ControlStatus;
 
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
-        OperatorFrame::new(SurgeonFrame::new(&frame.picture, age_ms), &frame.insight, app.blinded())
+        OperatorFrame::new(SurgeonFrame::new(&frame.picture, age_ms, app), &frame.insight, app.blinded())
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<OperatorView>>> {

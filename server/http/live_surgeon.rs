@@ -22,7 +22,9 @@ pub(super) struct ForSurgeon;
 pub(super) struct SurgeonFrame {
     /// Frame's number.
     frame: u64,
-    /// Milliseconds from the end of the exposure to sending.
+    /// The server's run that counted it.
+    run: i64,
+    /// Milliseconds from the end of the exposure to sending; for a surgeon in steps of ten.
     age: f64,
     /// Width in pixels.
     width: usize,
@@ -47,9 +49,10 @@ pub(super) struct Circle {
 
 impl SurgeonFrame {
     /// What goes with `picture`, which is `age` milliseconds old.
-    pub(super) fn new(picture: &Picture, age: f64) -> Self {
+    pub(super) fn new(picture: &Picture, age: f64, app: &App) -> Self {
         Self {
             frame: picture.number,
+            run: app.store.run(),
             age,
             width: picture.width,
             height: picture.height,
@@ -89,8 +92,9 @@ impl Audience for ForSurgeon {
     type Session = SurgeonView;
     type Status = SurgeonStatus;
 
-    fn header(frame: &EncodedFrame, age_ms: f64, _: &App) -> SurgeonFrame {
-        SurgeonFrame::new(&frame.picture, age_ms)
+    fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> SurgeonFrame {
+        // The age holds the policy's own time, some hundredths of a millisecond; in steps of ten it does not show.
+        SurgeonFrame::new(&frame.picture, (age_ms / 10.0).round() * 10.0, app)
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<SurgeonView>>> {

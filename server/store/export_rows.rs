@@ -14,7 +14,8 @@ impl Reader {
         let rows = sqlx::query(
             "SELECT run, wall, monotonic_ns, version, camera, lens, calibration FROM runs WHERE run IN (
                  SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
-                 UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1)
+                 UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
+                 UNION SELECT frame_run FROM comments WHERE session = ?1)
              ORDER BY run",
         )
         .bind(session.to_string())
@@ -57,6 +58,19 @@ impl Reader {
              FROM segments AS g JOIN telemetry AS t ON t.segment = g.number LEFT JOIN policies AS p ON p.number = t.policy
              WHERE g.session = ? ORDER BY g.setting, t.number";
         self.hand_out(session, sql, policy_row, take).await
+    }
+
+    /// Hands the weights of the learned policies of `session` to `take`, run by run.
+    pub(super) async fn export_weights<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        take: impl FnMut(Vec<Value>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT r.run, w.key AS policy, w.value AS sha256 FROM runs AS r, json_each(r.weights) AS w
+             WHERE r.run IN (SELECT run FROM events WHERE session = ?1)
+                 AND w.key IN (SELECT policy FROM segments WHERE session = ?1) ORDER BY r.run, w.key";
+        let row = |row: &SqliteRow| Ok(vec![integer(row, "run")?, string(row, "policy")?, string(row, "sha256")?]);
+        self.hand_out(session, sql, row, take).await
     }
 
     /// Hands the rows of `sql`, whose one parameter is `session`, to `take`, each as `read` reads it.

@@ -14,6 +14,7 @@ mod sessions;
 mod sets;
 pub mod telemetry;
 
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -27,6 +28,7 @@ use sqlx::pool::PoolConnection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 use tokio::sync::{Mutex, MutexGuard};
 
+use crate::autofocus::PolicyName;
 use crate::clock::Moment;
 
 pub use error::StoreError;
@@ -57,6 +59,8 @@ pub struct Run {
     pub lens: String,
     /// The sensor's calibration, by its title.
     pub calibration: String,
+    /// SHA-256 of each learned policy's weights, by its name.
+    pub weights: BTreeMap<PolicyName, String>,
     /// The seed given on the command line.
     pub seed: Option<u64>,
 }
@@ -209,8 +213,10 @@ fn drop_if_failed<T>(mut connection: PoolConnection<Sqlite>, outcome: &Result<T,
 }
 
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
+    let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let done = sqlx::query(
-        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, seed) VALUES (?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, weights, seed)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(run.wall.to_string())
     .bind(nanoseconds(run.at))
@@ -218,6 +224,7 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     .bind(&run.camera)
     .bind(&run.lens)
     .bind(&run.calibration)
+    .bind(weights)
     .bind(run.seed.map(u64::cast_signed))
     .execute(trial)
     .await?;

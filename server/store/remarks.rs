@@ -31,8 +31,9 @@ impl Store {
         let _turn = self.turn().await;
         let (kind, text) = said_columns(&comment.said);
         let done = sqlx::query(
-            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, client_millis, frame, kind, text)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
+            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, client_millis, waited_ms, frame, frame_run,
+                 kind, text)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
         )
         .bind(comment.key.to_string())
         .bind(comment.session.to_string())
@@ -41,7 +42,9 @@ impl Store {
         .bind(comment.stamp.wall.to_string())
         .bind(nanoseconds(comment.stamp.at))
         .bind(comment.client_millis)
+        .bind(comment.waited_ms)
         .bind(comment.frame.map(u64::cast_signed))
+        .bind(comment.frame_run)
         .bind(kind)
         .bind(text)
         .execute(&self.inner.trial)
@@ -134,7 +137,9 @@ fn comment(row: &SqliteRow) -> Result<Comment, StoreError> {
         session: parsed(row, "session")?,
         segment: segment(row)?,
         frame: frame.map(i64::cast_unsigned),
+        frame_run: row.try_get("frame_run")?,
         client_millis: row.try_get("client_millis")?,
+        waited_ms: row.try_get("waited_ms")?,
         stamp: stamp(row)?,
         said: said(row)?,
     })

@@ -30,8 +30,12 @@ pub struct Comment {
     pub segment: Option<SegmentId>,
     /// Number of the frame on screen.
     pub frame: Option<u64>,
+    /// The run that counted it.
+    pub frame_run: Option<i64>,
     /// The browser's clock, milliseconds since 1970.
     pub client_millis: Option<i64>,
+    /// Milliseconds that it waited on the surgeon's device before it was sent.
+    pub waited_ms: Option<i64>,
     /// When it was kept.
     pub stamp: Stamp,
     /// What was said.

@@ -122,8 +122,14 @@ pub struct NewComment {
     pub segment: Option<SegmentId>,
     /// Number of the frame that was on screen.
     pub frame: Option<u64>,
+    /// The run that counted it, as its header told.
+    #[serde(default)]
+    pub run: Option<i64>,
     /// Milliseconds since 1970 by the browser's clock.
     pub client_millis: Option<i64>,
+    /// Milliseconds that it waited on the surgeon's device before it was sent this time.
+    #[serde(default)]
+    pub waited_millis: Option<i64>,
     /// What was said.
     #[serde(flatten)]
     pub said: Said,

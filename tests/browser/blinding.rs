@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 41] = [
+const KEYS: [&str; 42] = [
     "age",
     "answers",
     "area",
@@ -57,6 +57,7 @@ const KEYS: [&str; 41] = [
     "questions",
     "quick_comments",
     "radius",
+    "run",
     "remaining_seconds",
     "segment",
     "session",

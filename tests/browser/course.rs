@@ -19,6 +19,7 @@ async fn practice_a_time_limit_an_emergency_and_an_abort() {
     let theatre = Theatre::open(&driver).await;
     the_belief_of_a_policy_that_has_one(&theatre).await;
     practice(&theatre).await;
+    a_link_that_breaks_without_a_word(&theatre).await;
     time_limit(&theatre).await;
     let researcher = emergency_unblinding(&theatre).await;
     abort(&theatre).await;
@@ -28,7 +29,7 @@ async fn practice_a_time_limit_an_emergency_and_an_abort() {
         assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
     }
     let seen = blinding::check(&theatre.proxy.recorded());
-    assert_eq!(seen.segments.len(), 4);
+    assert_eq!(seen.segments.len(), 5);
     assert!(seen.texts > 40 && seen.pictures > 40, "{} texts, {} pictures", seen.texts, seen.pictures);
 }
 
@@ -69,13 +70,25 @@ async fn practice(theatre: &Theatre<'_>) {
     surgeon.sees("#panel", "No trial is under way").await;
 }
 
-/// Nobody ends the setting: its five seconds do.
+/// The page finds out by itself, and follows what happened meanwhile.
+async fn a_link_that_breaks_without_a_word(theatre: &Theatre<'_>) {
+    theatre.proxy.break_silently();
+    theatre.begin("S-05", "practice").await;
+    theatre.surgeon.sees("#change-what", "This is the first setting.").await;
+    theatre.operator.click("#session-actions .danger").await;
+    theatre.give_reason("Only to see").await;
+    theatre.surgeon.sees("#panel h2", "The session was ended").await;
+    theatre.operator.click("#session-actions .primary").await;
+    theatre.surgeon.sees("#panel", "No trial is under way").await;
+}
+
+/// Nobody ends the setting: its ten seconds do.
 async fn time_limit(theatre: &Theatre<'_>) {
     theatre.begin("S-04", "limited").await;
     theatre.tap_notice(1).await;
     theatre.write("Cut off in the mid").await;
     theatre.surgeon.sees("#panel h2", "Setting 1: a few questions").await;
-    theatre.operator.sees("#log", "Setting 1 finished after 5.0 s · system").await;
+    theatre.operator.sees("#log", "Setting 1 finished after 10.0 s · system").await;
     assert_eq!(theatre.comment_box().await, "Cut off in the mid");
     theatre.say("dle", 1).await;
     theatre.answer_questions(3).await;
@@ -111,7 +124,9 @@ async fn emergency_unblinding(theatre: &Theatre<'_>) -> String {
 
 /// What stands on the surgeon's page, seen or not.
 async fn shown(theatre: &Theatre<'_>) -> Value {
-    let text = "return document.body.textContent.replace(/\\s+/g, ' ')";
+    // But for what the stream is doing, which hangs on the moment.
+    let text = "const page = document.body.cloneNode(true); page.querySelector('.viewer-stale').remove();
+                return page.textContent.replace(/\\s+/g, ' ')";
     theatre.surgeon.run(text, json!([])).await
 }
 
@@ -149,7 +164,10 @@ async fn database(theatre: &Theatre<'_>) {
                FROM sessions AS s ORDER BY rowid";
     let sessions = sqlx::query(sql).fetch_all(&pool).await.unwrap();
     let sessions: Vec<(String, bool, i64)> = sessions.iter().map(|row| (row.get(0), row.get(1), row.get(2))).collect();
-    assert_eq!(sessions, [("practice".to_owned(), true, 1), ("limited".to_owned(), false, 2)]);
+    assert_eq!(
+        sessions,
+        [("practice".to_owned(), true, 1), ("practice".to_owned(), true, 0), ("limited".to_owned(), false, 2),]
+    );
     let sql =
         "SELECT kind, role, payload FROM events NATURAL JOIN (SELECT session FROM sessions WHERE protocol = 'limited')
                WHERE kind IN ('segment-finished', 'unblinded', 'aborted') ORDER BY number";
@@ -160,7 +178,7 @@ async fn database(theatre: &Theatre<'_>) {
         .collect();
     let kinds: Vec<_> = events.iter().map(|(kind, role, _)| (kind.as_str(), role.as_str())).collect();
     assert_eq!(kinds, [("segment-finished", "system"), ("unblinded", "researcher"), ("aborted", "operator")]);
-    assert_eq!(events[0].2["inspected_ms"], 5000);
+    assert_eq!(events[0].2["inspected_ms"], 10_000);
     assert_eq!((&events[1].2["reason"], &events[1].2["emergency"]), (&json!(EMERGENCY), &json!(true)));
     assert_eq!(events[2].2["reason"], "The participant was called away");
     let about =

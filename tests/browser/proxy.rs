@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
 
 /// One connection's bytes.
 #[derive(Debug, Clone, Default)]
@@ -22,6 +23,8 @@ pub struct Proxy {
     /// Where the browser finds it.
     pub address: SocketAddr,
     recordings: Arc<Mutex<Vec<Recording>>>,
+    /// Connections from before the number was raised pass nothing on.
+    broken: watch::Sender<u64>,
 }
 
 impl Proxy {
@@ -31,14 +34,29 @@ impl Proxy {
         let address = listener.local_addr().unwrap();
         let recordings = Arc::<Mutex<Vec<Recording>>>::default();
         let all = Arc::clone(&recordings);
+        let (broken, breaks) = watch::channel(0);
         tokio::spawn(async move {
             while let Ok((browser, _)) = listener.accept().await {
                 let recording = Recording::default();
                 all.lock().unwrap().push(Arc::clone(&recording));
-                tokio::spawn(pass(browser, server, recording));
+                let mut breaks = breaks.clone();
+                breaks.mark_unchanged();
+                tokio::spawn(async move {
+                    let mut link = std::pin::pin!(pass(browser, server, recording));
+                    tokio::select! {
+                        () = &mut link => {}
+                        // Neither end is told, and neither hears anything more.
+                        _ = breaks.changed() => std::future::pending().await,
+                    }
+                });
             }
         });
-        Self { address, recordings }
+        Self { address, recordings, broken }
+    }
+
+    /// Breaks every connection there is, as walking out of the network's reach does: without a word.
+    pub fn break_silently(&self) {
+        self.broken.send_modify(|count| *count += 1);
     }
 
     /// Everything so far, a connection each.

@@ -39,6 +39,7 @@ pub fn a_run(clock: &ManualClock) -> Run {
         camera: "phantom".into(),
         lens: "simulated".into(),
         calibration: "typical".into(),
+        weights: Registry::standard().weights(),
         seed: None,
     }
 }
@@ -115,6 +116,8 @@ impl Bench {
             session: view.session,
             segment: view.segment,
             frame: Some(1234),
+            run: Some(self.store.run()),
+            waited_millis: None,
             client_millis: Some(1_772_355_600_000),
             said: Said::Text(text.to_owned()),
         }

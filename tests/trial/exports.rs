@@ -132,7 +132,7 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     export(bench.store.reader(), session, &blinded, false).await.unwrap();
     export(bench.store.reader(), session, &unblinded, true).await.unwrap();
     let more: Vec<String> = files(&unblinded).difference(&files(&blinded)).cloned().collect();
-    assert_eq!(more, ["allocation.csv", "allocation.json", "policy_steps.csv"]);
+    assert_eq!(more, ["allocation.csv", "allocation.json", "policy_steps.csv", "weights.csv"]);
     for file in files(&blinded).iter().filter(|file| !matches!(file.as_str(), "SHA256SUMS" | "datapackage.json")) {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
         assert!(read(&blinded) == read(&unblinded), "{file}");
@@ -143,6 +143,11 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     assert_eq!((steps.len(), steps[0]["metric"].as_str(), steps[0]["policy_micros"].as_str()), (60, "12.5", "17"));
     assert_eq!(json(&unblinded, "allocation.json")["unblinding_reason"], "the study is over; CNN won");
     assert_eq!(rows(&unblinded, "sessions")[0]["unblinded"], "after-end");
+    // Of the two learned policies in the session, by the checksums of what ships.
+    let sum = |name: &str| hex::encode(Sha256::digest(std::fs::read(format!("policies/{name}.safetensors")).unwrap()));
+    let weights: Vec<_> =
+        rows(&unblinded, "weights").into_iter().map(|row| (row["policy"].clone(), row["sha256"].clone())).collect();
+    assert_eq!(weights, ["cnn-learned", "mgm-learned"].map(|name| (name.to_owned(), sum(name))));
 }
 
 #[tokio::test]

@@ -39,6 +39,36 @@ async fn a_surgeon_goes_through_six_blinded_settings_and_everything_is_kept() {
 }
 
 #[tokio::test]
+async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let session = bench.begin("paper").await;
+    let segment = bench.view().segment.unwrap();
+    bench.surgeon(Action::Acknowledge { segment }).await;
+    bench.wait(Duration::from_secs(10)).await;
+    let mut comment = bench.comment("now");
+    let before = bench.store.run();
+    drop(bench);
+
+    let bench = Bench::start(folder.path()).await;
+    bench.clock.advance(Duration::from_secs(40));
+    comment.waited_millis = Some(30_000);
+    bench.conductor.comment(comment.clone()).await.unwrap();
+    // Sent once more, it has waited longer, and is still the same comment.
+    comment.waited_millis = Some(31_000);
+    bench.conductor.comment(comment.clone()).await.unwrap();
+    comment.key.0 = uuid::Uuid::from_u128(1);
+    comment.run = Some(99);
+    bench.conductor.comment(comment).await.unwrap();
+    let timeline = bench.conductor.timeline(session, 100).await.unwrap();
+    assert_eq!(timeline.comments.len(), 2);
+    assert!((timeline.comments[0].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments[0]);
+    let kept = bench.store.reader().comments(session).await.unwrap();
+    assert_eq!((kept[0].0, kept[0].1.frame_run, kept[0].1.waited_ms), (before + 1, Some(before), Some(30_000)));
+    assert_eq!(kept[1].1.frame_run, None, "a run that never was is not kept, the comment is");
+}
+
+#[tokio::test]
 async fn nothing_that_surgeon_or_operator_get_tells_a_policy() {
     let folder = tempfile::tempdir().unwrap();
     let mut bench = Bench::start(folder.path()).await;

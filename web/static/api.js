@@ -2,14 +2,16 @@
 
 /** The server's refusal: `message` is written for people. */
 export class Refused extends Error {
-  constructor(status, message) {
+  /** `ours`: whether the server itself said so, not a proxy before it. */
+  constructor(status, message, ours) {
     super(message);
     this.status = status;
+    this.ours = ours;
   }
 
-  /** Whether the same request may succeed later: the fault is not in what was sent. */
-  get passing() {
-    return this.status >= 500 || this.status === 408 || this.status === 429;
+  /** Whether the same request would be refused again: the server itself found the fault in what was sent. */
+  get final() {
+    return this.ours && [400, 404, 409, 413, 422].includes(this.status);
   }
 }
 
@@ -24,17 +26,21 @@ async function request(method, path, body) {
     cache: "no-store",
   });
   const text = await response.text();
-  if (!response.ok) throw new Refused(response.status, explanation(text, response.status));
+  if (!response.ok) throw refusal(text, response.status);
   return text ? JSON.parse(text) : null;
 }
 
-function explanation(text, status) {
+function refusal(text, status) {
   try {
     const said = JSON.parse(text);
-    if (typeof said.error === "string") return said.error;
+    if (typeof said.error === "string") return new Refused(status, said.error, true);
   } catch {
     // not JSON: a proxy's page or a bare status
   }
+  return new Refused(status, explanation(status), false);
+}
+
+function explanation(status) {
   if (status === 401 || status === 403) return "This link is no longer valid here. Open it again, or ask for a new one.";
   if (status === 413) return "That is too long to be saved in one piece.";
   return `The server answered with an error (${status}).`;

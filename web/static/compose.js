@@ -1,14 +1,16 @@
 // The comment box, the quick comments and "Mark this moment". A comment belongs to the setting it was begun under, even
 // when the setting changes while it is being written.
 
-import { Draft } from "./outbox.js";
+import { Draft, draftsOf } from "./outbox.js";
 import { byId, make, setText } from "./dom.js";
 
 const PATH = "/api/surgeon/comments";
 /** A second tap on the same button within this time is the same tap. */
 const SAME_TAP_MS = 700;
 
-/** `now()` gives `{ session, segment, setting, frame }` as on screen at this moment, or null outside a session. */
+const begin = ({ segment, setting, frame, run }) => ({ segment, setting, frame, run });
+
+/** `now()` gives `{ session, segment, setting, frame, run }` as on screen at this moment, or null outside a session. */
 export function composer(outbox, now) {
   const box = byId("comment");
   const about = byId("about");
@@ -20,12 +22,13 @@ export function composer(outbox, now) {
   let draft = null;
   let begun = null;
   let kept = 0;
-  let shown = null;
+  let shown;
 
   function follow(state) {
     const session = state?.session ?? null;
     if (session !== shown) {
       shown = session;
+      sendLeft(session);
       draft = session && new Draft(`comment.${session}`);
       const left = draft?.read();
       begun = left?.begun ?? null;
@@ -41,6 +44,15 @@ export function composer(outbox, now) {
     kept = state?.comments ?? 0;
     drawQuick(looking ? state.quick_comments : []);
     drawState();
+  }
+
+  /** Half-written comments on sessions that were put away are sent as they stand: their box is gone. */
+  function sendLeft(session) {
+    for (const [other, left] of draftsOf("comment.")) {
+      if (other === session) continue;
+      if (left?.text?.trim()) outbox.add(PATH, said({ kind: "text", text: left.text.trim() }, { session: other, ...left.begun }));
+      new Draft(`comment.${other}`).write(null);
+    }
   }
 
   function drawQuick(texts) {
@@ -65,12 +77,9 @@ export function composer(outbox, now) {
     if (elsewhere) setText(about, `This comment is about setting ${begun.setting}.`);
   }
 
-  function say(said, place) {
-    const { session, segment, frame } = place;
-    outbox.add(PATH, { session, segment, frame, client_millis: Date.now(), ...said });
-  }
+  const said = (what, { session, segment = null, frame = null, run = null }) => ({ session, segment, frame, run, client_millis: Date.now(), ...what });
 
-  function tap(button, said) {
+  function tap(button, what) {
     const place = now();
     if (!place || button.dataset.busy) return;
     button.dataset.busy = "yes";
@@ -79,14 +88,14 @@ export function composer(outbox, now) {
       delete button.dataset.busy;
       button.classList.remove("taken");
     }, SAME_TAP_MS);
-    say(said, place);
+    outbox.add(PATH, said(what, place));
   }
 
   function submit() {
     const place = now();
     const text = box.value.trim();
     if (!place || text === "") return;
-    say({ kind: "text", text }, { ...place, ...begun });
+    outbox.add(PATH, said({ kind: "text", text }, { ...place, ...begun }));
     write("");
     setText(trouble, "");
     box.focus();
@@ -95,7 +104,7 @@ export function composer(outbox, now) {
   function write(text) {
     if (box.value !== text) box.value = text;
     if (text === "") begun = null;
-    else if (!begun && now()) begun = { segment: now().segment, setting: now().setting, frame: now().frame };
+    else if (!begun && now()) begun = begin(now());
     draft?.write(text === "" ? null : { text, begun });
     box.classList.toggle("tall", text.length > 90 || text.includes("\n"));
     drawState();
@@ -107,7 +116,10 @@ export function composer(outbox, now) {
     drawState();
   });
 
-  function refused({ body }, reason) {
+  function refused(entry, reason) {
+    const { body } = entry;
+    if (body.session !== shown) return;
+    if (body.kind === "text") outbox.takeBack(entry);
     if (body.kind === "text") write(box.value === "" ? body.text : `${body.text}\n${box.value}`);
     const what = body.kind === "text" ? "The comment was not saved, it is back in the box" : body.kind === "mark" ? "The mark was not saved" : `“${body.text}” was not saved`;
     setText(trouble, `${what}: ${reason}`);
@@ -122,5 +134,5 @@ export function composer(outbox, now) {
   });
   send.onclick = submit;
   mark.onclick = () => tap(mark, { kind: "mark" });
-  return { follow, draw: drawState };
+  return { follow, draw: drawState, unsent: () => box.value.trim() !== "" };
 }

@@ -8,11 +8,15 @@
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
+/** The server says something at least every 5 s; after this long without a word the connection is dead, whatever it looks like. */
+const SILENCE_MS = 12000;
+const LOOK_MS = 1000;
 
 export class Live extends EventTarget {
   #role;
   #socket = null;
   #wait = FIRST_WAIT_MS;
+  #heardAt = 0;
   #decoder = new TextDecoder();
 
   /** @param {"surgeon"|"operator"|"researcher"} role */
@@ -21,10 +25,26 @@ export class Live extends EventTarget {
     this.#role = role;
     document.addEventListener("visibilitychange", () => this.#tellVisibility());
     // A network that came back, or a page brought back from the browser's cache, need not wait for its turn.
-    window.addEventListener("online", () => this.#connect());
+    window.addEventListener("online", () => this.#connectAnew());
     window.addEventListener("pageshow", () => this.#connect());
     // Listeners are added after construction; they are to miss nothing.
     queueMicrotask(() => this.#connect());
+    setInterval(() => this.#silent() && this.#connectAnew(), LOOK_MS);
+  }
+
+  #silent() {
+    return this.#socket?.readyState <= WebSocket.OPEN && performance.now() - this.#heardAt > SILENCE_MS;
+  }
+
+  /** A link that broke without a word leaves a socket that looks open; closing it would wait for the other end. */
+  #connectAnew() {
+    const socket = this.#socket;
+    if (socket && socket.readyState <= WebSocket.OPEN) {
+      this.#socket = null;
+      socket.close();
+      this.#emit("connection", { open: false });
+    }
+    this.#connect();
   }
 
   #connect() {
@@ -32,12 +52,16 @@ export class Live extends EventTarget {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(`${scheme}//${location.host}/live?role=${this.#role}`);
     socket.binaryType = "arraybuffer";
+    this.#heardAt = performance.now();
     socket.onopen = () => {
+      if (socket !== this.#socket) return;
       this.#wait = FIRST_WAIT_MS;
       this.#tellVisibility();
       this.#emit("connection", { open: true });
     };
     socket.onmessage = ({ data }) => {
+      if (socket !== this.#socket) return;
+      this.#heardAt = performance.now();
       if (typeof data === "string") this.#hear(JSON.parse(data));
       else this.#show(socket, data);
     };

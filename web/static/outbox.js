@@ -1,6 +1,6 @@
 // Keeps what was said until the server says that it is saved. Every entry is written to this device first, under a key of
 // its own, so that a reload, a Wi-Fi gap or a second tab loses nothing; the entry's idempotency key makes sending it
-// twice harmless.
+// twice harmless. What the server refuses stays on this device too, and is tried again when the page is next opened.
 
 import { post, Refused, inWords } from "./api.js";
 import { uuid } from "./dom.js";
@@ -12,24 +12,29 @@ const LONGEST_WAIT_MS = 8000;
 /** Fires `change` whenever an entry is added, saved or refused; the event's detail is `{ entry, state, reason }`. */
 export class Outbox extends EventTarget {
   #entries = new Map();
+  #refused = new Map();
   #flushing = false;
   #wait = FIRST_WAIT_MS;
   #timer = null;
   #count = 0;
   /** Why the last attempt failed, if it did. */
   trouble = null;
-  /** Whether this device keeps entries over a reload. */
-  durable = true;
 
   constructor() {
     super();
     for (const entry of stored()) this.#entries.set(entry.id, entry);
+    addEventListener("storage", ({ key, newValue }) => key && newValue === null && this.#doneElsewhere(key));
     addEventListener("online", () => this.nudge());
     document.addEventListener("visibilitychange", () => document.hidden || this.nudge());
     addEventListener("beforeunload", (event) => {
       if (!this.durable && this.#entries.size > 0) event.preventDefault();
     });
     this.nudge();
+  }
+
+  /** Whether this device keeps every unsaved entry over a reload. */
+  get durable() {
+    return [...this.#entries.values()].every(({ stored }) => stored);
   }
 
   /** Entries not yet saved, oldest first. */
@@ -43,12 +48,12 @@ export class Outbox extends EventTarget {
    */
   add(path, body, slot = null) {
     const order = `${String(Date.now()).padStart(15, "0")}-${String(this.#count++).padStart(5, "0")}`;
-    const entry = { id: `${order}-${uuid()}`, path, slot, body: { key: uuid(), ...body } };
+    const entry = { id: `${order}-${uuid()}`, path, slot, at: Date.now(), body: { key: uuid(), ...body } };
     if (slot) {
-      for (const other of this.waiting) if (other.slot === slot && !other.sending) this.#forget(other);
+      for (const other of [...this.waiting, ...this.#refused.values()]) if (other.slot === slot && !other.sending) this.#forget(other);
     }
     this.#entries.set(entry.id, entry);
-    this.durable = store(entry);
+    entry.stored = store(entry);
     this.#tell(entry, "saving");
     this.nudge();
     return entry;
@@ -96,26 +101,47 @@ export class Outbox extends EventTarget {
   async #send(entry) {
     entry.sending = true;
     try {
-      await post(entry.path, entry.body);
+      await post(entry.path, { ...entry.body, waited_millis: Math.max(0, Date.now() - entry.at) });
       this.trouble = null;
       this.#forget(entry);
       this.#tell(entry, "saved");
       return true;
     } catch (error) {
       entry.sending = false;
-      if (error instanceof Refused && !error.passing && error.status !== 401 && error.status !== 403) {
-        this.#forget(entry);
+      if (error instanceof Refused && error.final) {
+        this.#entries.delete(entry.id);
+        this.#refused.set(entry.id, entry);
         this.#tell(entry, "refused", error.message);
         return true;
       }
       this.trouble = inWords(error);
+      // Tried again later it would be the last to arrive, and count.
+      if (this.#replaced(entry)) this.#forget(entry);
       this.#tell(entry, "waiting", this.trouble);
       return error instanceof Refused;
     }
   }
 
+  #replaced({ id, slot }) {
+    return slot !== null && this.waiting.some((other) => other.slot === slot && other.id > id);
+  }
+
+  /** Takes back an entry that was refused: it is in a person's hands again. */
+  takeBack(entry) {
+    this.#forget(entry);
+  }
+
+  /** Another tab saved or replaced what both held. */
+  #doneElsewhere(key) {
+    const entry = this.#entries.get(key.slice(PREFIX.length));
+    if (!key.startsWith(PREFIX) || !entry || entry.sending) return;
+    this.#entries.delete(entry.id);
+    this.#tell(entry, "saved");
+  }
+
   #forget(entry) {
     this.#entries.delete(entry.id);
+    this.#refused.delete(entry.id);
     try {
       localStorage.removeItem(PREFIX + entry.id);
     } catch {
@@ -149,10 +175,23 @@ function stored() {
 
 function parsed(text) {
   try {
-    return [{ ...JSON.parse(text), sending: false }];
+    return [{ ...JSON.parse(text), sending: false, stored: true }];
   } catch {
     return [];
   }
+}
+
+/** The drafts on this device whose names begin with `start`, as `[rest of the name, value]`. */
+export function draftsOf(start) {
+  const prefix = `parfocal.draft.${start}`;
+  const names = ["sessionStorage", "localStorage"].flatMap((storage) => {
+    try {
+      return Object.keys(window[storage]).filter((key) => key.startsWith(prefix));
+    } catch {
+      return [];
+    }
+  });
+  return [...new Set(names)].map((key) => [key.slice(prefix.length), new Draft(key.slice("parfocal.draft.".length)).read()]);
 }
 
 /** A text being written, kept on this device: per tab over a reload, and for the next tab when this one is closed. */

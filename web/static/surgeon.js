@@ -15,7 +15,7 @@ let state = null;
 let known = false;
 let endsAt = null;
 
-const here = () => state && { session: state.session, segment: state.segment, setting: state.setting, frame: viewer.frame ?? null };
+const here = () => state && { session: state.session, segment: state.segment, setting: state.setting, frame: viewer.frame ?? null, run: viewer.run ?? null };
 const comments = composer(outbox, here);
 const change = changeNotice((segment) => act({ action: "acknowledge", segment }));
 
@@ -26,9 +26,9 @@ function follow(next) {
   state = next;
   endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
   drawBar();
+  comments.follow(state);
   drawPanel();
   takeAnswers();
-  comments.follow(state);
   if (state?.phase === "notice" && !state.paused) change.show(state);
   else change.hide();
 }
@@ -49,7 +49,7 @@ async function act(action) {
   } catch (error) {
     const refused = error instanceof Refused;
     change.ask(refused ? "Tap to continue" : "No answer yet: tap again");
-    if (refused && !error.passing) await refresh();
+    if (refused && error.status < 500) await refresh();
     if (stands(action)) setText(byId("trouble"), refused ? error.message : "The server does not answer. Try again in a moment.");
   }
 }
@@ -139,6 +139,7 @@ function panelContent() {
 
 /** Whether all is saved, said only when it is so. */
 function kept() {
+  if (comments.unsent()) return "Your last comment is still in its box: send it, or clear it.";
   return outbox.waiting.length === 0 ? "Everything you said is saved." : "Please leave this page open: some of what you said is still being saved.";
 }
 
@@ -223,6 +224,8 @@ outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }
 });
 
 /* Wiring */
+
+byId("comment").addEventListener("input", () => ended() && drawPanel());
 
 viewer.live.addEventListener("session", (event) => follow(event.detail));
 viewer.live.addEventListener("status", (event) => followStatus(event.detail));

@@ -24,6 +24,8 @@ export function mountViewer(element, options) {
 class Viewer extends EventTarget {
   /** Number of the frame on screen; null before the first. */
   frame = null;
+  /** The server's run that counted it. */
+  run = null;
   /** The stream: emits "session", "status" and "connection". */
   live;
 
@@ -82,6 +84,7 @@ class Viewer extends EventTarget {
     this.#picture.drawImage(bitmap, 0, 0, header.width, header.height);
     this.#last = { header, receivedAt };
     this.frame = header.frame;
+    this.run = header.run;
     if (this.#shown.has("peaking")) this.#peaking.look(bitmap, header.area);
     this.#drawOverlays();
     this.#traces?.add(header, receivedAt - header.age);

@@ -170,10 +170,12 @@ impl Blinded {
                 json!(kind),
                 json!(said),
                 json!(comment.frame),
+                json!(comment.frame_run),
                 text(comment.stamp.wall),
                 json!(run),
                 json!(nanoseconds(comment.stamp.at)),
                 json!(comment.client_millis),
+                json!(comment.waited_ms),
             ]
         };
         self.comments.iter().zip(1..).map(row).collect()

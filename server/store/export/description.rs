@@ -87,10 +87,17 @@ pub const COMMENTS: Table = Table {
         column("kind", String, "", "text (typed), quick (one tap) or mark (\"mark this moment\")"),
         column("text", String, "", "What was said, as it was said; empty for a mark"),
         column("frame", Integer, "", "Number of the frame on the surgeon's screen"),
+        column("frame_run", Integer, "", "Start of the server that counted that frame; see runs"),
         WALL,
         RUN,
         MONOTONIC,
         column("client_millis", Integer, "ms", "The browser's clock, milliseconds since 1970-01-01 UTC"),
+        column(
+            "waited_ms",
+            Integer,
+            "ms",
+            "Time between saying and sending, on the surgeon's device: said at wall less this",
+        ),
     ],
     key: &["key"],
 };
@@ -201,6 +208,18 @@ pub const ALLOCATION: Table = Table {
     key: &["segment"],
 };
 
+/// What a learned policy was.
+pub const WEIGHTS: Table = Table {
+    name: "weights",
+    description: "The weights that the session's learned policies had in each start of the server that served it",
+    columns: &[
+        RUN,
+        column("policy", String, "", "Policy's name"),
+        column("sha256", String, "", "SHA-256 of the file of its weights"),
+    ],
+    key: &["run", "policy"],
+};
+
 /// Telemetry that tells the policy.
 pub const POLICY_STEPS: Table = Table {
     name: "policy_steps",
@@ -224,5 +243,5 @@ pub const POLICY_STEPS: Table = Table {
 };
 
 /// Every table that an export may have.
-pub const ALL: [Table; 10] =
-    [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES, TELEMETRY, ALLOCATION, POLICY_STEPS];
+pub const ALL: [Table; 11] =
+    [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES, TELEMETRY, ALLOCATION, WEIGHTS, POLICY_STEPS];

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::ExportError;
-use super::description::{ALLOCATION, POLICY_STEPS};
+use super::description::{ALLOCATION, POLICY_STEPS, WEIGHTS};
 use super::folder::Folder;
 use super::table::Row;
 use crate::store::sessions::StoredSession;
@@ -33,6 +33,9 @@ impl Unblinded {
     /// Writes its files.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
         folder.table(&ALLOCATION, &self.rows())?;
+        let mut file = folder.begin(&WEIGHTS)?;
+        reader.export_weights(self.made.session, |row| file.row(&row)).await?;
+        folder.end(&WEIGHTS, file)?;
         let mut file = folder.begin(&POLICY_STEPS)?;
         reader.export_policy_steps(self.made.session, |row| file.row(&row)).await?;
         folder.end(&POLICY_STEPS, file)?;

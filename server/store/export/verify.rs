@@ -80,7 +80,7 @@ fn columns(folder: &Path) -> Outcome {
     let mut rows = 0;
     for table in ALL {
         let file = table.file();
-        if !folder.join(&file).exists() && matches!(table.name, "allocation" | "policy_steps") {
+        if !folder.join(&file).exists() && matches!(table.name, "allocation" | "weights" | "policy_steps") {
             continue;
         }
         let mut reader = csv(folder, &file)?;

@@ -73,6 +73,8 @@ pub struct SessionState {
     plan: Plan,
     phase: Phase,
     done: usize,
+    /// Segments whose questions were shown.
+    asked: usize,
     paused: Option<PauseCause>,
     inspected: Duration,
     running_since: Option<Moment>,
@@ -88,6 +90,7 @@ impl SessionState {
             plan,
             phase: Phase::Ready,
             done: 0,
+            asked: 0,
             paused: None,
             inspected: Duration::ZERO,
             running_since: None,
@@ -180,9 +183,7 @@ impl SessionState {
     pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
         match segment {
             None => matches!(self.phase, Phase::Closing | Phase::Completed) || self.done == self.plan.segments.len(),
-            Some(segment) => self.plan.position(segment).is_some_and(|position| {
-                position < self.done || (position == self.done && self.phase == Phase::Questions)
-            }),
+            Some(segment) => self.plan.position(segment).is_some_and(|position| position < self.asked),
         }
     }
 
@@ -198,6 +199,7 @@ impl SessionState {
             }
             EventKind::SegmentFinished { inspected_ms, .. } => {
                 self.stop_clock(*inspected_ms);
+                self.asked = self.done + 1;
                 if self.plan.after_segment.is_empty() { self.leave_segment() } else { self.phase = Phase::Questions }
             }
             EventKind::QuestionsFinished { segment: Some(_) } => self.leave_segment(),

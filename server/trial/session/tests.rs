@@ -212,6 +212,9 @@ fn questions_take_answers_from_when_they_are_asked_and_for_good() {
     assert!(run.state.takes_answers(Some(segment(0))) && !run.state.takes_answers(Some(segment(1))));
     run.act(Role::Operator, &Action::Pause { reason: String::new() }).unwrap();
     assert!(run.state.takes_answers(Some(segment(0))) && !run.state.takes_answers(None));
+    // A tablet out of the network's reach may have them still to send.
+    run.act(Role::Operator, &Action::Abort { reason: "the tablet is silent".to_owned() }).unwrap();
+    assert!(run.state.takes_answers(Some(segment(0))) && !run.state.takes_answers(Some(segment(1))));
 }
 
 #[derive(Debug, Clone)]
