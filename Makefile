@@ -33,7 +33,7 @@ unit:
 readme:
 	.ci/readme
 
-# Speed: each figure that the README states comes from here.
+# Speed: each figure that docs/speed.md states comes from here.
 bench:
 	cargo bench $(FEATURES)
 

@@ -31,7 +31,6 @@ impl Pace {
     ///
     /// # Errors
     /// When that time is further away than `timeout`; then it waits for that long.
-    #[allow(clippy::disallowed_methods, reason = "pacing is waiting")]
     pub fn wait(&mut self, clock: &dyn Clock, timeout: Duration) -> Result<u64, CameraError> {
         let now = clock.now();
         let (number, due) = self.next(now);

@@ -75,17 +75,28 @@ const TELEMETRY_CAPACITY: usize = 750;
 /// Open connections get this long to end by themselves, and then the disk as long to take what is left.
 const GRACE: Duration = Duration::from_millis(700);
 
-/// Serves until Ctrl-C or SIGTERM.
+/// Lens and camera get this long to be put to rest.
+const DEVICES: Duration = Duration::from_secs(5);
+
+/// Serves until Ctrl-C, SIGTERM or the end of its terminal.
 ///
 /// # Errors
 /// When the address is taken, or a folder, camera or lens cannot be used.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    // Through a queue: a terminal that is held, or a pipe that nobody reads, must not hold the control loop that logs a line.
+    // What does not fit is left out.
+    let (writer, flush) = tracing_appender::non_blocking(std::io::stderr());
     tracing_subscriber::fmt()
         .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| "info,sqlx=warn".into()))
         .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr)
+        .with_writer(writer)
         .init();
-    tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(serve(arguments))
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let outcome = runtime.block_on(serve(arguments));
+    // A thread that hangs must not keep the process from ending.
+    runtime.shutdown_background();
+    drop(flush);
+    outcome
 }
 
 async fn serve(arguments: &Arguments) -> Result<(), Failure> {
@@ -147,7 +158,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let _ = end.send(true);
     let _ = timeout(GRACE, async { (server.await, end.closed().await) }).await;
     conducting.abort();
-    tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join())).await?.1.ok();
+    let stopping = tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join()));
+    if timeout(DEVICES, stopping).await.is_err() {
+        tracing::error!("the control loop does not end; leaving it");
+    }
     let _ = timeout(GRACE, async { (writer.await, store.close().await) }).await;
     Ok(())
 }
@@ -236,21 +250,27 @@ fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
     }
 }
 
-/// Ctrl-C, or the end that a service manager asks for. Made before anything is announced, so that no signal is missed.
+/// Ctrl-C, the end that a service manager asks for, or that of the terminal, with which a lens must not keep its current. Made before anything is announced, so that no signal is missed.
 struct Signals {
     interrupt: Signal,
     terminate: Signal,
+    hangup: Signal,
 }
 
 impl Signals {
     fn new() -> std::io::Result<Self> {
-        Ok(Self { interrupt: signal(SignalKind::interrupt())?, terminate: signal(SignalKind::terminate())? })
+        Ok(Self {
+            interrupt: signal(SignalKind::interrupt())?,
+            terminate: signal(SignalKind::terminate())?,
+            hangup: signal(SignalKind::hangup())?,
+        })
     }
 
     async fn any(&mut self) {
         tokio::select! {
             _ = self.interrupt.recv() => {}
             _ = self.terminate.recv() => {}
+            _ = self.hangup.recv() => {}
         }
     }
 }

@@ -28,6 +28,11 @@ impl Shared {
             return Ok(());
         }
         let mut earlier = self.load(session).await?;
+        let same_set = |course: &Course| !course.state.ended() && course.made.seed == earlier.made.seed;
+        if matches!(action, Action::Unblind { .. }) && live.course.as_ref().is_some_and(same_set) {
+            let text = "a session of the same balanced set is under way, and this one's order would tell its own; wait for its end";
+            return Err(ConductError::Conflict(text.to_owned()));
+        }
         let kinds = decide(&earlier.state, by, action, self.clock.now())?;
         self.record(&mut earlier, by, kinds).await
     }

@@ -30,7 +30,7 @@ pub fn start(control: ControlHandle, reconstructor: Reconstructor) -> std::io::R
     let counts = Arc::new(Counts::default());
     let handle = LiveHandle { frames, counts: Arc::clone(&counts) };
     let studio = Studio::new(reconstructor).map_err(std::io::Error::other)?;
-    let worker = Worker { control, sender, counts, studio, areas: AreaWatch::default() };
+    let worker = Worker { control, sender, counts, studio, areas: AreaWatch::default(), looked: None };
     let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || worker.run())?;
     Ok((handle, thread))
 }
@@ -41,6 +41,8 @@ struct Worker {
     counts: Arc<Counts>,
     studio: Studio,
     areas: AreaWatch,
+    /// The frame in which the content area was last looked for.
+    looked: Option<u64>,
 }
 
 impl Worker {
@@ -58,17 +60,21 @@ impl Worker {
     fn turn(&mut self, frame: ControlledFrame) {
         self.counts.latency.observe(f64::from(frame.record.latency_micros) / 1e6);
         let watched = self.counts.viewers() > 0;
-        let detect = frame.frame.number.is_multiple_of(DETECT_EVERY);
+        // By distance: of frames that come faster than they are shown, those of a round number may never be seen here.
+        let detect = self.looked.is_none_or(|looked| frame.frame.number.abs_diff(looked) >= DETECT_EVERY);
         if !watched && !detect {
             return;
         }
-        let image = frame.frame.image.clone();
+        let (number, image) = (frame.frame.number, frame.frame.image.clone());
         self.studio.develop(&image);
         if watched {
             match self.studio.encode(&image) {
                 Ok(jpeg) => self.publish(frame, &image, jpeg),
                 Err(error) => tracing::error!(%error, "a picture could not be encoded"),
             }
+        }
+        if detect {
+            self.looked = Some(number);
         }
         // After the picture has left: nobody waits for this.
         if detect && let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {

@@ -75,6 +75,7 @@ pub struct Store {
 struct Inner {
     trial: SqlitePool,
     telemetry: SqlitePool,
+    checkpoints: SqlitePool,
     reader: Reader,
     /// `SQLite` lets one connection write at a time and polls for its turn; this queue is fair and wakes at once.
     turn: Mutex<()>,
@@ -100,17 +101,21 @@ impl Store {
             .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .foreign_keys(true)
-            .busy_timeout(Duration::from_secs(5));
+            .busy_timeout(Duration::from_secs(5))
+            // Checkpoints are made between batches of telemetry and by a connection of their own, so that none falls on a comment's
+            // commit and nobody waits for one.
+            .pragma("wal_autocheckpoint", "0");
         let trial = connect(options.clone().synchronous(SqliteSynchronous::Full)).await?;
         MIGRATOR.run(&trial).await?;
-        // Checkpoints are made between batches (see telemetry), so that none falls on a comment's commit.
-        let relaxed = options.synchronous(SqliteSynchronous::Normal).pragma("wal_autocheckpoint", "0");
-        let telemetry = connect(relaxed).await?;
+        let relaxed = options.synchronous(SqliteSynchronous::Normal);
+        let telemetry = connect(relaxed.clone()).await?;
+        let checkpoints = connect(relaxed).await?;
         let reader = Reader::open_file(&file).await?;
         let run = begin_run(&trial, run).await?;
         let inner = Inner {
             trial,
             telemetry,
+            checkpoints,
             reader,
             turn: Mutex::new(()),
             run,
@@ -141,6 +146,7 @@ impl Store {
     /// Closes the database; what was acknowledged is on disk with or without it.
     pub async fn close(&self) {
         self.inner.reader.close().await;
+        self.inner.checkpoints.close().await;
         self.inner.telemetry.close().await;
         self.inner.trial.close().await;
     }

@@ -237,7 +237,7 @@ impl Names {
 /// Moves what was written from the log into the database, as far as no reader stands in the way. Not in a turn: writers
 /// go on meanwhile.
 async fn checkpoint(store: &Store) {
-    if let Err(error) = sqlx::query("PRAGMA wal_checkpoint(PASSIVE)").execute(&store.inner.telemetry).await {
+    if let Err(error) = sqlx::query("PRAGMA wal_checkpoint(PASSIVE)").execute(&store.inner.checkpoints).await {
         tracing::warn!("the database's log could not be folded in: {error}; it is tried again");
     }
 }

@@ -191,7 +191,7 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
     let server = Server::start();
     let mut surgeon = Page::open(&server, "surgeon").await;
     let frame = surgeon.frame().await;
-    assert_eq!(frame.fields(), ["age", "area", "estimated", "frame", "height", "patch", "width"]);
+    assert_eq!(frame.fields(), ["age", "area", "estimated", "frame", "height", "patch", "run", "width"]);
     surgeon.sent_so_far().await;
     let told = surgeon.told();
     let status = told.iter().find(|told| told["type"] == "status").expect("a status");

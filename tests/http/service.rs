@@ -22,7 +22,7 @@ async fn it_says_where_it_is_and_what_is_simulated() {
 
 #[tokio::test]
 async fn it_ends_well_when_asked_to() {
-    for signal in [Signal::TERM, Signal::INT] {
+    for signal in [Signal::TERM, Signal::INT, Signal::HUP] {
         let mut server = Server::start();
         let mut stream = server.get("/stream.mjpeg").send().await.unwrap();
         assert!(stream.chunk().await.unwrap().is_some());

@@ -98,7 +98,6 @@ fn what_cannot_be_measured_says_why() {
 }
 
 #[test]
-#[allow(clippy::disallowed_methods, reason = "the emulated driver lives in real time")]
 fn an_emulated_driver_is_measured_as_its_glass_moves() {
     let glass = LensDynamics { delay: Duration::from_millis(10), settling: Duration::from_millis(40) };
     let emulator = emulator(Model { glass, latency: Duration::ZERO, ..Model::default() });

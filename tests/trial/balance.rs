@@ -80,6 +80,21 @@ async fn unblinding_closes_the_set_and_its_seed_is_told_when_all_of_it_are_unbli
 }
 
 #[tokio::test]
+async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
+    let folder = tempfile::tempdir().unwrap();
+    balanced(folder.path());
+    let bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
+    let left = session_that_is_left(&bench).await.session;
+    // In the place that was given back, and so by the same order.
+    let second = bench.begin("balanced").await;
+    let unblind = || bench.conductor.act(Role::Researcher, left, Action::Unblind { reason: "to see".to_owned() });
+    let refused = unblind().await.unwrap_err();
+    assert!(refused.to_string().contains("same balanced set"), "{refused}");
+    bench.conductor.act(Role::Operator, second, Action::Abort { reason: "over".to_owned() }).await.unwrap();
+    unblind().await.unwrap();
+}
+
+#[tokio::test]
 async fn a_fixed_seed_makes_other_ids_and_seeds_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let bench = Bench::start(folder.path()).await;

@@ -4,11 +4,12 @@
 //! [`Camera::next_frame`], and looks for the camera again when it is lost.
 
 mod device;
+mod numbers;
 mod pixels;
 mod timestamps;
 mod worker;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, OnceLock, mpsc};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -38,18 +39,26 @@ impl GigeCamera {
         if wanted.id == "list" {
             return Err(CameraError::BadSource(listing()));
         }
-        let device = Device::open(&wanted)
-            .map_err(|error| CameraError::BadSource(format!("{}: {error}; {}", wanted.id, listing())))?;
-        let size = (device.width, device.height);
-        let shared = Arc::new(Shared::new(settings.clock, &device));
-        let theirs = shared.clone();
+        let (tell, told) = mpsc::channel();
         let thread = std::thread::Builder::new()
             .name("gige".into())
             .spawn(move || {
                 crate::priority::raise();
-                worker::run(&theirs, &wanted, device);
+                // Opened here, so that Aravis's thread that receives packets inherits the priority.
+                match Device::open(&wanted) {
+                    Ok(device) => {
+                        let shared = Arc::new(Shared::new(settings.clock, &device));
+                        let _ = tell.send(Ok(((device.width, device.height), Arc::clone(&shared))));
+                        worker::run(&shared, &wanted, device);
+                    }
+                    Err(error) => {
+                        let _ = tell.send(Err(format!("{}: {error}; {}", wanted.id, listing())));
+                    }
+                }
             })
             .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
+        let opened = told.recv().unwrap_or_else(|_| Err("the camera's thread ended at once".to_owned()));
+        let (size, shared) = opened.map_err(CameraError::BadSource)?;
         Ok(Self { size, shared, thread: Some(thread) })
     }
 

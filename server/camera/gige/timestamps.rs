@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use crate::clock::Moment;
+use crate::clock::{Clock, Moment};
 
 /// How far back arrivals are compared; a crystal's drift over that time is some tens of microseconds.
 const WINDOW: Duration = Duration::from_secs(4);
@@ -17,12 +17,21 @@ const WINDOW: Duration = Duration::from_secs(4);
 pub struct Timestamps {
     /// Stamp's arrival and difference, differences rising: the front is the least of the window.
     differences: VecDeque<(Moment, i128)>,
+    last: Option<Moment>,
 }
 
 impl Timestamps {
     /// The moment that `stamp` (nanoseconds of the camera's clock) stands for, its frame having begun to arrive at
-    /// `arrived`. Never later than `arrived`; a camera without a clock gets `arrived`.
+    /// `arrived`. Never later than `arrived` but to come after the frame before; a camera without a clock gets `arrived`.
     pub fn moment(&mut self, stamp: u64, arrived: Moment) -> Moment {
+        let moment = self.undelayed(stamp, arrived);
+        // Else a least difference just found would put this frame before the last one.
+        let rising = self.last.map_or(moment, |last| moment.max(Moment::from_nanos(last.as_nanos() + 1)));
+        self.last = Some(rising);
+        rising
+    }
+
+    fn undelayed(&mut self, stamp: u64, arrived: Moment) -> Moment {
         if stamp == 0 {
             return arrived;
         }
@@ -39,9 +48,24 @@ impl Timestamps {
     }
 }
 
+/// When the frame that Aravis noted at `noted`, nanoseconds of the wall's clock, began to arrive.
+pub fn arrival(noted: u64, clock: &dyn Clock) -> Moment {
+    let wall = u64::try_from(clock.wall().as_nanosecond()).unwrap_or_default();
+    // Read last: what comes in between makes the arrival late, which `Timestamps` takes out again, never early, which it would
+    // believe for seconds.
+    let now = clock.now();
+    let age = wall.saturating_sub(noted);
+    // A wall clock that was set meanwhile makes nonsense of it.
+    let age = if age > 1_000_000_000 { 0 } else { age };
+    Moment::from_nanos(now.as_nanos().saturating_sub(age))
+}
+
 #[cfg(test)]
 mod tests {
+    use jiff::Timestamp;
+
     use super::*;
+    use crate::clock::ManualClock;
 
     const MILLI: u64 = 1_000_000;
 
@@ -65,12 +89,39 @@ mod tests {
     fn a_camera_clock_that_was_set_back_is_followed_within_the_window() {
         let mut map = Timestamps::default();
         map.moment(9000 * MILLI, at(1_000_000));
-        assert_eq!(map.moment(1000 * MILLI, at(1_020_000)), at(0), "at first the old difference rules");
+        let just_after = Moment::from_nanos(at(1_000_000).as_nanos() + 1);
+        assert_eq!(map.moment(1000 * MILLI, at(1_020_000)), just_after, "at first the old difference rules");
         assert_eq!(map.moment(5000 * MILLI, at(5_020_000)), at(5_020_000));
     }
 
     #[test]
     fn without_a_clock_the_arrival_counts() {
         assert_eq!(Timestamps::default().moment(0, at(5)), at(5));
+    }
+
+    /// A clock whose reader is held up for 30 ms after each look.
+    struct Slow(ManualClock);
+
+    impl Clock for Slow {
+        fn now(&self) -> Moment {
+            let now = self.0.now();
+            self.0.advance(Duration::from_millis(30));
+            now
+        }
+
+        fn wall(&self) -> Timestamp {
+            let wall = self.0.wall();
+            self.0.advance(Duration::from_millis(30));
+            wall
+        }
+    }
+
+    #[test]
+    fn who_is_held_up_takes_a_frame_for_late_and_never_for_early() {
+        let clock = Slow(ManualClock::new("2026-03-01T09:00:00Z".parse().unwrap()));
+        clock.0.advance(Duration::from_secs(10));
+        let noted = u64::try_from(clock.0.wall().as_nanosecond()).unwrap();
+        let truth = clock.0.now();
+        assert!(arrival(noted, &clock) >= truth);
     }
 }

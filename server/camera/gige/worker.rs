@@ -7,7 +7,8 @@ use std::time::Duration;
 use ::aravis::Buffer;
 
 use super::device::{Arrival, Device, Wanted};
-use super::timestamps::Timestamps;
+use super::numbers::steps;
+use super::timestamps::{Timestamps, arrival};
 use crate::camera::{CameraError, CameraHealth, Controls, Frame, FrameImage, MosaicPool, Setting};
 use crate::clock::{Clock, Moment};
 use crate::imaging::MosaicFrame;
@@ -18,8 +19,6 @@ const LOOK: Duration = Duration::from_millis(50);
 const SILENCE: Duration = Duration::from_millis(1500);
 /// Between two attempts to find a lost camera.
 const RETRY: Duration = Duration::from_millis(300);
-/// GigE Vision counts frames from 1 to this, and then again from 1.
-const LAST_NUMBER: u64 = 65_535;
 
 /// What the thread and the caller share.
 pub struct Shared {
@@ -231,9 +230,10 @@ impl<'a> Session<'a> {
     }
 
     fn deliver(&mut self, buffer: &Buffer) {
+        let arrived = arrival(buffer.system_timestamp(), self.shared.clock.as_ref());
         let now = self.shared.clock.now();
         self.count(buffer.frame_id());
-        let exposed_at = self.timestamps.moment(buffer.timestamp(), arrival(buffer, self.shared.clock.as_ref(), now));
+        let exposed_at = self.timestamps.moment(buffer.timestamp(), arrived);
         match self.mosaic(&buffer.image_data()) {
             Some(mosaic) => {
                 let (number, exposure, image) = (*self.number, self.exposure, FrameImage::Mosaic(mosaic));
@@ -280,40 +280,5 @@ impl<'a> Session<'a> {
         let exposure = offers.iter().find(|one| one.setting == Setting::Exposure);
         self.exposure = exposure.map_or(Duration::ZERO, |one| Duration::from_secs_f64(one.value.clamp(0.0, 1e9) / 1e6));
         self.shared.controls.offer(offers);
-    }
-}
-
-/// Frames from the camera's number `seen` to `now`; 1 where its counting was broken off.
-const fn steps(seen: Option<u64>, now: u64) -> u64 {
-    match seen {
-        Some(seen) if now > seen => now - seen,
-        // Rolled over, unless that would be an absurd gap.
-        Some(seen) if seen <= LAST_NUMBER && now + LAST_NUMBER - seen < 1000 => now + LAST_NUMBER - seen,
-        _ => 1,
-    }
-}
-
-/// When the frame began to arrive. Aravis notes it on the wall's clock.
-fn arrival(buffer: &Buffer, clock: &dyn Clock, now: Moment) -> Moment {
-    let wall = u64::try_from(clock.wall().as_nanosecond()).unwrap_or_default();
-    let age = wall.saturating_sub(buffer.system_timestamp());
-    // A wall clock that was set meanwhile makes nonsense of it.
-    let age = if age > 1_000_000_000 { 0 } else { age };
-    Moment::from_nanos(now.as_nanos().saturating_sub(age))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_cameras_numbers_roll_over_and_leave_gaps() {
-        assert_eq!(steps(None, 17), 1);
-        assert_eq!(steps(Some(17), 18), 1);
-        assert_eq!(steps(Some(17), 20), 3);
-        assert_eq!(steps(Some(65_535), 1), 1);
-        assert_eq!(steps(Some(65_534), 2), 3);
-        assert_eq!(steps(Some(5000), 1), 1, "the camera restarted");
-        assert_eq!(steps(Some(1 << 40), 3), 1);
     }
 }

@@ -71,7 +71,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let plan = Plan { repeats: arguments.repeats, watch, ..Plan::default() };
     let progress = ProgressBar::new_spinner().with_message("stepping the lens and watching it settle");
     progress.enable_steady_tick(Duration::from_millis(100));
-    #[allow(clippy::disallowed_methods, reason = "commands are to fall at ever other times between frames")]
     let measured = measure(lens.as_mut(), &mut view, plan, &|time| std::thread::sleep(time))?;
     progress.finish_and_clear();
     let report = Report::new(&measured, info, clock.as_ref());
