@@ -3,5 +3,6 @@
 mod balance;
 mod bench;
 mod exports;
+mod remarks;
 mod sessions;
 mod storage;
