@@ -1,5 +1,7 @@
 // Talks JSON with the server, and tells three things apart: it worked, the server refused, nobody answered.
 
+import { setText } from "./dom.js";
+
 /** The server's refusal: `message` is written for people. */
 export class Refused extends Error {
   /** `ours`: whether the server itself said so, not a proxy before it. */
@@ -49,7 +51,21 @@ function explanation(status) {
 export const get = (path) => request("GET", path);
 export const post = (path, body) => request("POST", path, body);
 
-/** An error in words, whoever made it. */
-export function inWords(error) {
-  return error instanceof Refused ? error.message : "No connection to the server. Trying again by itself.";
+/** An error in words, whoever made it; `unheard` is for nobody having answered. */
+export function inWords(error, unheard = "No connection to the server. Try again in a moment.") {
+  return error instanceof Refused ? error.message : unheard;
+}
+
+/** Says in `element` why something was not done. */
+export function tellTrouble(element, error, unheard) {
+  element.toggleAttribute("data-unheard", !(error instanceof Refused));
+  setText(element, inWords(error, unheard));
+}
+
+/** Takes back what was said of a server that did not answer: it is there again. */
+export function heardAgain() {
+  for (const element of document.querySelectorAll("[data-unheard]")) {
+    element.removeAttribute("data-unheard");
+    setText(element, "");
+  }
 }

@@ -4,7 +4,9 @@ import { make, redraw } from "./dom.js";
 
 /** Draws a lamp for camera, lens and loop into `list`. */
 export function drawDevices(list, status) {
-  const loop = `${status.steps_per_second.toFixed(0)} steps/s · ${milliseconds(status.latency_p50_micros)} ms median, ${milliseconds(status.latency_p99_micros)} ms p99`;
+  const hidden = status.latency_p50_micros === null;
+  const latency = hidden ? "timing hidden" : `${milliseconds(status.latency_p50_micros)} ms median, ${milliseconds(status.latency_p99_micros)} ms p99`;
+  const loop = `${status.steps_per_second.toFixed(0)} steps/s · ${latency}`;
   redraw(list, [
     lamp(status.camera.name, `${status.camera.fps.toFixed(1)} fps${status.camera.lost > 0 ? ` · ${status.camera.lost} lost` : ""}`, status.camera.working ? (status.camera.simulated ? "warn" : "") : "bad", status.camera.message),
     lamp(status.lens.name, status.lens.working ? "" : "not answering", status.lens.working ? (status.lens.simulated || status.lens.caution ? "warn" : "") : "bad", status.lens.message),

@@ -27,8 +27,17 @@ export function askIn(dialog, trouble, done) {
   dialog.showModal();
 }
 
+/** Asks in the page's reason dialog whether something is meant. `ask` is `{ heading, consequence, go, done() }`. */
+export function askWhetherMeant(ask) {
+  open({ ...ask, unreasoned: true });
+}
+
 /** Asks for a reason in the page's reason dialog. `ask` is `{ heading, consequence, go, danger, done(reason) }`. */
 export function askReason(ask) {
+  open(ask);
+}
+
+function open(ask) {
   const dialog = document.getElementById("reason-dialog");
   const go = document.getElementById("reason-go");
   setText(document.getElementById("reason-heading"), ask.heading);
@@ -36,6 +45,8 @@ export function askReason(ask) {
   setText(go, ask.go);
   go.className = ask.danger ? "danger filled" : "primary";
   const reason = document.getElementById("reason");
+  document.getElementById("reason-field").hidden = ask.unreasoned ?? false;
+  reason.required = !ask.unreasoned;
   reason.value = "";
   askIn(dialog, document.getElementById("reason-trouble"), () => ask.done(reason.value.trim()));
 }

@@ -40,8 +40,8 @@ export function uuid() {
   return hex.replace(/^(.{8})(.{4})(.{4})(.{4})(.{12})$/, "$1-$2-$3-$4-$5");
 }
 
-/** Seconds as `1:05`. */
-export function clockText(seconds) {
-  const whole = Math.max(0, Math.ceil(seconds));
+/** Seconds as `1:05`: those gone by, counted when whole; with `Math.ceil`, those left. */
+export function clockText(seconds, round = Math.floor) {
+  const whole = Math.max(0, round(seconds));
   return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
 }

@@ -1,13 +1,15 @@
 // The operator's page: the devices, who focuses, and the session from preparing it to its end.
 
-import { get, inWords, post } from "./api.js";
+import { get, heardAgain, post, Refused, tellTrouble } from "./api.js";
 import { drawCamera } from "./camera.js";
-import { askIn, askReason } from "./dialogs.js";
+import { askIn, askReason, askWhetherMeant } from "./dialogs.js";
 import { byId, clockText, make, redraw, setText } from "./dom.js";
 import { drawDevices, drawDeviceWords, drawWarnings } from "./devices.js";
 import { mountViewer } from "./viewer.js";
 
 const BY_HAND = "by-hand";
+/** What the list of policies shows while nobody is told which one runs. */
+const UNTOLD = "";
 const viewer = mountViewer(byId("view"), { role: "operator", traces: byId("traces") });
 let session = null;
 let choices = null;
@@ -28,15 +30,27 @@ function followStatus(next) {
 }
 
 function drawFocus() {
-  const busy = session !== null;
-  byId("focus-controls").disabled = busy;
+  // The status that tells again comes after the word that the session is closed.
+  const untold = session !== null || status.focal_power === null;
+  const wasUntold = byId("policy").value === UNTOLD;
+  byId("focus-controls").disabled = untold;
+  byId("traces-hidden").hidden = !untold;
+  if (untold) return drawUntold();
   const power = status.focal_power.toFixed(3);
-  setText(byId("focus-now"), busy ? "The session decides until it is closed." : `focal power ${power}`);
-  if (dragging || busy) return;
+  setText(byId("focus-now"), `focal power ${power}`);
+  if (dragging) return;
   byId("policy").value = status.policy ?? BY_HAND;
-  if (status.policy === null) return;
+  if (status.policy === null && !wasUntold) return;
   byId("focal-power").value = status.focal_power;
   setText(byId("focal-power-value"), power);
+}
+
+/** Nothing of before the session stays, which would look as if it held now. */
+function drawUntold() {
+  setText(byId("focus-now"), "The session decides until it is closed.");
+  byId("policy").value = UNTOLD;
+  byId("focal-power").value = 0.5;
+  setText(byId("focal-power-value"), "");
 }
 
 async function focus(order) {
@@ -44,7 +58,7 @@ async function focus(order) {
     await post("/api/operator/focus", order);
     setText(byId("focus-trouble"), "");
   } catch (error) {
-    setText(byId("focus-trouble"), inWords(error));
+    tellTrouble(byId("focus-trouble"), error);
   }
 }
 
@@ -76,6 +90,7 @@ const PHASES = {
 };
 
 function followSession(next) {
+  if (session && !next) refresh();
   session = next;
   endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
   byId("new-session").hidden = session !== null;
@@ -105,38 +120,50 @@ function drawBadges() {
 
 function drawTime() {
   const inspecting = session?.phase === "inspecting" && endsAt !== null;
-  setText(byId("remaining"), !inspecting ? "" : session.paused ? "clock stopped" : `${clockText((endsAt - performance.now()) / 1000)} left`);
+  setText(byId("remaining"), !inspecting ? "" : session.paused ? "clock stopped" : `${clockText((endsAt - performance.now()) / 1000, Math.ceil)} left`);
 }
 
 function drawActions() {
   const { phase, paused, setting } = session;
   const buttons = [];
   const add = (label, onclick, className = "") => buttons.push(make("button", { type: "button", className, onclick }, label));
-  if (phase === "ready") add("Start", () => act({ action: "start" }), "primary");
-  if (paused) add("Resume", () => act({ action: "resume" }), "primary");
-  else if (phase === "inspecting") add(`End setting ${setting} now`, () => act({ action: "finish-segment", segment: session.segment }));
+  if (phase === "ready") add("Start", () => act("start"), "primary");
+  if (paused) add("Resume", () => act("resume"), "primary");
+  else if (phase === "inspecting") add(`End setting ${setting} now…`, endSetting);
   if (!paused && phase !== "ready" && !over(session)) add("Pause…", pause);
   if (over(session)) add("Close and prepare the next", dismiss, "primary");
   else add("Abort…", abort, "danger");
   redraw(byId("session-actions"), buttons);
 }
 
+function endSetting() {
+  const { session: shown, segment, setting } = session;
+  askWhetherMeant({
+    heading: `End setting ${setting} now`,
+    consequence: "The surgeon’s time with this setting ends for good; the questions about it follow. Comments on it are still kept.",
+    go: `End setting ${setting}`,
+    done: () => send(shown, { action: "finish-segment", segment }),
+  });
+}
+
 function pause() {
+  const { session: shown } = session;
   askReason({
     heading: "Pause the session",
     consequence: "The clock stops and the lens holds still. The surgeon sees that the session is paused and can still comment.",
     go: "Pause",
-    done: (reason) => send({ action: "pause", reason }),
+    done: (reason) => send(shown, { action: "pause", reason }),
   });
 }
 
 function abort() {
+  const { session: shown } = session;
   askReason({
     heading: "Abort the session",
     consequence: "The session ends for good and cannot be taken up again. Everything said and answered so far is kept.",
     go: "Abort session",
     danger: true,
-    done: (reason) => send({ action: "abort", reason }),
+    done: (reason) => send(shown, { action: "abort", reason }),
   });
 }
 
@@ -144,19 +171,22 @@ async function dismiss() {
   try {
     followSession(await post("/api/operator/dismissals", { session: session.session }));
   } catch (error) {
-    setText(byId("session-trouble"), inWords(error));
+    tellTrouble(byId("session-trouble"), error);
   }
 }
 
-const send = async (action) => followSession(await post("/api/operator/actions", { session: session.session, ...action }));
+/** Does `action` on the session that was shown when it was asked for: another operator may have closed that one. */
+async function send(shown, action) {
+  if (session?.session !== shown) throw new Refused(409, "This session was closed meanwhile: nothing was done.", true);
+  followSession(await post("/api/operator/actions", { session: shown, ...action }));
+}
 
 async function act(action) {
   try {
-    await send(action);
+    await send(session?.session, { action });
     setText(byId("session-trouble"), "");
   } catch (error) {
-    setText(byId("session-trouble"), inWords(error));
-    refresh();
+    tellTrouble(byId("session-trouble"), error);
   }
 }
 
@@ -176,20 +206,22 @@ function drawFeed() {
 /* Preparing a session */
 
 function fill(select, options, chosen) {
-  select.replaceChildren(...options.map(({ value, label, disabled }) => make("option", { value, disabled: disabled ?? false, selected: value === chosen }, label)));
+  select.replaceChildren(...options.map(({ value, label, disabled = false, hidden = false }) => make("option", { value, disabled, hidden, selected: value === chosen }, label)));
 }
 
 function drawChoices(participant = byId("participant").value) {
   fill(byId("participant"), choices.participants.map((code) => ({ value: code, label: code })), participant);
   fill(byId("protocol"), choices.protocols.map(({ name, researcher_title: label }) => ({ value: name, label })), byId("protocol").value);
   const policies = choices.policies.map(({ name, available }) => ({ value: name, label: available ? name : `${name} (no weights)`, disabled: !available }));
-  fill(byId("policy"), [{ value: BY_HAND, label: "By hand" }, ...policies], status?.policy ?? BY_HAND);
+  fill(byId("policy"), [{ value: UNTOLD, label: "Not told during a session", hidden: true }, { value: BY_HAND, label: "By hand" }, ...policies], byId("policy").value);
+  if (status) drawFocus();
   drawSummary();
 }
 
 function drawSummary() {
   const protocol = choices.protocols.find(({ name }) => name === byId("protocol").value);
-  const length = protocol && `${protocol.settings} settings of at most ${clockText(protocol.segment_seconds)}`;
+  // With its title: the list cuts long ones off.
+  const length = protocol && `${protocol.researcher_title}: ${protocol.settings} settings of at most ${clockText(protocol.segment_seconds)}`;
   setText(byId("protocol-summary"), protocol ? `${length}${protocol.practice ? "; practice, kept apart from real data" : ""}.` : "");
 }
 
@@ -200,9 +232,11 @@ byId("new-session").addEventListener("submit", async (event) => {
     followSession(await post("/api/operator/sessions", { participant: byId("participant").value, protocol: byId("protocol").value }));
     setText(byId("session-trouble"), "");
   } catch (error) {
-    setText(byId("session-trouble"), inWords(error));
+    tellTrouble(byId("session-trouble"), error);
   }
 });
+// Another operator may have added participants.
+for (const way of ["pointerenter", "focus"]) byId("participant").addEventListener(way, refresh);
 byId("add-participant").onclick = () =>
   askIn(byId("participant-dialog"), byId("participant-trouble"), async () => {
     const code = byId("code").value.trim();
@@ -238,15 +272,24 @@ viewer.addEventListener("frame", ({ detail }) => {
 });
 
 async function refresh() {
+  const before = choices;
   try {
-    choices = await get("/api/operator/choices");
+    const now = await get("/api/operator/choices");
+    // A list that is open is drawn anew only for news, and never for what was so before a participant was added here.
+    if (choices !== before || JSON.stringify(now) === JSON.stringify(choices)) return;
+    choices = now;
     drawChoices();
   } catch (error) {
-    setText(byId("session-trouble"), inWords(error));
+    tellTrouble(byId("session-trouble"), error);
   }
 }
 
 viewer.live.addEventListener("session", (event) => followSession(event.detail));
 viewer.live.addEventListener("status", (event) => followStatus(event.detail));
+viewer.live.addEventListener("connection", ({ detail: { open } }) => {
+  if (!open) return;
+  heardAgain();
+  refresh();
+});
 setInterval(drawTime, 250);
 refresh();

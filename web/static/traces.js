@@ -22,6 +22,7 @@ export class Traces {
   #beliefOn = false;
 
   constructor(element) {
+    this.#context.canvas.setAttribute("aria-hidden", "true");
     element.append(this.#context.canvas);
     element.hidden = true;
     onResize(this.#context.canvas, () => this.#draw());
@@ -35,8 +36,12 @@ export class Traces {
     this.#draw();
   }
 
-  /** Keeps what came with a frame that was exposed at `time` (milliseconds). */
+  /** Keeps what came with a frame that was exposed at `time` (milliseconds). While a session is under way nothing does. */
   add({ asked, measured, metric, belief }, time) {
+    if (asked === null) {
+      this.#points = [];
+      return this.#draw();
+    }
     this.#points.push({ time, asked, measured, metric });
     this.#belief = belief;
     const past = this.#points.findIndex((point) => point.time > time - SECONDS * 1000);
