@@ -24,7 +24,7 @@ pub(super) struct SurgeonFrame {
     frame: u64,
     /// The server's run that counted it.
     run: i64,
-    /// Milliseconds from the end of the exposure to sending; for a surgeon in steps of ten.
+    /// Milliseconds from the end of the exposure to sending; in whole hundreds for who must not know the policy.
     age: f64,
     /// Width in pixels.
     width: usize,
@@ -87,14 +87,19 @@ impl SurgeonStatus {
     }
 }
 
+/// A picture's age in whole hundreds of milliseconds. It holds the policy's own time, from hundredths of a millisecond to
+/// some milliseconds on a busy machine; a page wants to know only whether the picture is older than half a second.
+pub(super) fn coarse(age_ms: f64) -> f64 {
+    (age_ms / 100.0).floor() * 100.0
+}
+
 impl Audience for ForSurgeon {
     type Header = SurgeonFrame;
     type Session = SurgeonView;
     type Status = SurgeonStatus;
 
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> SurgeonFrame {
-        // The age holds the policy's own time, some hundredths of a millisecond; in steps of ten it does not show.
-        SurgeonFrame::new(&frame.picture, (age_ms / 10.0).round() * 10.0, app)
+        SurgeonFrame::new(&frame.picture, coarse(age_ms), app)
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<SurgeonView>>> {
@@ -103,5 +108,16 @@ impl Audience for ForSurgeon {
 
     fn status(status: &ControlStatus, _: &App) -> SurgeonStatus {
         SurgeonStatus::new(status)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_age_does_not_show_how_long_a_policy_took() {
+        assert!([3.1, 9.9, 24.0].into_iter().all(|age| coarse(age) == 0.0));
+        assert!((coarse(612.4) - 600.0).abs() < 1e-9);
     }
 }

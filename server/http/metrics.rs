@@ -1,4 +1,5 @@
-//! `/metrics`: counters for Prometheus. For operator and researcher; nothing in it is told apart by policy.
+//! `/metrics`: counters for Prometheus. For operator and researcher; nothing in it is told apart by policy, and the loop's
+//! latency, from which one may be guessed, is left out while a session is under way.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -61,8 +62,10 @@ fn collect(app: &App) -> Registry {
     registry.register("frames_sent", "Frames sent to viewers", app.metrics.frames_sent.clone());
     registry.register_with_unit("stream", "Frames sent to viewers", Unit::Bytes, app.metrics.bytes_sent.clone());
     registry.register("viewers", "Viewers that want pictures now", ConstGauge::new(counts.viewers()));
-    let latency = counts.latency().clone();
-    registry.register_with_unit("latency", "Time from exposure to lens command", Unit::Seconds, latency);
+    if !app.blinded() {
+        let latency = counts.latency().clone();
+        registry.register_with_unit("latency", "Time from exposure to lens command", Unit::Seconds, latency);
+    }
     let gauges = [
         ("steps_per_second", "Steps of the control loop over the last second", status.steps_per_second),
         ("camera_fps", "Frames a second from the camera", status.camera.fps),

@@ -133,20 +133,23 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
 }
 
 #[tokio::test]
-async fn during_a_session_the_operator_is_not_told_the_policy_either() {
+async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart() {
     let server = Server::start();
     let session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
     let mut page = Page::open(&server, "operator").await;
     session.operator("/api/operator/focus", json!({"policy": "parfocal"})).await;
     page.until_belief().await;
     session.operator("/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
-    page.until(|told| told["policy"] == "mgm-hill-climber").await;
+    page.until(|told| told["policy"] == "mgm-hill-climber" && told["latency_p50_micros"].is_number()).await;
+    assert!(metrics(&session).await.contains("latency"));
     session.operator("/api/operator/participants", json!({"code": "S01"})).await;
     session.operator("/api/operator/sessions", json!({"participant": "S01", "protocol": "paper"})).await;
     page.until(|told| told["type"] == "session" && !told["view"].is_null()).await;
     page.until(|told| told["type"] == "status" && told["policy"].is_null()).await;
     page.heard.clear();
     page.watch(5).await;
+    page.until(|told| told["type"] == "status").await;
+    assert!(!metrics(&session).await.contains("latency"), "how long a step takes tells a network from a hill-climber");
     let told: Vec<_> = page.heard.iter().map(|message| format!("{message:?}")).collect();
     assert!(told.iter().all(|told| !told.contains("climber")), "{told:?}");
     let frames = page.heard.iter().filter_map(|heard| match heard {
@@ -154,8 +157,25 @@ async fn during_a_session_the_operator_is_not_told_the_policy_either() {
         Heard::Text(_) => None,
     });
     for header in frames {
-        assert!(header["asked"].is_number() && header["metric"].is_null() && header["belief"].is_null(), "{header}");
+        for telling in ["asked", "measured", "metric", "belief"] {
+            assert!(header[telling].is_null(), "{telling} in {header}");
+        }
+        assert!(header["age"].as_f64().unwrap() % 100.0 == 0.0, "{header}");
     }
+    let states = page.heard.iter().filter_map(|heard| match heard {
+        Heard::Text(text) => Some(serde_json::from_str::<Value>(text).unwrap()).filter(|told| told["type"] == "status"),
+        Heard::Frame(_) => None,
+    });
+    for state in states {
+        for telling in ["policy", "focal_power", "latency_p50_micros", "latency_p99_micros"] {
+            assert!(state[telling].is_null(), "{telling} in {state}");
+        }
+        assert_eq!(state["lens"]["working"], true, "that the lens works is the operator's business");
+    }
+}
+
+async fn metrics(session: &Session<'_>) -> String {
+    session.ask("operator", Method::GET, "/metrics", &Value::Null).await.1
 }
 
 /// The names of all fields, and whether there is a content area.
