@@ -18,13 +18,16 @@ use super::error::{Error, ErrorBody};
 use super::roles::Researcher;
 use super::security::Nonce;
 use crate::autofocus::PolicyName;
-use crate::conductor::{AnswerLine, SessionDetail, Timeline};
+use crate::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
 use crate::ids::SessionId;
 use crate::store::{SessionLine, SessionStatus};
 use crate::trial::view::{Action, AnswerValue, Role};
 
 /// Points of the focal path for each setting: about as many as there are pixels to draw them on.
 const POINTS: u32 = 600;
+
+/// What stands where an answer is missing.
+const NO_ANSWER: &str = "–";
 
 /// When a session was made, on the clock of the room.
 pub(super) fn made(line: &SessionLine) -> String {
@@ -64,8 +67,10 @@ async fn list_page(_: Researcher, State(app): State<AppState>) -> Result<Html<St
 struct SessionPage {
     nonce: String,
     detail: SessionDetail,
-    /// Questions after a setting, each with its answer in every setting.
+    /// Questions after a setting, each with its answer in every setting: those answered by a number.
     questions: Vec<QuestionRow>,
+    /// Those answered in words, which no column holds.
+    written: Vec<QuestionRow>,
     closing: Vec<AnswerLine>,
 }
 
@@ -73,13 +78,23 @@ struct SessionPage {
 struct QuestionRow {
     text: String,
     answers: Vec<String>,
+    /// Whether the answers are words.
+    written: bool,
+}
+
+impl QuestionRow {
+    /// The settings that were answered, each with the answer.
+    fn given(&self) -> impl Iterator<Item = (usize, &String)> {
+        (1..).zip(&self.answers).filter(|(_, answer)| *answer != NO_ANSWER)
+    }
 }
 
 impl SessionPage {
     fn new(nonce: String, detail: SessionDetail) -> Self {
         let (asked, closing): (Vec<_>, _) = detail.answers.iter().cloned().partition(|answer| answer.setting.is_some());
-        let questions = questions(&asked, detail.settings_detail.len());
-        Self { nonce, detail, questions, closing }
+        let all = questions(&asked, detail.settings_detail.len());
+        let (written, questions) = all.into_iter().partition(|question| question.written);
+        Self { nonce, detail, questions, written, closing }
     }
 
     /// The policy of `setting`, once it was told.
@@ -98,7 +113,9 @@ fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
     let mut rows: Vec<QuestionRow> = Vec::new();
     for answer in answers {
         let place = *places.entry(&answer.question).or_insert_with(|| {
-            rows.push(QuestionRow { text: answer.text.clone(), answers: vec!["–".to_owned(); settings] });
+            let written = matches!(answer.value, AnswerValue::Text(_));
+            let answers = vec![NO_ANSWER.to_owned(); settings];
+            rows.push(QuestionRow { text: answer.text.clone(), answers, written });
             rows.len() - 1
         });
         let cell = answer.setting.and_then(|setting| rows[place].answers.get_mut(setting.wrapping_sub(1)));
@@ -119,7 +136,7 @@ pub(super) fn in_words(value: &AnswerValue) -> String {
 
 /// An item still open has no point.
 fn point_in_words(point: u8) -> String {
-    if point == 0 { "–".to_owned() } else { point.to_string() }
+    if point == 0 { NO_ANSWER.to_owned() } else { point.to_string() }
 }
 
 /// One session.
@@ -132,7 +149,10 @@ async fn session_page(
     Nonce(nonce): Nonce,
     Path(id): Path<SessionId>,
 ) -> Result<Html<String>, Error> {
-    let detail = app.conductor.session_detail(id).await?;
+    let detail = app.conductor.session_detail(id).await.map_err(|error| match error {
+        ConductError::NotFound(_) => Error::NotFound("There is no such session here.".to_owned()),
+        error => error.into(),
+    })?;
     SessionPage::new(nonce, detail).render().map(Html).map_err(|_| Error::Internal)
 }
 
