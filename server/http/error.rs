@@ -27,10 +27,12 @@ pub enum Error {
     #[error("{0}")]
     Invalid(String),
     /// The browser has not been let in to this role.
-    #[error("This page is for the {}. Open it with the {}'s link, which the server printed when it started.", role_name(*.0), role_name(*.0))]
+    #[error("This page is for the {role}. Open it with the {role}'s link{}.", whence(*.0), role = role_name(*.0))]
     NeedsRole(Role),
     /// The key in the link is not one of this server's.
-    #[error("This link is not, or no longer, valid. Ask for the link that the server printed when it last started.")]
+    #[error(
+        "This link is not, or no longer, valid. A surgeon gets the link from the operator; the server printed all of them when it last started."
+    )]
     WrongKey,
     /// Another role does this.
     #[error("{0}")]
@@ -118,6 +120,8 @@ pub async fn render(request: Request, next: Next) -> Response {
     let error = parts.extensions.remove::<Error>();
     let message = match &error {
         Some(error) => error.to_string(),
+        // What a parser said of an address is for programmers.
+        None if page && status == StatusCode::BAD_REQUEST => MISSPELLED.to_owned(),
         None => message_of(status, &parts.headers, body).await,
     };
     parts.headers.remove(CONTENT_LENGTH);
@@ -136,13 +140,17 @@ pub async fn render(request: Request, next: Next) -> Response {
     }
 }
 
+const MISSPELLED: &str =
+    "This address is incomplete or misspelled. Open the link once more as you were given it, or go to the start page.";
+
 fn wants_page(headers: &HeaderMap) -> bool {
     headers.get(ACCEPT).and_then(|accept| accept.to_str().ok()).is_some_and(|accept| accept.contains("text/html"))
 }
 
 /// The words of a failure that another layer made: its own if it gave any, else what the status means.
 async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::Body) -> String {
-    let is_text = headers.get(CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"text/plain"));
+    let is_text = status != StatusCode::PAYLOAD_TOO_LARGE
+        && headers.get(CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"text/plain"));
     if is_text
         && let Ok(bytes) = to_bytes(body, 4096).await
         && let Ok(text) = String::from_utf8(bytes.into())
@@ -153,7 +161,7 @@ async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::B
     match status {
         StatusCode::NOT_FOUND => "There is nothing at this address.".into(),
         StatusCode::METHOD_NOT_ALLOWED => "This address does not take this kind of request.".into(),
-        StatusCode::PAYLOAD_TOO_LARGE => "What was sent is too large.".into(),
+        StatusCode::PAYLOAD_TOO_LARGE => "That is too long to be kept in one piece.".into(),
         StatusCode::REQUEST_TIMEOUT => "The server took too long; try again.".into(),
         other => other.canonical_reason().unwrap_or("The request failed.").into(),
     }
@@ -166,6 +174,14 @@ fn title_of(status: StatusCode) -> &'static str {
         StatusCode::CONFLICT => "That does not fit just now",
         status if status.is_server_error() => "The server failed",
         _ => "That did not work",
+    }
+}
+
+/// Where the link of `role` is to be had: a surgeon has not seen the server start.
+const fn whence(role: Role) -> &'static str {
+    match role {
+        Role::Surgeon => ": the operator has it",
+        _ => ", which the server printed when it started",
     }
 }
 

@@ -80,9 +80,13 @@ impl FromRequestParts<AppState> for Roles {
 }
 
 fn holds(parts: &Parts, app: &App, role: Role) -> bool {
+    shows_key(parts, app, role) || (role == Role::Operator && app.loopback_only && sits_at_the_machine(parts))
+}
+
+/// By its cookie or its bearer token.
+fn shows_key(parts: &Parts, app: &App, role: Role) -> bool {
     cookie(parts, cookie_name(role)).is_some_and(|token| app.keys.opens(role, token))
         || bearer(parts).is_some_and(|key| app.keys.role_of(key) == Some(role))
-        || (role == Role::Operator && app.loopback_only && sits_at_the_machine(parts))
 }
 
 const fn cookie_name(role: Role) -> &'static str {
@@ -148,10 +152,12 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
 #[utoipa::path(get, path = "/", tag = "roles", responses(
     (status = 303, description = "On to the role's page"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
-async fn start(roles: Roles) -> Result<Redirect, Error> {
+async fn start(roles: Roles, State(app): State<AppState>, parts: Parts) -> Redirect {
+    // Whoever sits at the machine is its operator, also who was let in there by the surgeon's link: the link counts.
+    let by_key: Vec<_> = roles.0.iter().copied().filter(|role| shows_key(&parts, &app, *role)).collect();
+    let held = if by_key.is_empty() { roles.0 } else { by_key };
     // Whoever holds more than one role works here rather than being a subject of the trial.
-    let role = roles.0.iter().copied().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon);
-    Ok(Redirect::to(home(role)))
+    Redirect::to(home(held.into_iter().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)))
 }
 
 /// The routes of this file.

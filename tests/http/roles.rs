@@ -107,7 +107,7 @@ async fn a_link_becomes_a_strict_cookie_and_leaves_the_address() {
     let response = wrong.send().await.unwrap();
     assert_eq!(response.status(), StatusCode::FORBIDDEN);
     assert!(response.headers().get(SET_COOKIE).is_none());
-    assert!(response.text().await.unwrap().contains("Ask for the link"));
+    assert!(response.text().await.unwrap().contains("gets the link from the operator"));
 }
 
 #[tokio::test]
@@ -170,4 +170,17 @@ async fn a_page_opened_from_another_site_is_asked_for_once_more() {
     assert!(!direct.contains("http-equiv=\"refresh\""));
     let linked = page.header("sec-fetch-site", "cross-site").send().await.unwrap().text().await.unwrap();
     assert!(linked.contains("http-equiv=\"refresh\""));
+}
+
+#[tokio::test]
+async fn on_the_machine_itself_the_start_page_is_that_of_the_link_that_let_one_in() {
+    let server = Server::start();
+    let start = async |cookie: &str| {
+        let response = server.get("/").header(COOKIE, cookie).send().await.unwrap();
+        response.headers()[LOCATION].to_str().unwrap().to_owned()
+    };
+    assert_eq!(start("").await, "/operator");
+    let (surgeon, researcher) = (cookie(&server, "surgeon").await, cookie(&server, "researcher").await);
+    assert_eq!(start(&surgeon).await, "/surgeon");
+    assert_eq!(start(&format!("{surgeon}; {researcher}")).await, "/researcher");
 }

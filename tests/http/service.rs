@@ -109,6 +109,19 @@ async fn failures_are_pages_for_browsers_and_json_for_programs() {
 
     let query: Value = server.get("/enter").send().await.unwrap().json().await.unwrap();
     assert!(query["error"].as_str().unwrap().contains("key"), "{query}");
+
+    for (path, words) in [
+        ("/enter", "incomplete or misspelled"),
+        ("/enter?key=nonsense", "from the operator"),
+        ("/surgeon", "the operator has it"),
+        ("/researcher/sessions/nonsense", "incomplete or misspelled"),
+        ("/researcher/sessions/00000000-0000-4000-8000-000000000000", "There is no such session here."),
+    ] {
+        let request = server.get(path).header("accept", "text/html");
+        let request = if path.contains("sessions") { request.bearer_auth(server.key("researcher")) } else { request };
+        let text = request.send().await.unwrap().text().await.unwrap();
+        assert!(text.contains(words), "{path}: {text}");
+    }
 }
 
 #[tokio::test]
