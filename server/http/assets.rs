@@ -48,6 +48,7 @@ static ASSETS: &[Asset] = &assets![
     "surgeon.js",
     "timeline.js",
     "traces.js",
+    "twice.js",
     "viewer.css",
     "viewer.js",
 ];

@@ -7,6 +7,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::blinding;
 use crate::screenshots::shoot;
+use crate::support::client;
 use crate::theatre::Theatre;
 use crate::webdriver::Driver;
 
@@ -19,6 +20,7 @@ async fn practice_a_time_limit_an_emergency_and_an_abort() {
     let theatre = Theatre::open(&driver).await;
     the_belief_of_a_policy_that_has_one(&theatre).await;
     practice(&theatre).await;
+    beside_another_operator(&theatre).await;
     a_link_that_breaks_without_a_word(&theatre).await;
     time_limit(&theatre).await;
     let researcher = emergency_unblinding(&theatre).await;
@@ -29,7 +31,7 @@ async fn practice_a_time_limit_an_emergency_and_an_abort() {
         assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
     }
     let seen = blinding::check(&theatre.proxy.recorded());
-    assert_eq!(seen.segments.len(), 5);
+    assert_eq!(seen.segments.len(), 6);
     assert!(seen.texts > 40 && seen.pictures > 40, "{} texts, {} pictures", seen.texts, seen.pictures);
 }
 
@@ -67,6 +69,31 @@ async fn practice(theatre: &Theatre<'_>) {
     surgeon.sees("#panel h2", "Thank you").await;
     operator.sees("#session-actions", "Close and prepare the next").await;
     operator.click("#session-actions .primary").await;
+    surgeon.sees("#panel", "No trial is under way").await;
+}
+
+/// Another operator closes the session while this one is asked why to pause it, and adds a participant.
+async fn beside_another_operator(theatre: &Theatre<'_>) {
+    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    theatre.begin("S-07", "practice").await;
+    surgeon.sees("#change-what", "This is the first setting.").await;
+    operator.sees("#session-actions button:first-child", "Pause").await;
+    operator.click("#session-actions button:first-child").await;
+    let other = async |path: &str, body: Value| {
+        let request = client().post(theatre.server.url(path)).bearer_auth(theatre.server.key("operator"));
+        request.json(&body).send().await.unwrap().error_for_status().unwrap().text().await.unwrap()
+    };
+    other("/api/operator/participants", json!({ "code": "S-08" })).await;
+    let view = client().get(theatre.server.url("/api/operator/session")).bearer_auth(theatre.server.key("operator"));
+    let session = view.send().await.unwrap().json::<Value>().await.unwrap()["session"].clone();
+    let abort = json!({ "session": session, "action": "abort", "reason": "By the other" });
+    other("/api/operator/actions", abort).await;
+    other("/api/operator/dismissals", json!({ "session": session })).await;
+    operator.sees("#new-session", "Prepare session").await;
+    theatre.give_reason("Too late").await;
+    operator.sees("#reason-trouble", "This session was closed meanwhile").await;
+    operator.click("#reason-dialog [data-close]").await;
+    operator.sees("#participant", "S-08").await;
     surgeon.sees("#panel", "No trial is under way").await;
 }
 
@@ -166,7 +193,8 @@ async fn database(theatre: &Theatre<'_>) {
     let sessions: Vec<(String, bool, i64)> = sessions.iter().map(|row| (row.get(0), row.get(1), row.get(2))).collect();
     assert_eq!(
         sessions,
-        [("practice".to_owned(), true, 1), ("practice".to_owned(), true, 0), ("limited".to_owned(), false, 2),]
+        [("practice", true, 1), ("practice", true, 0), ("practice", true, 0), ("limited", false, 2)]
+            .map(|(protocol, practice, comments)| (protocol.to_owned(), practice, comments))
     );
     let sql =
         "SELECT kind, role, payload FROM events NATURAL JOIN (SELECT session FROM sessions WHERE protocol = 'limited')

@@ -70,12 +70,12 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         const outbox = new Outbox();
         answers.push(Promise.resolve(ours(404)));
         const refused = saved(outbox);
-        outbox.add("/comments", { value: "b" });
+        outbox.add("/comments", { session: "s", value: "b" });
         await refused;
-        const after = kept();
+        const after = [kept(), outbox.refused("s").length, outbox.refused("t").length];
         const next = new Outbox();
         await saved(next);
-        return [posted, after, kept()];
+        return [posted, ...after, kept(), next.refused("s").length];
     "#;
-    assert_eq!(run(&page, script).await, json!([["b", "b"], 1, 0]));
+    assert_eq!(run(&page, script).await, json!([["b", "b"], 1, 1, 0, 0, 0]));
 }

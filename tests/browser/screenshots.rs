@@ -22,7 +22,8 @@ pub async fn shoot(browser: &Browser<'_>, name: &str) {
     resize(browser, width, height).await;
 }
 
-async fn resize(browser: &Browser<'_>, width: u32, height: u32) {
+/// Gives the page this size, as a turned tablet or its keyboard does, and waits until it is drawn.
+pub async fn resize(browser: &Browser<'_>, width: u32, height: u32) {
     let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
     browser.tools("Emulation.setDeviceMetricsOverride", size).await;
     // Two frames: one in which the page lays itself out anew, one in which what watches its size has drawn.

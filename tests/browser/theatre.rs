@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rustix::process::Signal;
-use serde_json::json;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::proxy::Proxy;
@@ -120,15 +120,31 @@ impl<'a> Theatre<'a> {
         self.surgeon.sees("#comment-state", &told).await;
     }
 
+    /// Height of the live picture's place on the surgeon's page.
+    pub async fn picture_height(&self) -> Value {
+        let height = "return document.getElementById('view').getBoundingClientRect().height";
+        self.surgeon.run(height, json!([])).await
+    }
+
     /// What stands in the comment box.
     pub async fn comment_box(&self) -> String {
         let value = self.surgeon.run("return document.getElementById('comment').value", json!([])).await;
         value.as_str().unwrap().to_owned()
     }
 
-    /// The surgeon is done with the setting, answers `point` to its question, writes a remark, and goes on.
-    pub async fn finish_setting(&self, point: u8) {
+    /// The surgeon is done with the setting: by two taps, the second as late as it takes to be meant.
+    pub async fn finish(&self) {
         self.surgeon.click("#finish").await;
+        until("the setting to be finished", || async {
+            self.surgeon.try_click("#finish").await;
+            self.surgeon.text("#finish").await.is_empty()
+        })
+        .await;
+    }
+
+    /// The surgeon is done with the setting, answers `point` to its question, and goes on.
+    pub async fn finish_setting(&self, point: u8) {
+        self.finish().await;
         self.answer_questions(point).await;
     }
 

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use crate::aftermath::{database, export, researcher};
 use crate::blinding;
-use crate::screenshots::shoot;
+use crate::screenshots::{resize, shoot};
 use crate::theatre::{Theatre, kill, start_again};
 use crate::wait::until;
 use crate::webdriver::Driver;
@@ -76,13 +76,26 @@ async fn first_setting_typed_comments(theatre: &Theatre<'_>) {
     theatre.say("Loses the fissure", 2).await;
     surgeon.sees("#prompt", "How does the focus feel now?").await;
     shoot(surgeon, "surgeon-4-inspecting").await;
+    resize(surgeon, 820, 780).await;
+    let width = surgeon.run("return document.getElementById('comment').offsetWidth", json!([])).await;
+    assert!(
+        width.as_f64() > Some(700.0),
+        "beside an upright tablet's keyboard there is as much room to write: {width}"
+    );
+    resize(surgeon, 1180, 820).await;
     theatre.operator.sees("#comments", "Follows me well 🧠").await;
     theatre.operator.sees("#phase", "Setting 1 of 6: inspecting").await;
+    theatre.operator.sees("#traces-hidden", "hidden while a session runs").await;
+    theatre.operator.sees("#devices", "timing hidden").await;
+    let shown =
+        theatre.operator.run("return document.getElementById('policy').selectedOptions[0].text", json!([])).await;
+    assert_eq!(shown, "Not told during a session");
     shoot(&theatre.operator, "operator-3-inspecting").await;
-    surgeon.click("#finish").await;
+    theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
     surgeon.click(".questions .done button").await;
     surgeon.sees("#missing", "One question is still open").await;
+    surgeon.sees("[data-question=sharpness] > .state", "Not answered yet").await;
     theatre.choose("sharpness", 3).await;
     theatre.choose("sharpness", 5).await;
     surgeon.click("[data-question=remarks] textarea").await;
@@ -99,7 +112,12 @@ async fn second_setting_quick_comments_and_double_taps(theatre: &Theatre<'_>) {
     surgeon.run(twice, json!(["#mark"])).await;
     theatre.sees_saved(4).await;
     surgeon.run(twice, json!(["#finish"])).await;
-    theatre.answer_questions(2).await;
+    surgeon.sees("#finish", "Tap again to finish").await;
+    surgeon.sees("#finish-heard", "Tap again to finish").await;
+    shoot(surgeon, "surgeon-14-finish").await;
+    surgeon.sees("#finish", "Done with this setting").await;
+    surgeon.sees("#remaining", "left").await;
+    theatre.finish_setting(2).await;
 }
 
 async fn third_setting_reload_and_second_tab(theatre: &Theatre<'_>) {
@@ -111,7 +129,7 @@ async fn third_setting_reload_and_second_tab(theatre: &Theatre<'_>) {
     until("the draft to be back", || async { theatre.comment_box().await == "Half a thought" }).await;
     let first = surgeon.new_tab(&format!("http://{}/surgeon", theatre.proxy.address)).await;
     surgeon.sees("#setting", "Setting 3 of 6").await;
-    surgeon.click("#finish").await;
+    theatre.finish().await;
     surgeon.sees("#panel h2", "Setting 3: a few questions").await;
     surgeon.close_tab(&first).await;
     // The stale tab follows by itself, and its draft is still about setting 3.
@@ -124,12 +142,15 @@ async fn third_setting_reload_and_second_tab(theatre: &Theatre<'_>) {
 async fn fourth_setting_too_long_a_comment(theatre: &Theatre<'_>) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(4).await;
+    let height = theatre.picture_height().await;
     let paste = "const box = document.getElementById('comment'); box.value = 'x'.repeat(1_000_000);
                  box.dispatchEvent(new Event('input'));";
     surgeon.run(paste, json!([])).await;
     surgeon.click("#send").await;
-    surgeon.sees("#comment-trouble", "it is back in the box").await;
+    surgeon.sees("#comment-trouble", "it is back in the box: That is too long").await;
     assert_eq!(theatre.comment_box().await.len(), 1_000_000);
+    assert_eq!(theatre.picture_height().await, height, "neither a long comment nor a message moves the picture");
+    shoot(surgeon, "surgeon-15-long-comment").await;
     surgeon.reload().await;
     surgeon.sees("#setting", "Setting 4 of 6").await;
     until("the paste to be back", || async { theatre.comment_box().await.len() == 1_000_000 }).await;
@@ -147,10 +168,25 @@ async fn fifth_setting_killed_server(theatre: &mut Theatre<'_>) {
     theatre.write("Said while it was away").await;
     theatre.surgeon.click("#send").await;
     theatre.surgeon.sees("#comment-state", "kept on this device").await;
+    theatre.surgeon.click("#finish").await;
+    until("the server not to answer", || async {
+        theatre.surgeon.try_click("#finish").await;
+        theatre.surgeon.text("#trouble").await.contains("does not answer")
+    })
+    .await;
+    theatre.surgeon.sees("#view .viewer-stale", "Not live").await;
+    let cut = "const edge = document.getElementById('quick').getBoundingClientRect();
+               return [...document.querySelectorAll('#quick button')].map((each) => each.getBoundingClientRect())
+                   .filter(({ right, bottom }) => right > edge.right + 1 || bottom > edge.bottom + 1).length";
+    assert_eq!(theatre.surgeon.run(cut, json!([])).await, 0, "every quick comment can be tapped without a connection");
+    let prompt = "return getComputedStyle(document.getElementById('prompt')).visibility";
+    assert_eq!(theatre.surgeon.run(prompt, json!([])).await, "hidden", "the prompt gives way to the warning");
     shoot(&theatre.surgeon, "surgeon-6-no-connection").await;
     start_again(&mut theatre.server);
     theatre.surgeon.sees("#panel h2", "Paused").await;
+    theatre.surgeon.sees_no("#trouble:not(:empty)").await;
     theatre.sees_saved(8).await;
+    theatre.surgeon.sees("#panel", "Everything you said is saved.").await;
     shoot(&theatre.surgeon, "surgeon-7-restarted").await;
     theatre.surgeon.click("#panel button").await;
     theatre.surgeon.sees_no("#panel").await;
@@ -173,6 +209,10 @@ async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre<'_>) {
     surgeon.sees_no("#panel").await;
     operator.sees("#session-actions", "End setting 6 now").await;
     operator.click("#session-actions button:first-child").await;
+    operator.sees("#reason-heading", "End setting 6 now").await;
+    operator.sees_no("#reason").await;
+    shoot(operator, "operator-11-end-setting").await;
+    operator.click("#reason-go").await;
     theatre.answer_questions(1).await;
 }
 
@@ -181,6 +221,10 @@ async fn closing_questions(theatre: &Theatre<'_>) {
     surgeon.sees("#panel h2", "To finish").await;
     shoot(surgeon, "surgeon-9-closing").await;
     surgeon.click("[aria-label='Move setting 5 up']").await;
+    surgeon.sees("[data-question=preference] > .state", "Kept on this device until you tap").await;
+    surgeon.reload().await;
+    surgeon.sees(".ranking li:nth-child(4)", "Setting 5").await;
+    surgeon.click("[data-question=preference] .confirm").await;
     surgeon.sees("[data-question=preference] > .state", "Saved").await;
     half_a_questionnaire_on_a_second_tablet(theatre).await;
     surgeon.click("[data-question=closing-remarks] textarea").await;
@@ -207,6 +251,13 @@ async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre<'_>) {
     surgeon.sees(state, "4 of 10 answered · Saved").await;
     surgeon.click(".questions .done button").await;
     surgeon.sees("#missing", "2 questions are still open").await;
+    surgeon.sees(".sus fieldset:nth-child(5) .gap", "Not answered yet").await;
+    assert_eq!(surgeon.text(".sus fieldset:nth-child(4) .gap").await, "");
+    let seen = "const { top, bottom } = document.querySelector('.sus fieldset:nth-child(5)').getBoundingClientRect();
+                const panel = document.getElementById('panel').getBoundingClientRect();
+                return top >= panel.top && bottom <= panel.bottom";
+    assert_eq!(surgeon.run(seen, json!([])).await, true, "the first item without an answer is on screen");
+    shoot(surgeon, "surgeon-16-missing").await;
     let first = surgeon.new_tab(&format!("http://{}/surgeon", theatre.proxy.address)).await;
     surgeon.sees(state, "4 of 10 answered").await;
     give(4..9).await;

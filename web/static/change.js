@@ -27,7 +27,7 @@ export function changeNotice(accept) {
     segment = state.segment;
     shownAt = performance.now();
     setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
-    setText(byId("change-what"), `${state.setting === 1 ? "This is the first setting." : "The setting has changed."} Look around as you would in surgery, and say what you notice.`);
+    setText(byId("change-what"), `${state.setting === 1 ? "This is the first setting." : "The setting has changed."} Look around as you would in surgery, and write down what you notice.`);
     ask("Tap to continue");
     byId("change-practice").hidden = !state.practice;
     if (dialog.open) return;

@@ -38,7 +38,7 @@ export function composer(outbox, now) {
     const over = !state || state.phase === "completed" || state.phase === "aborted";
     box.disabled = over && box.value === "";
     byId("compose").hidden = box.disabled && state !== null;
-    box.placeholder = state ? "Say what you see" : "Comments are kept once a trial begins";
+    box.placeholder = state ? "Write what you see" : "Comments are kept once a trial begins";
     const looking = state?.phase === "inspecting";
     mark.hidden = !looking;
     kept = state?.comments ?? 0;

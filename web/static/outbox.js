@@ -42,6 +42,11 @@ export class Outbox extends EventTarget {
     return [...this.#entries.values()].sort((a, b) => (a.id < b.id ? -1 : 1));
   }
 
+  /** What the server refused on `session` and this device still keeps. */
+  refused(session) {
+    return [...this.#refused.values()].filter(({ body }) => body.session === session);
+  }
+
   /**
    * Takes something to be sent to `path`. An entry with the same `slot` (a question) that has not left yet is replaced.
    * `body.key` is made here.
@@ -114,7 +119,7 @@ export class Outbox extends EventTarget {
         this.#tell(entry, "refused", error.message);
         return true;
       }
-      this.trouble = inWords(error);
+      this.trouble = inWords(error, "No connection: trying again by itself.");
       // Tried again later it would be the last to arrive, and count.
       if (this.#replaced(entry)) this.#forget(entry);
       this.#tell(entry, "waiting", this.trouble);

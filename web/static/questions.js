@@ -22,15 +22,16 @@ const TYPING_PAUSE_MS = 900;
  *
  * `context.give(question, value, part)` sends an answer, or part `part` of one; `context.draft(question)` keeps a text that
  * is being written; `context.answers` maps question ids to answers already given; `context.settings` is how many settings
- * there are. Each question's element has `show(state, reason)`, which tells how far its answer has got, and `take(value)`,
- * which shows an answer given on another device.
+ * there are. Each question's element has `show(state, reason)`, which tells how far its answer has got; `take(value)`,
+ * which shows an answer given on another device; `begun()`, whether something in it waits for a word of the surgeon's; and
+ * `want(wanted)`, which marks what is still to be answered, or takes the marks back, and gives the first such place.
  */
 export function questionForm(questions, context) {
   const draw = { text: textQuestion, likert: likertQuestion, ranking: rankingQuestion, sus: susQuestion };
   return questions.map((question) => {
     const state = make("p", { className: "state", role: "status" });
     const answered = context.answers[question.id];
-    const { nodes, take, open = () => null } = draw[question.kind](question, answered, {
+    const { nodes, take, open = () => null, begun = () => null, gaps = () => [box] } = draw[question.kind](question, answered, {
       ...context,
       give: (value, part) => {
         box.show("saving");
@@ -40,11 +41,19 @@ export function questionForm(questions, context) {
       partly: (text) => showState(state, "partly", text),
     });
     const box = make("fieldset", { className: "question", "data-question": question.id }, ...nodes, state);
-    box.show = (reached, reason) => showState(state, reached, reason, open());
+    box.show = (reached, reason) => (begun() && reached !== "refused" ? showState(state, "partly", begun()) : showState(state, reached, reason, open()));
+    box.begun = () => begun() !== null;
+    box.want = (wanted) => {
+      const places = wanted ? gaps() : [];
+      for (const marked of [box, ...box.querySelectorAll(".wanting")]) marked.classList.remove("wanting");
+      for (const place of places) place.classList.add("wanting");
+      if (places.includes(box)) showState(state, "partly", begun() ?? "Not answered yet");
+      return places[0];
+    };
     box.take = (value) => {
       if (take(value)) box.show("saved");
     };
-    if (answered !== undefined) box.show("saved");
+    if (answered !== undefined || begun()) box.show("saved");
     return box;
   });
 }
@@ -110,7 +119,9 @@ function check(points, value) {
 
 /** Radio buttons 1..=points with what the ends mean. */
 function scale(name, { points, low, high }, chosen, give) {
-  const ends = make("div", { className: "ends", "aria-hidden": "true" }, make("span", {}, low), make("span", {}, high));
+  // Room for the mark is kept, so that nothing moves when it comes or goes.
+  const gap = make("span", { className: "gap" }, "Not answered yet");
+  const ends = make("div", { className: "ends" }, make("span", { "aria-hidden": "true" }, low), gap, make("span", { "aria-hidden": "true" }, high));
   const buttons = Array.from({ length: points }, (_, index) => {
     const value = index + 1;
     const meaning = value === 1 ? low : value === points ? high : "";
@@ -132,27 +143,38 @@ function susQuestion(question, answered, context) {
     // Each item goes by itself, so that it takes back nothing that another device has given.
     const choose = (value) => {
       points[index] = value;
+      items[index].classList.remove("wanting");
       context.give(points.map((_, place) => (place === index ? value : 0)), index);
     };
     return scale(`${question.id}-${index}`, ends, points[index], choose);
   });
   const take = (value) => {
     points.splice(0, points.length, ...value);
+    items.forEach((item, index) => points[index] > 0 && item.classList.remove("wanting"));
     return scales.map((each, index) => check(each, value[index])).some(Boolean);
   };
   const items = SUS_ITEMS.map((text, index) => make("fieldset", {}, make("legend", {}, `${index + 1}. ${text}`), scales[index]));
-  return { nodes: [asked(question), make("div", { className: "sus" }, ...items)], take, open };
+  const gaps = () => items.filter((_, index) => points[index] === 0);
+  return { nodes: [asked(question), make("div", { className: "sus" }, ...items)], take, open, gaps };
 }
 
 function rankingQuestion(question, answered, context) {
-  const order = answered ? [...answered] : Array.from({ length: context.settings }, (_, index) => index + 1);
+  // An order counts once it is confirmed as a whole: one tap on an arrow says nothing of the other settings.
+  const arranged = context.draft.read();
+  const order = arranged ?? (answered ? [...answered] : Array.from({ length: context.settings }, (_, index) => index + 1));
   const list = make("ol", { className: "ranking" });
   const heard = make("p", { className: "visually-hidden", "aria-live": "polite" });
-  const confirm = make("button", { type: "button", className: "confirm", hidden: answered !== undefined }, "This order is right");
-  confirm.onclick = () => settle();
-  const settle = () => {
+  const confirm = make("button", { type: "button", className: "confirm", hidden: answered !== undefined && arranged === null }, "This order is right");
+  const begun = () => (!confirm.hidden && context.draft.read() !== null ? "Kept on this device until you tap “This order is right”" : null);
+  confirm.onclick = () => {
     confirm.hidden = true;
+    context.draft.write(null);
     context.give([...order]);
+  };
+  const moved = () => {
+    if (confirm.hidden) return context.give([...order]);
+    context.draft.write(order);
+    context.partly(begun());
   };
   const move = (from, to) => {
     const [setting] = order.splice(from, 1);
@@ -161,7 +183,7 @@ function rankingQuestion(question, answered, context) {
     const [up, down] = list.children[to].querySelectorAll("button");
     (to < from ? (up.disabled ? down : up) : down.disabled ? up : down).focus();
     setText(heard, `Setting ${setting} is now in place ${to + 1} of ${order.length}`);
-    settle();
+    moved();
   };
   const mover = (label, sign, from, to) => {
     const button = make("button", { type: "button", "aria-label": label, disabled: to < 0 || to >= order.length }, sign);
@@ -177,6 +199,7 @@ function rankingQuestion(question, answered, context) {
     );
   draw();
   const take = (value) => {
+    if (begun()) return false;
     const news = !confirm.hidden || value.some((setting, index) => setting !== order[index]);
     if (!news) return false;
     confirm.hidden = true;
@@ -184,7 +207,7 @@ function rankingQuestion(question, answered, context) {
     draw();
     return true;
   };
-  return { nodes: [asked(question), list, heard, confirm], take };
+  return { nodes: [asked(question), list, heard, confirm], take, begun };
 }
 
 function place(number) {

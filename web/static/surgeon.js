@@ -1,11 +1,12 @@
 // The surgeon's page: follows the session's state as the server sends it, and shows the same whatever is being tried.
 
-import { post, get, inWords, Refused } from "./api.js";
+import { get, heardAgain, post, Refused, tellTrouble } from "./api.js";
 import { changeNotice } from "./change.js";
 import { composer } from "./compose.js";
 import { byId, clockText, make, setText } from "./dom.js";
 import { Draft, Outbox } from "./outbox.js";
 import { onTopOf, questionForm } from "./questions.js";
+import { twoTaps } from "./twice.js";
 import { mountViewer } from "./viewer.js";
 
 const ANSWERS = "/api/surgeon/answers";
@@ -18,6 +19,7 @@ let endsAt = null;
 const here = () => state && { session: state.session, segment: state.segment, setting: state.setting, frame: viewer.frame ?? null, run: viewer.run ?? null };
 const comments = composer(outbox, here);
 const change = changeNotice((segment) => act({ action: "acknowledge", segment }));
+const finishUntapped = twoTaps(byId("finish"), byId("finish-heard"), () => act({ action: "finish-segment", segment: state.segment }));
 
 /* State in */
 
@@ -37,7 +39,7 @@ async function refresh() {
   try {
     follow(await get("/api/surgeon/session"));
   } catch (error) {
-    setText(byId("trouble"), inWords(error));
+    tellTrouble(byId("trouble"), error);
   }
 }
 
@@ -50,7 +52,7 @@ async function act(action) {
     const refused = error instanceof Refused;
     change.ask(refused ? "Tap to continue" : "No answer yet: tap again");
     if (refused && error.status < 500) await refresh();
-    if (stands(action)) setText(byId("trouble"), refused ? error.message : "The server does not answer. Try again in a moment.");
+    if (stands(action)) tellTrouble(byId("trouble"), error, "The server does not answer. Try again in a moment.");
   }
 }
 
@@ -74,6 +76,7 @@ function drawBar() {
   const inspecting = state?.phase === "inspecting";
   byId("finish").hidden = !inspecting;
   byId("finish").disabled = !inspecting || state.paused;
+  if (byId("finish").disabled) finishUntapped();
   setText(byId("prompt"), inspecting && !state.paused ? (state.prompt ?? "") : "");
   drawTime();
 }
@@ -82,7 +85,7 @@ function drawTime() {
   const left = byId("remaining");
   if (state?.phase !== "inspecting" || endsAt === null) return setText(left, "");
   if (state.paused) return setText(left, "Paused");
-  setText(left, `${clockText((endsAt - performance.now()) / 1000)} left`);
+  setText(left, `${clockText((endsAt - performance.now()) / 1000, Math.ceil)} left`);
 }
 
 function followStatus({ camera_simulated: camera, lens_simulated: lens, notice }) {
@@ -100,7 +103,7 @@ const ended = () => state?.phase === "completed" || state?.phase === "aborted";
 
 function drawPanel() {
   const panel = byId("panel");
-  const key = JSON.stringify(state && [state.session, state.phase, state.paused, state.segment, state.questions, ended() && kept()]);
+  const key = JSON.stringify(state && [state.session, state.phase, state.paused, state.segment, state.questions, ended() && kept(), state.may_resume && saved()]);
   if (key === drawn) return;
   drawn = key;
   const content = panelContent();
@@ -137,15 +140,22 @@ function panelContent() {
   }
 }
 
-/** Whether all is saved, said only when it is so. */
 function kept() {
-  if (comments.unsent()) return "Your last comment is still in its box: send it, or clear it.";
-  return outbox.waiting.length === 0 ? "Everything you said is saved." : "Please leave this page open: some of what you said is still being saved.";
+  return comments.unsent() ? "Your last comment is still in its box: send it, or clear it." : saved();
+}
+
+/** Whether all is saved, said only when it is so. */
+function saved() {
+  const refused = outbox.refused(state.session).length;
+  const said = refused === 1 ? "One thing that you said" : `${refused} things that you said`;
+  const told = refused > 0 ? `${said} could not be saved and ${refused === 1 ? "is" : "are"} kept on this device: tell the operator. ` : "";
+  if (outbox.waiting.length > 0) return `${told}Please leave this page open: some of what you said is still being saved.`;
+  return told.trim() || "Everything you said is saved.";
 }
 
 function paused() {
   const resume = make("button", { type: "button", className: "primary", onclick: () => act({ action: "resume" }) }, "Go on");
-  const text = state.may_resume ? "The server was restarted. Everything is saved; go on where you were." : "The operator has paused the session. You can still comment.";
+  const text = state.may_resume ? `The server was restarted. ${saved()} Go on where you were.` : "The operator has paused the session. You can still comment.";
   return card("centred clear", "Paused", text, state.may_resume && resume);
 }
 
@@ -180,17 +190,24 @@ async function finishQuestions(segment) {
   const boxes = [...byId("panel").querySelectorAll(".question")];
   for (const area of byId("panel").querySelectorAll("textarea")) area.give();
   const wanting = boxes.filter((box) => unanswered(box));
-  for (const box of boxes) box.classList.toggle("wanting", wanting.includes(box));
+  const places = boxes.map((box) => box.want(wanting.includes(box))).filter(Boolean);
   if (wanting.length > 0) {
-    setText(byId("missing"), wanting.length === 1 ? "One question is still open." : `${wanting.length} questions are still open.`);
-    wanting[0].scrollIntoView({ block: "start" });
-    return wanting[0].querySelector("input, textarea, button.confirm, button")?.focus();
+    tellMissing(wanting.length === 1 ? "One question is still open." : `${wanting.length} questions are still open.`);
+    places[0].scrollIntoView({ block: "center" });
+    return places[0].querySelector("input, textarea, button.confirm")?.focus({ preventScroll: true });
   }
-  setText(byId("missing"), "Saving…");
-  if (!(await outbox.settled(ANSWERS))) return setText(byId("missing"), `${outbox.trouble} Your answers are kept on this device.`);
-  if (byId("panel").querySelector(".state.refused")) return setText(byId("missing"), "An answer was not taken: see above.");
+  tellMissing("Saving…");
+  if (!(await outbox.settled(ANSWERS))) return tellMissing(`${outbox.trouble} Your answers are kept on this device.`, true);
+  if (byId("panel").querySelector(".state.refused")) return tellMissing("An answer was not taken: see above.");
   await act({ action: "finish-questions", segment });
-  if (byId("missing")) setText(byId("missing"), byId("trouble").textContent);
+  // What stopped it is said by the dock, right beneath.
+  if (byId("missing")) tellMissing("");
+}
+
+/** Says why the questions are not done with; `unheard`: until the server answers again. */
+function tellMissing(text, unheard = false) {
+  byId("missing").toggleAttribute("data-unheard", unheard);
+  setText(byId("missing"), text);
 }
 
 const boxOf = (id) => byId("panel").querySelector(`[data-question="${CSS.escape(id)}"]`);
@@ -211,11 +228,12 @@ function settle({ id }) {
 
 function unanswered(box) {
   const question = state.questions.find(({ id }) => id === box.dataset.question);
-  return question && !question.optional && !/saving|saved|waiting/.test(box.querySelector(".state").className);
+  if (box.begun()) return true;
+  return question && !question.optional && !/saving|saved|waiting/.test(box.querySelector(":scope > .state").className);
 }
 
 outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }) => {
-  if (ended()) drawPanel();
+  if (state) drawPanel();
   if (entry.path !== ANSWERS) return;
   const { session, segment, question: id, value } = entry.body;
   if (!state || session !== state.session || segment !== (state.phase === "questions" ? state.segment : null)) return;
@@ -229,8 +247,11 @@ byId("comment").addEventListener("input", () => ended() && drawPanel());
 
 viewer.live.addEventListener("session", (event) => follow(event.detail));
 viewer.live.addEventListener("status", (event) => followStatus(event.detail));
-viewer.live.addEventListener("connection", (event) => event.detail.open && outbox.nudge());
-byId("finish").onclick = () => act({ action: "finish-segment", segment: state.segment });
+viewer.live.addEventListener("connection", ({ detail: { open } }) => {
+  if (!open) return;
+  outbox.nudge();
+  heardAgain();
+});
 for (const box of document.querySelectorAll("[data-overlay]")) {
   box.addEventListener("change", () => viewer.overlay(box.dataset.overlay, box.checked));
 }
