@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::clip::{Clip, ClipError};
 use super::pictures::{Split, reference};
-use super::rollout::{FocalTimeScan, Path, PathFigures, roll_out, roll_out_oracle};
+use super::rollout::{FocalTimeScan, NoTarget, Path, PathFigures, roll_out, roll_out_oracle};
 use super::scan::{Scan, ScanSettings};
 use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
 use super::variety::Variety;
@@ -148,16 +148,34 @@ pub struct Comparison {
     pub p: f64,
 }
 
+/// Why an evaluation ended without figures.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError {
+    /// A policy is unknown or cannot run.
+    #[error(transparent)]
+    Policy(#[from] PolicyError),
+    /// A policy gave up.
+    #[error("policy '{policy}' failed on scan {scan}: {error}; mend it, or evaluate without it")]
+    NoTarget {
+        /// The policy.
+        policy: PolicyName,
+        /// The scan, from 1.
+        scan: usize,
+        /// When, and what it answered.
+        error: NoTarget,
+    },
+}
+
 /// Runs the named policies, and the oracle first, over `scans`. `progress` is told after each policy's scan.
 ///
 /// # Errors
-/// When a policy is unknown or cannot run.
+/// When a policy is unknown or cannot run, or answers what is no focal power.
 pub fn evaluate(
     registry: &Registry,
     policies: &[PolicyName],
     scans: &dyn ScanSet,
     progress: &dyn Fn(&str),
-) -> Result<Vec<Outcome>, PolicyError> {
+) -> Result<Vec<Outcome>, EvaluateError> {
     let (count, parts) = (scans.count(), scans.parts());
     let perfect = |index| {
         let (mut scan, frames) = scans.scan(index);
@@ -169,7 +187,9 @@ pub fn evaluate(
         for index in 0..count {
             let (mut scan, frames) = scans.scan(index);
             let mut policy = registry.build(name)?;
-            paths.push(roll_out(policy.as_mut(), scan.as_mut(), frames));
+            let path = roll_out(policy.as_mut(), scan.as_mut(), frames);
+            let failed = |error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error };
+            paths.push(path.map_err(failed)?);
             progress(name.as_str());
         }
         outcomes.push(Outcome { policy: name.to_string(), paths, parts });

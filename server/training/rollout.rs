@@ -90,19 +90,36 @@ impl Path {
     }
 }
 
+/// What a policy answered that is no number.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("at frame {frame} it answered {target}, which is no focal power")]
+pub struct NoTarget {
+    /// The frame, from 1.
+    pub frame: usize,
+    /// The answer.
+    pub target: f64,
+}
+
 /// Runs `policy` over `frames` frames of `scan`, starting in the middle of the lens's range. What the policy asks for is
 /// what the next frame is seen at.
-pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: usize) -> Path {
+///
+/// # Errors
+/// When it asks for what is no number. In the live loop the watchdog would take over; its path is not the policy's.
+pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: usize) -> Result<Path, NoTarget> {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();
-    for _ in 0..frames {
+    for frame in 1..=frames {
         let patch = scan.observe(focal_power);
         course.focal_power.push(focal_power.get());
         course.optimum.push(scan.optimum().get());
-        focal_power = FocalPower::nearest(policy.step(&Observation { patch: &patch, focal_power }).target);
+        let target = policy.step(&Observation { patch: &patch, focal_power }).target;
+        if !target.is_finite() {
+            return Err(NoTarget { frame, target });
+        }
+        focal_power = FocalPower::nearest(target);
         scan.advance();
     }
-    course
+    Ok(course)
 }
 
 /// What a policy with the paper's steps could do at best, if it knew the next frame's optimum.

@@ -1,8 +1,10 @@
-//! What an evaluation's figures are, worked by hand.
+//! What an evaluation's figures are, worked by hand, and how it ends.
 
 use super::*;
+use crate::autofocus::{Decision, Observation, Policy};
 use crate::lens::FocalPower;
 use crate::training::recorded::PARTS;
+use crate::training::texture::texture;
 
 fn row(focal_power: Vec<f64>, optimum: Vec<f64>) -> Row {
     Outcome { policy: "a".to_owned(), paths: vec![Path { focal_power, optimum }], parts: PARTS }.row()
@@ -39,6 +41,27 @@ fn figures_of_a_number_of_poses_that_parts_do_not_divide_are_those_of_the_whole_
     {
         assert!((found - expected).abs() < 1e-12, "{row:?}");
     }
+}
+
+/// Answers no number from its third frame on.
+struct GivesUp(usize);
+
+impl Policy for GivesUp {
+    fn step(&mut self, seen: &Observation<'_>) -> Decision {
+        self.0 += 1;
+        let target = if self.0 < 3 { seen.focal_power.get() } else { f64::NAN };
+        Decision { target, ..Decision::default() }
+    }
+}
+
+#[test]
+fn a_policy_that_gives_up_has_no_figures() {
+    let registry = Registry::default().with("lazy", "", || Box::new(GivesUp(0)));
+    let clips = vec![Arc::new(Clip::still(texture(1, 64)).unwrap())];
+    let conditions = Conditions::Same(ScanSettings::default());
+    let scans = Benchmark { clips, conditions, seed: 1, count: 1, frames: 9 };
+    let told = evaluate(&registry, &[PolicyName::new("lazy")], &scans, &|_| ()).unwrap_err().to_string();
+    assert!(told.starts_with("policy 'lazy' failed on scan 1: at frame 3 it answered NaN"), "{told}");
 }
 
 #[test]
