@@ -2,7 +2,8 @@
 //!
 //! The module's `forward` takes the latest eight frames, oldest first, as two float tensors: gray patches `[8, 32, 32]` (0..=255)
 //! and the focal powers that they were exposed at, `[8]` (0..=1). It returns the values of the three actions, `[3]`: a step
-//! down, none, a step up. Before eight frames were seen, the first stands for those missing.
+//! down, none, a step up. Before eight frames were seen, the first stands for those missing. Each instance has a module of its own, in
+//! evaluation mode.
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "small numbers in single precision")]
 
 use std::collections::VecDeque;
@@ -14,11 +15,11 @@ use tch::{CModule, Kind, Tensor};
 
 use super::learned::{action_step, best_action};
 use super::networks::{ACTIONS, HISTORY};
-use super::{Decision, Observation, Policy, PolicyName, Registry};
+use super::{Decision, Fixed, Observation, Policy, PolicyName, Registry};
 use crate::imaging::PATCH_SIDE;
 
 /// What a policy's name begins with if it is a file.
-const PREFIX: &str = "file:";
+pub const PREFIX: &str = "file:";
 const SIDE: i64 = PATCH_SIDE as i64;
 
 /// `registry` with the policy that `name` stands for, if it is a file's; a file that is no such policy is listed with the reason and
@@ -28,25 +29,42 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     const SUMMARY: &str = "action values from a TorchScript file";
     let Some(path) = name.as_str().strip_prefix(PREFIX) else { return registry };
     match load(Path::new(path)) {
-        Ok((module, bytes)) => registry
-            .with(name.as_str(), SUMMARY, move || Box::new(Scripted::new(Arc::clone(&module))))
-            .weighing(name.as_str(), &bytes),
+        Ok(bytes) => {
+            let source = Arc::clone(&bytes);
+            // It was read a moment ago; should libtorch fail all the same, the lens stays where it is.
+            let make = move || {
+                parse(&source).map_or_else(
+                    |_| Box::<Fixed>::default() as Box<dyn Policy>,
+                    |module| Box::new(Scripted::new(module)),
+                )
+            };
+            registry.with(name.as_str(), SUMMARY, make).weighing(name.as_str(), &bytes)
+        }
         Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
     }
 }
 
-/// Reads the module, with the file's bytes, and tries it once.
-fn load(path: &Path) -> Result<(Arc<CModule>, Vec<u8>), String> {
+/// Reads the file's bytes, and tries the module on patches that show nothing and on others that do.
+fn load(path: &Path) -> Result<Arc<[u8]>, String> {
     let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    let module = CModule::load_data(&mut bytes.as_slice())
-        .map_err(|error| format!("{} is not TorchScript: {}", path.display(), first_line(&error.to_string())))?;
-    let (patches, focal_powers) = (vec![128.0; HISTORY * PATCH_SIDE * PATCH_SIDE], vec![0.5; HISTORY]);
-    values(&module, &patches, &focal_powers).map_err(|reason| {
-        let signature =
-            format!("forward(patches [{HISTORY}, {SIDE}, {SIDE}], focal_powers [{HISTORY}]) -> values [{ACTIONS}]");
-        format!("{} is not a policy: {reason}; it must have {signature}, all float32", path.display())
-    })?;
-    Ok((Arc::new(module), bytes))
+    let module = parse(&bytes).map_err(|reason| format!("{} is not TorchScript: {reason}", path.display()))?;
+    let textured = |index: usize| f32::from((index * 7919 + index * index * 31) as u8);
+    let probes: [&dyn Fn(usize) -> f32; 2] = [&|_| 128.0, &textured];
+    for probe in probes {
+        let patches: Vec<f32> = (0..HISTORY * PATCH_SIDE * PATCH_SIDE).map(probe).collect();
+        values(&module, &patches, &[0.5; HISTORY]).map_err(|reason| {
+            let signature =
+                format!("forward(patches [{HISTORY}, {SIDE}, {SIDE}], focal_powers [{HISTORY}]) -> values [{ACTIONS}]");
+            format!("{} is not a policy: {reason}; it must have {signature}, all float32", path.display())
+        })?;
+    }
+    Ok(bytes.into())
+}
+
+/// The module in `bytes`, in evaluation mode: without it, layers such as dropout act by chance.
+fn parse(bytes: &[u8]) -> Result<CModule, String> {
+    let module = CModule::load_data(&mut &*bytes).and_then(|mut module| module.f_set_eval().map(|()| module));
+    module.map_err(|error| first_line(&error.to_string()))
 }
 
 /// The three action values; what the module is given is flat, oldest frame first.
@@ -68,13 +86,13 @@ fn first_line(message: &str) -> String {
 
 /// A module with its memory of eight frames.
 struct Scripted {
-    module: Arc<CModule>,
+    module: CModule,
     patches: VecDeque<f32>,
     focal_powers: VecDeque<f32>,
 }
 
 impl Scripted {
-    const fn new(module: Arc<CModule>) -> Self {
+    const fn new(module: CModule) -> Self {
         Self { module, patches: VecDeque::new(), focal_powers: VecDeque::new() }
     }
 
@@ -99,7 +117,8 @@ impl Policy for Scripted {
                 let target = seen.focal_power.moved(action_step(best_action(&values))).get();
                 Decision { target, metric: None, belief: None }
             }
-            // It worked when it was loaded; now it fails on what it sees: the watchdog takes a target that is none.
+            // It worked when it was loaded; now it fails on what it sees: the live loop's watchdog takes a target that is none,
+            // and an evaluation ends.
             Err(_) => Decision { target: f64::NAN, metric: None, belief: None },
         }
     }
@@ -111,9 +130,14 @@ mod tests {
     use crate::imaging::Patch;
     use crate::lens::FocalPower;
 
-    fn policy(file: &str) -> Result<Box<dyn Policy>, String> {
+    fn registered(file: &str) -> (Registry, PolicyName) {
         let name = PolicyName::new(&format!("file:{}/tests/vectors/{file}", env!("CARGO_MANIFEST_DIR")));
-        with_file(Registry::default(), &name).build(&name).map_err(|error| error.to_string())
+        (with_file(Registry::default(), &name), name)
+    }
+
+    fn policy(file: &str) -> Result<Box<dyn Policy>, String> {
+        let (registry, name) = registered(file);
+        registry.build(&name).map_err(|error| error.to_string())
     }
 
     /// Vertical stripes that differ by `height` gray levels.
@@ -138,12 +162,24 @@ mod tests {
     }
 
     #[test]
+    fn each_instance_remembers_nothing_of_another_and_is_not_in_training() {
+        let focal_power = FocalPower::MIDDLE;
+        let (registry, name) = registered("first-frame.pt");
+        for _ in 0..2 {
+            let mut policy = registry.build(&name).unwrap();
+            let targets = [(); 2].map(|()| policy.step(&Observation { patch: &stripes(9.0), focal_power }).target);
+            assert!((targets[0] - 0.55).abs() < 1e-9 && (targets[1] - 0.45).abs() < 1e-9, "{targets:?}");
+        }
+    }
+
+    #[test]
     fn what_is_no_policy_is_told_why() {
         let error = |file| policy(file).err().unwrap();
         assert!(
             error("wrong-shape.pt")
                 .contains("it returned Float of shape [8]; it must have forward(patches [8, 32, 32]")
         );
+        assert!(error("flat-only.pt").contains("it returned no numbers"), "with texture in view");
         assert!(error("pytorch.json").contains("is not TorchScript"));
         assert!(error("nothing.pt").contains("cannot read"));
     }
