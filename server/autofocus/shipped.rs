@@ -17,12 +17,12 @@ pub enum Design {
     Belief,
 }
 
-/// A learned policy: its name, what it does, its network, and the weights that ship, if any.
+/// A learned policy: its name, what it does, its network, and the weights that ship.
 struct Shipped {
     name: &'static str,
     summary: &'static str,
     design: Design,
-    weights: Option<&'static [u8]>,
+    weights: &'static [u8],
 }
 
 const SHIPPED: [Shipped; 4] = [
@@ -30,25 +30,25 @@ const SHIPPED: [Shipped; 4] = [
         name: "mgm-learned",
         summary: "learned optimiser of the mean gradient magnitude",
         design: Design::Values(Sight::Mgm),
-        weights: Some(include_bytes!("../../policies/mgm-learned.safetensors")),
+        weights: include_bytes!("../../policies/mgm-learned.safetensors"),
     },
     Shipped {
         name: "mlr-learned",
         summary: "learned optimiser of the mean local ratio",
         design: Design::Values(Sight::Mlr),
-        weights: Some(include_bytes!("../../policies/mlr-learned.safetensors")),
+        weights: include_bytes!("../../policies/mlr-learned.safetensors"),
     },
     Shipped {
         name: "cnn-learned",
         summary: "learned end to end from the last eight patches",
         design: Design::Values(Sight::Patch),
-        weights: Some(include_bytes!("../../policies/cnn-learned.safetensors")),
+        weights: include_bytes!("../../policies/cnn-learned.safetensors"),
     },
     Shipped {
         name: "parfocal",
         summary: "tracks a belief about the optimum and goes where it is most likely in focus",
         design: Design::Belief,
-        weights: Some(include_bytes!("../../policies/parfocal.safetensors")),
+        weights: include_bytes!("../../policies/parfocal.safetensors"),
     },
 ];
 
@@ -58,17 +58,14 @@ pub fn design(name: &str) -> Option<Design> {
     SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| shipped.design)
 }
 
-/// `registry` with all learned policies, those available whose weights ship and are sound.
+/// `registry` with all learned policies, those available whose weights are sound.
 #[must_use]
 pub fn with_shipped(registry: Registry) -> Registry {
     SHIPPED.iter().fold(registry, |registry, shipped| {
         let Shipped { name, summary, design, weights } = shipped;
-        match weights {
-            None => registry.without(name, summary, "its weights are missing: make them with `parfocal train`"),
-            Some(bytes) => match build(*design, bytes) {
-                Ok(_) => put(registry, name, summary, *design, Arc::from(*bytes)),
-                Err(error) => registry.without(name, summary, &format!("{error}; put sound weights in their place")),
-            },
+        match build(*design, weights) {
+            Ok(_) => put(registry, name, summary, *design, Arc::from(*weights)),
+            Err(error) => registry.without(name, summary, &format!("{error}; put sound weights in their place")),
         }
     })
 }
@@ -142,7 +139,7 @@ mod tests {
     #[test]
     fn what_ships_is_sound() {
         let registry = with_shipped(Registry::default());
-        for shipped in SHIPPED.iter().filter(|shipped| shipped.weights.is_some()) {
+        for shipped in SHIPPED {
             assert!(registry.build(&PolicyName::new(shipped.name)).is_ok(), "{}", shipped.name);
         }
     }
