@@ -4,6 +4,7 @@
 //! Rooms, from the ground up; each uses only rooms listed before it (see ARCHITECTURE.md).
 
 pub mod clock;
+pub mod files;
 pub mod ids;
 pub mod imaging;
 pub mod lens;

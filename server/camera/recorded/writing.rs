@@ -3,7 +3,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::{HEADER, Header, Image, POSES, Pose, ScanError, ScanFolder};
+use crate::files::{replace, write_through};
 use crate::imaging::{GrayImage, PatchArea};
 use crate::lens::FocalPower;
 
@@ -53,7 +54,7 @@ impl Recording {
             if occupied().map_err(|error| unwritable(path, 0, error))? {
                 return Err(ScanError::Occupied(path.to_owned()));
             }
-            write_whole(&path.join(HEADER), &pretty(header)).map_err(|error| unwritable(path, 0, error))?;
+            replace(&path.join(HEADER), &pretty(header)).map_err(|error| unwritable(path, 0, error))?;
         }
         let journal = path.join(POSES);
         let journal =
@@ -174,24 +175,6 @@ fn pretty(header: &Header) -> Vec<u8> {
     let mut text = serde_json::to_vec_pretty(header).unwrap_or_default();
     text.push(b'\n');
     text
-}
-
-/// Writes a file that is either there and whole or not there.
-fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial: PathBuf = path.with_file_name(format!(".{name}.partial"));
-    let written = write_through(&partial, content).and_then(|()| fs::rename(&partial, path));
-    if written.is_err() {
-        let _ = fs::remove_file(&partial);
-    }
-    written
-}
-
-/// Writes a file and waits until the disk has it.
-fn write_through(path: &Path, content: &[u8]) -> io::Result<()> {
-    let mut file = File::create(path)?;
-    file.write_all(content)?;
-    file.sync_data()
 }
 
 /// A gray picture as 8-bit PNG; levels are rounded.
