@@ -4,6 +4,8 @@
 
 #[path = "scans/bench.rs"]
 mod bench;
+#[path = "scans/import.rs"]
+mod import;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -175,7 +177,10 @@ fn what_is_missing_or_damaged_is_named() {
         }
     };
     fs::write(out.join(POSES), format!("{}\n{}\n", lines[0], lines[2])).unwrap();
-    refusals("of 3 poses 2 is missing");
+    refusals("pose 2 of 3 is missing");
+    fs::write(out.join(POSES), format!("{}\n", lines[0])).unwrap();
+    let info = said(&parfocal(&["scan", "info", text(&out)]));
+    assert!(info.contains("changing by 0.0000 a pose") && info.contains("missing       poses 2, 3\n"), "{info}");
     fs::write(out.join(POSES), format!("{0}\n{0}\n", lines[0])).unwrap();
     refusals("pose 1 is there twice");
     fs::write(out.join(POSES), journal.replace("pose0002/pose0002", "../scan/pose0002")).unwrap();
@@ -184,6 +189,8 @@ fn what_is_missing_or_damaged_is_named() {
     let header = fs::read_to_string(out.join("scan.json")).unwrap();
     fs::write(out.join("scan.json"), header.replace("\"version\": 1", "\"version\": 2")).unwrap();
     refusals("this program reads version 1");
+    fs::write(out.join("scan.json"), header.replace("\"poses\": 3", "\"poses\": 100000000000")).unwrap();
+    refusals("it has 100000000000 poses; a scan has 1 to 100000");
     fs::write(out.join("scan.json"), header).unwrap();
 
     let picture = out.join("pose0002/pose0002_f0.250.png");
@@ -198,51 +205,6 @@ fn what_is_missing_or_damaged_is_named() {
     assert!(evaluated.contains("pose0002_f0.250.png is damaged"), "{evaluated}");
     let nothing = complaint(&parfocal(&["scan", "info", text(folder.path())]));
     assert!(nothing.contains("no recorded scan"), "{nothing}");
-}
-
-#[test]
-fn a_folder_of_pictures_is_imported() {
-    let folder = TempDir::new().unwrap();
-    let (pictures, out) = (folder.path().join("pictures"), folder.path().join("scan"));
-    fs::create_dir(&pictures).unwrap();
-    // Stripes of more contrast, the nearer the focal power is to 0.5 at pose 8 and to 0 at pose 9.
-    let save = |pose: u32, power: f64, contrast: u8, size: u32| {
-        let stripes = image::GrayImage::from_fn(size, size, |x, _| image::Luma([100 + u8::from(x % 4 < 2) * contrast]));
-        stripes.save(pictures.join(format!("pose{pose:04}_f{power:.3}.png"))).unwrap();
-    };
-    for (pose, contrasts) in [(8, [20, 80, 30]), (9, [70, 40, 10])] {
-        for (power, contrast) in [0.0, 0.5, 1.0].into_iter().zip(contrasts) {
-            save(pose, power, contrast, 80);
-        }
-    }
-    fs::write(pictures.join("notes.txt"), "not a picture").unwrap();
-    let import = || parfocal(&["scan", "import", text(&pictures), "--out", text(&out), "--camera", "arm 3"]);
-
-    fs::rename(pictures.join("pose0009_f0.500.png"), folder.path().join("aside.png")).unwrap();
-    assert!(complaint(&import()).contains("pose 9 has no picture at focal power 0.500"));
-    fs::rename(folder.path().join("aside.png"), pictures.join("pose0009_f0.500.png")).unwrap();
-    save(11, 0.5, 10, 80);
-    assert!(complaint(&import()).contains("poses 10 are missing"));
-    fs::rename(pictures.join("pose0011_f0.500.png"), pictures.join("pose0009_f1.200.png")).unwrap();
-    assert!(complaint(&import()).contains("focal power must be a number from 0 to 1"));
-    fs::remove_file(pictures.join("pose0009_f1.200.png")).unwrap();
-    save(9, 0.5, 40, 96);
-    assert!(complaint(&import()).contains("is 96x96 pixels, but"));
-    save(9, 0.5, 40, 63);
-    assert!(complaint(&import()).contains("must be at least 64x64"));
-    save(9, 0.5, 40, 80);
-    let empty = folder.path().join("empty");
-    fs::create_dir(&empty).unwrap();
-    let told = complaint(&parfocal(&["scan", "import", text(&empty), "--out", text(&out)]));
-    assert!(told.contains("no picture named like pose0001_f0.350.png"), "{told}");
-    assert!(!out.exists(), "nothing is written before all is checked");
-
-    assert!(import().status.success());
-    let scan = ScanFolder::open(&out).unwrap().whole().unwrap();
-    assert_eq!(scan.header().camera, "arm 3");
-    let optima: Vec<f64> = scan.poses().values().map(|pose| pose.optimum.get()).collect();
-    assert_eq!(optima, [0.5, 0.0]);
-    assert_eq!(scan.poses()[&1].patch, (24, 24), "in the middle of 80x80");
 }
 
 /// Glass at one focal power.

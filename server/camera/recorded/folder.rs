@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::{FORMAT, HEADER, Header, Image, LEAST_SIDE, POSES, Pose, ScanError, VERSION};
+use super::{FORMAT, HEADER, Header, Image, LEAST_SIDE, MOST_POSES, POSES, Pose, ScanError, VERSION};
 use crate::imaging::{DecodeError, GrayImage, PATCH_SIDE, Picture, decode};
 use crate::lens::FocalPower;
 
@@ -181,8 +181,8 @@ fn check_header(header: &Header) -> Result<(), String> {
     if *version != VERSION {
         return Err(format!("it is of version {version}; this program reads version {VERSION}"));
     }
-    if *poses == 0 {
-        return Err("it has no poses".to_owned());
+    if !(1..=MOST_POSES).contains(poses) {
+        return Err(format!("it has {poses} poses; a scan has 1 to {MOST_POSES}"));
     }
     if focal_powers.len() < 2 || !focal_powers.is_sorted_by(|a, b| a < b) {
         return Err("its focal powers must be at least two, and rise".to_owned());

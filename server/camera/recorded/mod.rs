@@ -25,6 +25,8 @@ pub const POSES: &str = "poses.jsonl";
 pub const FORMAT: &str = "parfocal-scan";
 /// What [`Header::version`] says.
 pub const VERSION: u32 = 1;
+/// Most poses of a scan: over an hour at 25 a second.
+pub const MOST_POSES: usize = 100_000;
 /// Least width and height of a picture, pixels.
 pub const LEAST_SIDE: usize = 64;
 
@@ -129,8 +131,8 @@ pub enum ScanError {
         reason: String,
     },
     /// Poses were not recorded yet.
-    #[error("the scan {} is not whole: of {of} poses {} {} missing; go on recording it with the command that began it",
-        path.display(), numbers(missing), if missing.len() == 1 { "is" } else { "are" })]
+    #[error("the scan {} is not whole: {} of {of} {} missing; go on recording it with the command that began it",
+        path.display(), poses(missing), if missing.len() == 1 { "is" } else { "are" })]
     Missing {
         /// The scan's folder.
         path: PathBuf,
@@ -194,9 +196,14 @@ impl ScanError {
     }
 }
 
-/// Numbers for people: `3, 7 to 9 and 12`, at most a handful of them.
+/// Poses for people: `pose 3`, `poses 3, 7 to 9`.
 #[must_use]
-pub fn numbers(of: &[usize]) -> String {
+pub fn poses(of: &[usize]) -> String {
+    format!("{} {}", if of.len() == 1 { "pose" } else { "poses" }, numbers(of))
+}
+
+/// Numbers for people: `3, 7 to 9, 12`, at most a handful of them.
+fn numbers(of: &[usize]) -> String {
     const MOST: usize = 6;
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for &number in of {
@@ -222,7 +229,8 @@ mod tests {
 
     #[test]
     fn numbers_are_told_in_stretches() {
-        assert_eq!(numbers(&[3]), "3");
+        assert_eq!(poses(&[3]), "pose 3");
+        assert_eq!(poses(&[3, 4]), "poses 3, 4");
         assert_eq!(numbers(&[1, 2, 3, 7, 9, 10]), "1 to 3, 7, 9, 10");
         assert_eq!(numbers(&[1, 3, 5, 7, 9, 11, 13]), "1, 3, 5, 7, 9, 11 and 1 more");
     }

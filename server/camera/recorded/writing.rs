@@ -1,6 +1,7 @@
 //! A recorded scan's folder, written. A pose's pictures appear under their name all at once, when all are stored, and only
 //! then does the pose get its line: whatever ends the recording, what is there is whole and the rest is missing.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
@@ -94,9 +95,13 @@ impl Recording {
 
     fn write(&self, shot: &Shot, name: &str, partial: &Path) -> io::Result<Pose> {
         fs::create_dir(partial)?;
+        let rounded = |power: f64| format!("{power:.3}");
+        let unlike: BTreeSet<String> = shot.images.iter().map(|(power, _)| rounded(power.get())).collect();
         let write = |(power, picture): &(FocalPower, GrayImage)| -> io::Result<Image> {
             let png = png(picture)?;
-            let file = format!("{name}_f{:.3}.png", power.get());
+            // All digits of each, where three do not tell them apart.
+            let told = if unlike.len() == shot.images.len() { rounded(power.get()) } else { power.get().to_string() };
+            let file = format!("{name}_f{told}.png");
             write_through(&partial.join(&file), &png)?;
             Ok(Image { focal_power: *power, file: format!("{name}/{file}"), sha256: hex::encode(Sha256::digest(&png)) })
         };

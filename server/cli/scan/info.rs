@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Failure, bar, print};
-use crate::camera::recorded::{Damage, ScanFolder, numbers};
+use crate::camera::recorded::{Damage, ScanFolder, poses};
+use crate::files::replace;
 use crate::training::plot;
 
 /// Arguments of `parfocal scan info`.
@@ -78,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let damages: Vec<Damage> = checked.into_iter().flat_map(|(_, damages)| damages).collect();
     let info = info(&scan, bytes, &damages);
     if let Some(path) = &arguments.out {
-        std::fs::write(path, picture(&scan))
+        replace(path, picture(&scan).as_bytes())
             .map_err(|error| format!("the picture could not be saved to {}: {error}", path.display()))?;
     }
     print(&if arguments.json { serde_json::to_string(&info)? + "\n" } else { text(&info) })?;
@@ -124,7 +125,8 @@ fn optimum(path: &[f64]) -> Optimum {
     Optimum {
         min: path.iter().copied().reduce(f64::min).unwrap_or_default(),
         max: path.iter().copied().reduce(f64::max).unwrap_or_default(),
-        step: steps.sum::<f64>() / (path.len().max(2) - 1) as f64,
+        // Not by `sum`, to which nothing adds up to -0.
+        step: steps.fold(0.0, |sum, step| sum + step) / (path.len().max(2) - 1) as f64,
     }
 }
 
@@ -168,7 +170,7 @@ fn text(info: &Info) -> String {
         ));
     }
     if !info.missing.is_empty() {
-        rows.push(("missing", format!("poses {}", numbers(&info.missing))));
+        rows.push(("missing", poses(&info.missing)));
     }
     rows.push(("damaged", if info.damaged.is_empty() { "none".to_owned() } else { info.damaged.join(", ") }));
     rows.into_iter().fold(String::new(), |mut text, (name, value)| {

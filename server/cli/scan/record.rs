@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 
 use super::{Failure, bar, print};
 use crate::camera::phantom::Trajectory;
-use crate::camera::recorded::{FORMAT, Header, Order, Recording, VERSION};
+use crate::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
 use crate::camera::{self, CameraSettings};
 use crate::cli::calibration;
 use crate::cli::interrupt::Interrupt;
@@ -171,7 +171,8 @@ fn asker(
 }
 
 fn parse_poses(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|poses| (1..=100_000).contains(poses)).ok_or_else(|| "must be from 1 to 100000".to_owned())
+    let inside = text.parse().ok().filter(|poses| (1..=MOST_POSES).contains(poses));
+    inside.ok_or_else(|| format!("must be from 1 to {MOST_POSES}"))
 }
 
 fn parse_powers(text: &str) -> Result<usize, String> {

@@ -1,91 +1,17 @@
 //! Importing a scan: a folder of pictures named by pose and focal power, from whatever recorded them.
 
 use std::collections::BTreeMap;
-use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{RecordError, Taken, shot};
-use crate::camera::recorded::{FORMAT, Header, LEAST_SIDE, Order, Recording, ScanError, VERSION, numbers};
+use super::import_error::ImportError;
+use super::{Taken, shot};
+use crate::camera::recorded::{
+    FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
+};
 use crate::imaging::{
     Calibration, DecodeError, GrayImage, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode,
 };
 use crate::lens::FocalPower;
-
-/// Why a folder is no scan.
-#[derive(Debug, thiserror::Error)]
-pub enum ImportError {
-    /// The folder cannot be read.
-    #[error("cannot read {}: {error}", path.display())]
-    Unreadable {
-        /// The folder or file.
-        path: PathBuf,
-        /// Why.
-        error: io::Error,
-    },
-    /// It holds no pictures of a scan.
-    #[error("there is no picture named like pose0001_f0.350.png in {}", .0.display())]
-    Empty(PathBuf),
-    /// A name that cannot be meant.
-    #[error("{}: {reason}", path.display())]
-    Name {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with its name.
-        reason: String,
-    },
-    /// Poses without any picture.
-    #[error("poses {} are missing: there is no picture of them", numbers(.0))]
-    MissingPoses(Vec<usize>),
-    /// A pose without some of the others' focal powers.
-    #[error("pose {pose} has no picture at focal power {power:.3}, which other poses have")]
-    MissingPower {
-        /// The pose's number.
-        pose: usize,
-        /// The focal power.
-        power: f64,
-    },
-    /// A stack of one picture.
-    #[error("a scan needs at least two focal powers; every picture is at {0:.3}")]
-    OnePower(f64),
-    /// Pictures of different sizes.
-    #[error("{} is {}x{} pixels, but {} is {}x{}; a scan's pictures are all of one size",
-        other.display(), other_size.0, other_size.1, first.display(), size.0, size.1)]
-    Sizes {
-        /// The first picture.
-        first: PathBuf,
-        /// Its width and height.
-        size: (usize, usize),
-        /// One that differs.
-        other: PathBuf,
-        /// Its width and height.
-        other_size: (usize, usize),
-    },
-    /// Pictures too small to be of use.
-    #[error("{} is {}x{} pixels; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}", path.display(), size.0, size.1)]
-    TooSmall {
-        /// The file.
-        path: PathBuf,
-        /// Its width and height.
-        size: (usize, usize),
-    },
-    /// A file that is no picture.
-    #[error("{}: {error}", path.display())]
-    Picture {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        error: DecodeError,
-    },
-    /// It cannot be stored.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-}
-
-impl From<ScanError> for ImportError {
-    fn from(error: ScanError) -> Self {
-        Self::Record(error.into())
-    }
-}
 
 /// What a folder holds: for each pose its number there, and a file for each focal power, rising.
 #[derive(Debug)]
@@ -120,7 +46,10 @@ impl Imported {
         };
         let missing: Vec<usize> = (first..=last).filter(|number| !poses.contains_key(number)).take(10_000).collect();
         if !missing.is_empty() {
-            return Err(ImportError::MissingPoses(missing));
+            return Err(ImportError::MissingPoses { folder: folder.to_owned(), missing });
+        }
+        if poses.len() > MOST_POSES {
+            return Err(ImportError::TooMany { folder: folder.to_owned(), poses: poses.len() });
         }
         let imported = Self { poses };
         imported.check_powers()?;
@@ -162,10 +91,11 @@ impl Imported {
     }
 }
 
-/// Stores `imported` as a scan in `out`; poses are numbered from 1 there. `progress` is told after each.
+/// Stores `imported` as a scan in `out`; poses are numbered from 1 there. Poses that `out` holds already must show the same
+/// pictures. `progress` is told after each.
 ///
 /// # Errors
-/// When a picture cannot be used, or the scan not be written.
+/// When a picture cannot be used, `out` holds another scan, or it cannot be written.
 pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()) -> Result<(), ImportError> {
     let header = Header {
         format: FORMAT.to_owned(),
@@ -185,16 +115,36 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
     let mut recording = Recording::open(out, &header)?;
     for (pose, stack) in (1..).zip(imported.poses.values()) {
-        if recording.folder().poses().contains_key(&pose) {
-            continue;
-        }
         let powers: Vec<FocalPower> = stack.iter().map(|(power, _)| *power).collect();
         let pictures = stack.iter().map(|(_, path)| reader.read(path)).collect::<Result<Vec<_>, _>>()?;
-        let patch = patch(&pictures).ok_or_else(|| ImportError::Empty(out.to_owned()))?;
-        recording.store(&shot(pose, &powers, Taken { pictures, patch, truth: None }))?;
+        if recording.folder().poses().contains_key(&pose) {
+            if !shows(recording.folder(), pose, &pictures)? {
+                let difference = format!("with other pictures of pose {pose}");
+                return Err(ScanError::Other { path: out.to_owned(), difference }.into());
+            }
+        } else {
+            let patch = patch(&pictures).ok_or_else(|| ImportError::Empty(out.to_owned()))?;
+            recording.store(&shot(pose, &powers, Taken { pictures, patch, truth: None }))?;
+        }
         progress();
     }
     Ok(())
+}
+
+/// Whether what is stored of `pose` are these pictures, which rise in focal power as the scan's do.
+fn shows(scan: &ScanFolder, pose: usize, pictures: &[GrayImage]) -> Result<bool, ScanError> {
+    let Some(stored) = scan.poses().get(&pose) else { return Ok(false) };
+    for (power, picture) in scan.header().focal_powers.iter().zip(pictures) {
+        let Some(image) = stored.images.iter().find(|image| image.focal_power == *power) else { return Ok(false) };
+        let kept = scan.picture(stored, image)?;
+        // Levels are rounded when they are stored.
+        let mut levels = kept.data.iter().zip(&picture.data);
+        let alike = levels.all(|(kept, level)| (kept - level).abs() <= 0.5);
+        if (kept.width, kept.height) != (picture.width, picture.height) || !alike {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// The patch in the content area that the first picture shows.
@@ -216,7 +166,10 @@ impl Reader {
             path: path.to_owned(),
             error: DecodeError::Damaged(error.to_string()),
         };
-        let (width, height) = image::image_dimensions(path).map_err(damaged)?;
+        let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
+        // By its content, as `read` does: a name may lie.
+        let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
+        let (width, height) = reader.map_err(unreadable)?.into_dimensions().map_err(damaged)?;
         self.check(path, (width as usize, height as usize))
     }
 

@@ -2,10 +2,12 @@
 
 mod devices;
 mod import;
+mod import_error;
 mod phantom;
 
 pub use devices::{Devices, Stepper, StepperError};
-pub use import::{ImportError, Imported, import};
+pub use import::{Imported, import};
+pub use import_error::ImportError;
 pub use phantom::PhantomBench;
 
 use super::recorded::{Stack as PatchStack, capture_order, levels_at};
