@@ -4,6 +4,8 @@
 
 #[path = "scans/bench.rs"]
 mod bench;
+#[path = "scans/evaluation.rs"]
+mod evaluation;
 #[path = "scans/import.rs"]
 mod import;
 

@@ -1,11 +1,13 @@
 //! `parfocal evaluate`: all policies on the same focal-time scans, and the paper's table with ours beside it.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{Failure, scan};
+use super::{Failure, print, scan};
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::ScanFolder;
@@ -28,17 +30,18 @@ pub struct Arguments {
     /// A video, an image or a folder of images to scan in place of the reference pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
-    /// Policies by name, separated by commas, or `all` that can run; `file:PATH` for one from a `TorchScript` file.
-    #[arg(long, default_value = "all")]
-    policies: String,
+    /// Policies by name, separated by commas, `all` for all that can run; `file:PATH` for one from a `TorchScript` file, whose
+    /// path goes on to the end of the argument, commas included. May be given more than once.
+    #[arg(long, value_name = "NAMES", default_value = "all")]
+    policies: Vec<String>,
     /// Folder with weights (`NAME.safetensors`) to take in the place of those that ship.
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
     /// Seed of the scans' courses; a recorded scan has its own.
     #[arg(long, value_name = "N", default_value_t = SEED)]
     seed: u64,
-    /// Number of scans; 200 simulated ones or 1 over the phantom, if not said.
-    #[arg(long, value_name = "N")]
+    /// Number of scans, 10000 at most, 100 over the phantom; 200 simulated ones or 1 over the phantom, if not said.
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     count: Option<usize>,
     /// Print JSON.
     #[arg(long)]
@@ -47,6 +50,9 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
+
+/// Most scans over the phantom at once: each takes 25 MB, and half a minute to make.
+const MOST_PHANTOM: usize = 100;
 
 /// Runs the command.
 ///
@@ -60,32 +66,51 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let policies = policies(&arguments.policies, &registry);
     let registry = policies.iter().fold(registry, scripted::with_file);
+    // What cannot be had is told before anything that takes time.
+    policies.iter().try_for_each(|name| registry.build(name).map(drop))?;
+    let unwritable = |folder: &Path, error| format!("cannot write the results to {}: {error}", folder.display());
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
+    }
     let scans = scans(arguments)?;
     let bar = progress(policies.len() * scans.set.count());
     let outcomes = evaluate(&registry, &policies, scans.set.as_ref(), &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
-    })?;
+    });
     bar.finish_and_clear();
-    let report = report(arguments, &scans, &outcomes);
-    if let Some(folder) = &arguments.out {
-        report
-            .write(&outcomes, folder)
-            .map_err(|error| format!("cannot write the results to {}: {error}", folder.display()))?;
-    }
-    if arguments.json {
-        println!("{}", serde_json::to_string(&report)?);
-    } else {
-        print!("{}", report.markdown());
-    }
-    Ok(())
+    let outcomes = outcomes?;
+    let mut weights = registry.weights();
+    weights.retain(|name, _| policies.contains(name));
+    let report = report(arguments, &scans, weights, &outcomes);
+    // Both in any case: what one cannot take, the other has.
+    let written = arguments
+        .out
+        .as_ref()
+        .map_or(Ok(()), |folder| report.write(&outcomes, folder).map_err(|error| unwritable(folder, error)));
+    print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })?;
+    Ok(written?)
 }
 
-fn policies(asked: &str, registry: &Registry) -> Vec<PolicyName> {
-    if asked == "all" {
-        registry.entries().into_iter().filter(|entry| entry.available).map(|entry| entry.name).collect()
-    } else {
-        asked.split(',').map(|name| PolicyName::new(name.trim())).collect()
+/// The policies asked for, each once.
+fn policies(asked: &[String], registry: &Registry) -> Vec<PolicyName> {
+    let mut policies: Vec<PolicyName> = Vec::new();
+    for name in asked.iter().flat_map(|argument| names(argument)) {
+        let all = registry.entries().into_iter().filter(|entry| entry.available).map(|entry| entry.name);
+        let named: Vec<_> = if name == "all" { all.collect() } else { vec![PolicyName::new(name)] };
+        policies.extend(named.into_iter().filter(|name| !policies.contains(name)).collect::<Vec<_>>());
+    }
+    policies
+}
+
+/// The names in one argument; a file's goes on to its end.
+fn names(argument: &str) -> Vec<&str> {
+    let argument = argument.trim_start();
+    match argument.split_once(',') {
+        Some((name, rest)) if !argument.starts_with(scripted::PREFIX) => {
+            std::iter::once(name.trim_end()).chain(names(rest)).collect()
+        }
+        _ => vec![argument.trim_end()],
     }
 }
 
@@ -97,9 +122,6 @@ struct Scans {
 }
 
 fn scans(arguments: &Arguments) -> Result<Scans, Failure> {
-    if arguments.count == Some(0) {
-        return Err("--count must be at least 1".into());
-    }
     if arguments.scans == "simulated" {
         return simulated(arguments);
     }
@@ -109,6 +131,9 @@ fn scans(arguments: &Arguments) -> Result<Scans, Failure> {
     let between = Some(arguments.between);
     let recorded = |scans| Box::new(Recorded { scans, between: arguments.between });
     if arguments.scans == "phantom" {
+        if arguments.count.is_some_and(|count| count > MOST_PHANTOM) {
+            return Err(format!("--count is at most {MOST_PHANTOM} over the phantom").into());
+        }
         let scans = (0..arguments.count.unwrap_or(1) as u64).map(|index| phantom(arguments.seed.wrapping_add(index)));
         return Ok(Scans { set: recorded(scans.collect()), seed: arguments.seed, between });
     }
@@ -151,16 +176,46 @@ fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
     Ok(Scans { set: Box::new(set), seed, between: None })
 }
 
-fn report(arguments: &Arguments, scans: &Scans, outcomes: &[Outcome]) -> Report {
+fn report(arguments: &Arguments, scans: &Scans, weights: BTreeMap<PolicyName, String>, outcomes: &[Outcome]) -> Report {
     let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();
     let comparisons = compare(&rows);
     let footage = arguments.footage.iter().map(|path| path.display().to_string()).collect();
-    let (name, count) = (arguments.scans.clone(), scans.set.count());
-    Report { scans: name, seed: scans.seed, count, footage, between: scans.between, rows, comparisons }
+    let weights_folder = arguments.weights.as_ref().map(|folder| folder.display().to_string());
+    Report {
+        scans: arguments.scans.clone(),
+        seed: scans.seed,
+        count: scans.set.count(),
+        footage,
+        between: scans.between,
+        weights_folder,
+        weights,
+        rows,
+        comparisons,
+    }
 }
 
 fn progress(total: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} scans, {eta} left: {msg}");
     let bar = ProgressBar::new(total as u64);
     style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_split_at_commas_but_a_files_path_is_not() {
+        let asked = ["fixed, mgm-learned", "parfocal,file:a,b.pt", "fixed"].map(str::to_owned);
+        let names: Vec<_> = policies(&asked, &Registry::default()).iter().map(ToString::to_string).collect();
+        assert_eq!(names, ["fixed", "mgm-learned", "parfocal", "file:a,b.pt"]);
+    }
+
+    #[test]
+    fn all_may_stand_beside_others() {
+        let registry = || Registry::standard().without("broken", "", "it is not here");
+        let count = Registry::standard().entries().len();
+        let names = policies(&["all".to_owned(), "parfocal,file:a.pt".to_owned()], &registry());
+        assert_eq!((names.len(), names[count].as_str()), (count + 1, "file:a.pt"));
+    }
 }

@@ -1,8 +1,6 @@
 //! `parfocal policies`: lists the registry.
 
-use std::io::Write;
-
-use super::Failure;
+use super::{Failure, print};
 use crate::autofocus::{PolicyEntry, Registry};
 
 /// Arguments of `parfocal policies`.
@@ -20,8 +18,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let entries = Registry::standard().entries();
     let text = if arguments.json { serde_json::to_string_pretty(&entries)? + "\n" } else { table(&entries) };
-    std::io::stdout().write_all(text.as_bytes())?;
-    Ok(())
+    print(&text)
 }
 
 fn table(entries: &[PolicyEntry]) -> String {

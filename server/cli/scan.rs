@@ -4,11 +4,9 @@ mod import;
 mod info;
 mod record;
 
-use std::io::Write;
-
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Failure;
+use super::{Failure, print};
 
 /// Arguments of `parfocal scan`.
 #[derive(Debug, clap::Args)]
@@ -45,9 +43,4 @@ pub(super) fn bar(total: usize, done: usize) -> ProgressBar {
     bar.reset_eta();
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} poses, {eta} left {msg}");
     style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
-}
-
-fn print(text: &str) -> Result<(), Failure> {
-    std::io::stdout().write_all(text.as_bytes())?;
-    Ok(())
 }

@@ -3,24 +3,20 @@
 use std::fmt::Write as _;
 
 /// Width of a plot.
-pub const WIDTH: f64 = 900.0;
+const WIDTH: f64 = 900.0;
 /// Height of a panel.
 pub const PANEL: f64 = 230.0;
 /// Where panels begin, rightwards.
-pub const LEFT: f64 = 55.0;
+const LEFT: f64 = 55.0;
 
-/// The beginning of a plot of this height.
-#[must_use]
-pub fn begin(height: f64) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" \
-         font-size=\"12\"><rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-    )
-}
+/// Rightmost end of panels and keys.
+const RIGHT: f64 = WIDTH - 15.0;
+/// Height of a row of keys.
+const ROW: f64 = 18.0;
 
 /// A frame with its top at `top`, for values of `label` from 0 to `most` over `across`.
 pub fn panel(svg: &mut String, top: f64, label: &str, most: f64, across: &str) {
-    let (right, bottom) = (WIDTH - 15.0, top + PANEL);
+    let (right, bottom) = (RIGHT, top + PANEL);
     let _ = writeln!(
         svg,
         "<rect x=\"{LEFT}\" y=\"{top}\" width=\"{}\" height=\"{PANEL}\" fill=\"none\" stroke=\"#cccccc\"/>\
@@ -39,7 +35,7 @@ pub fn panel(svg: &mut String, top: f64, label: &str, most: f64, across: &str) {
 /// A line through `values` in the panel whose top is at `top`.
 #[allow(clippy::cast_precision_loss, reason = "frame numbers are small")]
 pub fn line(svg: &mut String, values: &[f64], top: f64, most: f64, colour: &str, name: &str) {
-    let step = (WIDTH - 15.0 - LEFT) / (values.len().max(2) - 1) as f64;
+    let step = (RIGHT - LEFT) / (values.len().max(2) - 1) as f64;
     let mut points = String::new();
     for (index, value) in values.iter().enumerate() {
         let y = top + PANEL * (1.0 - (value / most).clamp(0.0, 1.0));
@@ -48,30 +44,103 @@ pub fn line(svg: &mut String, values: &[f64], top: f64, most: f64, colour: &str,
     let _ = writeln!(
         svg,
         "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\">\
-         <title>{name}</title></polyline>"
+         <title>{}</title></polyline>",
+        escaped(name),
     );
 }
 
-/// What each colour stands for, in a row whose base line is at `y`.
-pub fn legend<'a>(svg: &mut String, y: f64, entries: impl IntoIterator<Item = (&'a str, &'a str)>) {
-    let mut x = LEFT;
+/// The whole plot of what `panels` holds down to `bottom`, with a key below for each name and colour.
+#[must_use]
+pub fn finished<'a>(panels: &str, bottom: f64, entries: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
+    let (mut keys, mut x, mut y) = (String::new(), LEFT, bottom + ROW);
     for (name, colour) in entries {
-        let _ = writeln!(svg, "<rect x=\"{x}\" y=\"{}\" width=\"12\" height=\"4\" fill=\"{colour}\"/>", y - 6.0);
-        let _ = writeln!(svg, "<text x=\"{}\" y=\"{y}\">{name}</text>", x + 16.0);
-        x += 105.0;
+        let name = shortened(name);
+        let width = key_width(&name);
+        if x + width > RIGHT && x > LEFT {
+            (x, y) = (LEFT, y + ROW);
+        }
+        let _ = writeln!(
+            keys,
+            "<rect x=\"{x:.1}\" y=\"{}\" width=\"12\" height=\"4\" fill=\"{colour}\"/>\
+             <text x=\"{:.1}\" y=\"{y}\">{}</text>",
+            y - 6.0,
+            x + 16.0,
+            escaped(&name),
+        );
+        x += width;
     }
+    let height = y + 12.0;
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" \
+         font-size=\"12\"><rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{panels}{keys}</svg>\n"
+    )
+}
+
+/// Room for a key: swatch, gaps, and 7.5 a character, wider than sans-serif letters of 12 are on average.
+#[allow(clippy::cast_precision_loss, reason = "a hundred characters at most")]
+fn key_width(name: &str) -> f64 {
+    30.0 + 7.5 * name.chars().count() as f64
+}
+
+/// The end of a name that is too long for a row, as of a file deep in folders.
+fn shortened(name: &str) -> String {
+    const MOST: usize = 80;
+    let extra = name.chars().count().saturating_sub(MOST);
+    if extra == 0 { name.to_owned() } else { format!("…{}", name.chars().skip(extra).collect::<String>()) }
+}
+
+/// `text` as it may stand in XML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Focal powers over poses: a line for each name and colour.
 #[must_use]
 pub fn over_poses(lines: &[(&str, &str, &[f64])]) -> String {
-    let height = PANEL + 70.0;
-    let mut svg = begin(height);
-    panel(&mut svg, 20.0, "focal power", 1.0, "pose");
+    let mut panels = String::new();
+    panel(&mut panels, 20.0, "focal power", 1.0, "pose");
     for (name, colour, values) in lines {
-        line(&mut svg, values, 20.0, 1.0, colour, name);
+        line(&mut panels, values, 20.0, 1.0, colour, name);
     }
-    legend(&mut svg, height - 12.0, lines.iter().map(|(name, colour, _)| (*name, *colour)));
-    svg.push_str("</svg>\n");
-    svg
+    finished(&panels, PANEL + 40.0, lines.iter().map(|(name, colour, _)| (*name, *colour)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where each key stands: left end, base line, name.
+    fn keys(svg: &str) -> Vec<(f64, f64, String)> {
+        let keys = svg.lines().filter(|line| line.starts_with("<rect x=") && line.contains("height=\"4\""));
+        keys.map(|line| {
+            let (x, rest) = line.split_once("<text x=\"").unwrap().1.split_once("\" y=\"").unwrap();
+            let (y, rest) = rest.split_once("\">").unwrap();
+            (x.parse().unwrap(), y.parse().unwrap(), rest.strip_suffix("</text>").unwrap().to_owned())
+        })
+        .collect()
+    }
+
+    #[test]
+    fn keys_go_on_in_the_next_row_and_stay_within_the_picture() {
+        let names = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-learned", "mlr-learned", "cnn-learned"];
+        let names = names.into_iter().chain(["parfocal", "file:my.pt", "optimum"]);
+        let svg = finished("", 300.0, names.map(|name| (name, "black")));
+        let keys = keys(&svg);
+        assert_eq!(keys.len(), 9);
+        for (key, next) in keys.iter().zip(&keys[1..]) {
+            // At 12 pixels no sans-serif letter of these names is wider than 7 on average.
+            let end = key.0 + 7.0 * f64::from(u8::try_from(key.2.len()).unwrap());
+            assert!(end <= WIDTH && (next.1 > key.1 || end < next.0 - 16.0), "{key:?} {next:?}");
+        }
+        let last = keys.last().unwrap();
+        assert!(last.1 > 318.0 && svg.contains(&format!("0 0 900 {}", last.1 + 12.0)), "{svg}");
+    }
+
+    #[test]
+    fn names_are_escaped_and_long_ones_lose_their_beginning() {
+        let name = format!("file:{}/a&b<c>.pt", "x".repeat(200));
+        let svg = over_poses(&[(&name, "black", &[0.5])]);
+        assert!(svg.contains("<title>file:xxx") && svg.contains("/a&amp;b&lt;c&gt;.pt</title>"), "{svg}");
+        assert!(keys(&svg)[0].2.starts_with("…xxx"), "{svg}");
+    }
 }

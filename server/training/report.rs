@@ -1,5 +1,6 @@
 //! An evaluation for people and programs: JSON as in the contract, Markdown, CSV, and the paper's figure as SVG.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path as FilePath;
 use std::{fs, io};
@@ -7,10 +8,11 @@ use std::{fs, io};
 use serde::Serialize;
 
 use super::evaluate::{Comparison, ORACLE, Outcome, Row};
-use super::plot::{PANEL, begin, legend, line, panel};
+use super::plot::{PANEL, finished, line, panel};
 use super::recorded::Between;
 use super::rollout::Path;
-use crate::autofocus::IN_FOCUS;
+use crate::autofocus::{IN_FOCUS, PolicyName};
+use crate::files::replace;
 
 /// What `evaluate` gives. The contract fixes the fields' names.
 #[derive(Debug, Clone, Serialize)]
@@ -26,6 +28,11 @@ pub struct Report {
     /// What a recorded scan shows between two of its focal powers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub between: Option<Between>,
+    /// Folder of weights in the place of those that ship, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights_folder: Option<String>,
+    /// SHA-256 of the weights of each learned policy that was evaluated.
+    pub weights: BTreeMap<PolicyName, String>,
     /// One a policy.
     pub rows: Vec<Row>,
     /// One a pair of policies.
@@ -56,7 +63,7 @@ const ROBOTIC: [PaperRow; 6] = [
 ];
 
 impl Report {
-    /// The table as Markdown, beside the paper's figures on scans of the same kind.
+    /// The table as Markdown, beside the paper's figures on scans of the same kind; then the tests, and what was evaluated.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(
@@ -82,26 +89,77 @@ impl Report {
                 row.reversals,
             );
         }
-        let _ = write!(text, "\nScans: {}, {} of them, seed {}.", self.scans, self.count, self.seed);
-        text.push_str(match self.between {
-            None => "\n",
-            Some(Between::Nearest) => " A frame shows the picture recorded at the nearest focal power.\n",
-            Some(Between::Interpolated) => {
-                " A frame shows a mix of the pictures recorded at the two focal powers around.\n"
-            }
-        });
+        text.push_str(&self.tests());
+        let _ = writeln!(text, "\n{}", self.about());
         text
     }
 
-    /// The rows as CSV.
-    #[must_use]
-    pub fn csv(&self) -> String {
-        let mut text = String::from("policy,frames,mae,sd,in_focus,travel,reversals\n");
-        for row in &self.rows {
-            let Row { policy, frames, mae, sd, in_focus, travel, reversals, .. } = row;
-            let _ = writeln!(text, "{policy},{frames},{mae},{sd},{in_focus},{travel},{reversals}");
+    /// p of the test between any two policies, as Markdown; nothing where there is but one.
+    fn tests(&self) -> String {
+        let names: Vec<&str> =
+            self.rows.iter().map(|row| row.policy.as_str()).filter(|policy| *policy != ORACLE).collect();
+        let Some(columns) = names.get(1..).filter(|columns| !columns.is_empty()) else { return String::new() };
+        let over = if self.between.is_some() { "stretches of the scans" } else { "scans" };
+        let mut text = format!("\np of the paired Wilcoxon signed-rank test over {over}:\n\n");
+        let _ = writeln!(text, "| | {} |\n|{}", columns.join(" | "), "---|".repeat(names.len()));
+        for a in &names[..columns.len()] {
+            let cell = |b: &&str| {
+                let of = |test: &&Comparison| test.a == *a && test.b == **b;
+                self.comparisons.iter().find(of).map_or_else(String::new, |test| probability(test.p))
+            };
+            let cells: Vec<String> = columns.iter().map(cell).collect();
+            let _ = writeln!(text, "| {a} | {} |", cells.join(" | "));
         }
         text
+    }
+
+    /// What was evaluated, in sentences.
+    fn about(&self) -> String {
+        let mut text = format!("Scans: {}", self.scans);
+        if !self.footage.is_empty() {
+            let _ = write!(text, " over {}", self.footage.join(", "));
+        }
+        let _ = write!(text, ", {} of them, seed {}.", self.count, self.seed);
+        text.push_str(match self.between {
+            None => "",
+            Some(Between::Nearest) => " A frame shows the picture recorded at the nearest focal power.",
+            Some(Between::Interpolated) => {
+                " A frame shows a mix of the pictures recorded at the two focal powers around."
+            }
+        });
+        if !self.weights.is_empty() {
+            let weights: Vec<_> = self.weights.iter().map(|(name, sum)| format!("{name} {sum:.12}")).collect();
+            let _ = write!(text, " Weights, by how their SHA-256 begins: {}", weights.join(", "));
+            match &self.weights_folder {
+                None => text.push('.'),
+                Some(folder) => {
+                    let _ = write!(text, "; those in {folder} took the place of those that ship.");
+                }
+            }
+        }
+        text
+    }
+
+    /// The rows as CSV, each with what was evaluated.
+    ///
+    /// # Errors
+    /// None in practice: it is made in memory.
+    pub fn csv(&self) -> io::Result<String> {
+        let mut table = csv::Writer::from_writer(Vec::new());
+        table.write_record(COLUMNS)?;
+        for row in &self.rows {
+            let weights = self.weights.get(&PolicyName::new(&row.policy));
+            let numbers = [row.mae, row.sd, row.in_focus, row.travel, row.reversals];
+            let intervals = [row.mae_interval, row.in_focus_interval].map(|(low, high)| [low, high]);
+            let numbers = numbers.iter().chain(intervals.as_flattened()).map(f64::to_string);
+            let mut record = vec![row.policy.clone(), row.frames.to_string()];
+            record.extend(numbers);
+            record.extend([self.scans.clone(), self.seed.to_string(), self.footage.join("; ")]);
+            record.push(weights.cloned().unwrap_or_default());
+            table.write_record(record)?;
+        }
+        let bytes = table.into_inner().map_err(|error| io::Error::other(error.to_string()))?;
+        String::from_utf8(bytes).map_err(io::Error::other)
     }
 
     /// Writes `results.json`, `results.md`, `results.csv` and `figure.svg` (the first scan's paths) into `folder`.
@@ -110,11 +168,36 @@ impl Report {
     /// When a file cannot be written.
     pub fn write(&self, outcomes: &[Outcome], folder: &FilePath) -> io::Result<()> {
         fs::create_dir_all(folder)?;
-        fs::write(folder.join("results.json"), serde_json::to_string_pretty(self)?)?;
-        fs::write(folder.join("results.md"), self.markdown())?;
-        fs::write(folder.join("results.csv"), self.csv())?;
-        fs::write(folder.join("figure.svg"), figure(outcomes, 0))
+        let write = |name: &str, text: String| replace(&folder.join(name), text.as_bytes());
+        write("results.json", serde_json::to_string_pretty(self)?)?;
+        write("results.md", self.markdown())?;
+        write("results.csv", self.csv()?)?;
+        write("figure.svg", figure(outcomes, 0))
     }
+}
+
+/// Columns of the table as CSV. New ones come at the end.
+const COLUMNS: [&str; 15] = [
+    "policy",
+    "frames",
+    "mae",
+    "sd",
+    "in_focus",
+    "travel",
+    "reversals",
+    "mae_low",
+    "mae_high",
+    "in_focus_low",
+    "in_focus_high",
+    "scans",
+    "seed",
+    "footage",
+    "weights",
+];
+
+/// A p for people: `0.03`, or `4e-11` where it is below a thousandth.
+fn probability(p: f64) -> String {
+    if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
 }
 
 const COLOURS: [&str; 8] = ["#999999", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#6a3d9a"];
@@ -127,8 +210,7 @@ pub fn figure(outcomes: &[Outcome], index: usize) -> String {
         .filter(|outcome| outcome.policy != ORACLE)
         .filter_map(|outcome| Some((outcome.policy.as_str(), outcome.paths.get(index)?)))
         .collect();
-    let height = 2.0 * PANEL + 110.0;
-    let mut svg = begin(height);
+    let mut svg = String::new();
     panel(&mut svg, 20.0, "focal power", 1.0, "frame");
     panel(&mut svg, PANEL + 50.0, "focal error", 0.5, "frame");
     for (colour, (name, path)) in COLOURS.iter().cycle().zip(&policies) {
@@ -140,9 +222,7 @@ pub fn figure(outcomes: &[Outcome], index: usize) -> String {
         line(&mut svg, &vec![IN_FOCUS; path.optimum.len()], PANEL + 50.0, 0.5, "#bbbbbb", "in focus");
     }
     let names = policies.iter().map(|policy| policy.0);
-    legend(&mut svg, height - 12.0, names.zip(COLOURS.into_iter().cycle()).chain([("optimum", "black")]));
-    svg.push_str("</svg>\n");
-    svg
+    finished(&svg, 2.0 * PANEL + 80.0, names.zip(COLOURS.into_iter().cycle()).chain([("optimum", "black")]))
 }
 
 /// Mean of up to five values around each.
@@ -155,6 +235,52 @@ fn moving_average(values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn path(errors: [f64; 4]) -> Vec<Path> {
+        errors.map(|error| Path { focal_power: vec![0.5], optimum: vec![0.5 + error] }).to_vec()
+    }
+
+    fn report() -> Report {
+        let outcome = |(name, paths): (&str, Vec<Path>)| Outcome { policy: name.to_owned(), paths, parts: 1 };
+        let outcomes = [
+            (ORACLE, path([0.0; 4])),
+            ("near", path([0.01, 0.02, 0.03, 0.04])),
+            ("file:far,b.pt", path([0.11, 0.12, 0.13, 0.14])),
+        ];
+        let rows: Vec<Row> = outcomes.map(outcome).iter().map(Outcome::row).collect();
+        Report {
+            scans: "simulated".to_owned(),
+            seed: 7,
+            count: 4,
+            footage: vec!["endo.mp4".to_owned()],
+            between: None,
+            weights_folder: Some("runs/x".to_owned()),
+            weights: [(PolicyName::new("near"), "0123456789abcdef".repeat(4))].into(),
+            comparisons: super::super::evaluate::compare(&rows),
+            rows,
+        }
+    }
+
+    #[test]
+    fn what_was_evaluated_and_the_tests_stand_below_the_table() {
+        let text = report().markdown();
+        // All four pairs differ alike: z = -5 / sqrt(7.5 - 1.25), two-sided.
+        assert!(text.contains("| | file:far,b.pt |\n|---|---|\n| near | 0.046 |\n"), "{text}");
+        assert!(text.contains("Scans: simulated over endo.mp4, 4 of them, seed 7. Weights, "), "{text}");
+        assert!(text.contains("near 0123456789ab; those in runs/x took"), "{text}");
+    }
+
+    #[test]
+    fn the_table_as_csv_has_intervals_footage_and_weights() {
+        let text = report().csv().unwrap();
+        let mut table = csv::Reader::from_reader(text.as_bytes());
+        let records: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
+        let cell = |row: usize, column: &str| &records[row][COLUMNS.iter().position(|name| *name == column).unwrap()];
+        assert_eq!((cell(2, "policy"), cell(2, "footage"), cell(2, "weights")), ("file:far,b.pt", "endo.mp4", ""));
+        assert_eq!(cell(1, "weights"), "0123456789abcdef".repeat(4));
+        let [low, mae, high] = ["mae_low", "mae", "mae_high"].map(|column| cell(1, column).parse::<f64>().unwrap());
+        assert!(0.01 <= low && low < mae && mae < high && high <= 0.04, "{text}");
+    }
 
     #[test]
     fn the_moving_average_of_a_spike_is_a_plateau() {

@@ -1,0 +1,109 @@
+//! What an evaluation does with its arguments, and where its results go.
+
+use super::*;
+
+/// Evaluates on one simulated scan with more arguments.
+fn evaluate(more: &[&str]) -> Command {
+    command(&[&["evaluate", "--count", "1"], more].concat())
+}
+
+#[test]
+fn results_that_cannot_be_written_are_still_printed() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("results");
+    // Something stands where the last file would.
+    fs::create_dir_all(out.join("figure.svg")).unwrap();
+    let output = evaluate(&["--policies", "fixed", "--out", text(&out)]).output().unwrap();
+    assert!(complaint(&output).contains("cannot write the results to"), "{}", complaint(&output));
+    assert!(said(&output).contains("| fixed |"), "{}", said(&output));
+    // A folder that cannot be is told before anything is played, so before the footage is missed.
+    let file = out.join("results.json");
+    let output = evaluate(&["--out", text(&file), "--footage", "/no/such.mp4"]).output().unwrap();
+    assert!(complaint(&output).contains("cannot write the results to"), "{}", complaint(&output));
+}
+
+#[test]
+fn a_full_disk_leaves_no_half_of_a_result() {
+    let folder = TempDir::new().unwrap();
+    let disk = folder.path().join("disk");
+    fs::create_dir(&disk).unwrap();
+    // Four pages: the tables fit, the figure does not. The disk is gone with the namespace that it is mounted in.
+    let script = format!(
+        "mount -t tmpfs -o size=16k tmpfs {0} || exit 77
+         {1} evaluate --count 1 --policies fixed --out {0}/out >/dev/null; echo code $?; ls -A {0}/out",
+        disk.display(),
+        env!("CARGO_BIN_EXE_parfocal"),
+    );
+    let output = Command::new("unshare").args(["-rm", "sh", "-c", &script]).stdin(Stdio::null()).output();
+    let output = match output {
+        Ok(output) if output.status.code() != Some(77) && !said(&output).is_empty() => output,
+        other => return println!("skipped: a small disk cannot be mounted here: {other:?}"),
+    };
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(said(&output), "code 1\nresults.csv\nresults.json\nresults.md\n", "{error}");
+    assert!(error.contains("cannot write the results to"), "{error}");
+}
+
+#[test]
+fn a_standard_output_that_takes_nothing_is_told() {
+    for arguments in [["--policies", "fixed"].as_slice(), &["--policies", "fixed", "--json"]] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = evaluate(arguments).stdout(full).output().unwrap();
+        assert!(
+            complaint(&output).contains("cannot write to standard output: No space left"),
+            "{}",
+            complaint(&output)
+        );
+    }
+}
+
+#[test]
+fn numbers_of_scans_that_cannot_be_meant_are_wrong_usage() {
+    for count in ["0", "10001", "100000000000000000", "18446744073709551615"] {
+        let output = parfocal(&["evaluate", "--policies", "fixed", "--count", count]);
+        assert_eq!(output.status.code(), Some(2), "{count}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("1..=10000"), "{count}");
+    }
+    let many = parfocal(&["evaluate", "--scans", "phantom", "--policies", "fixed", "--count", "101"]);
+    assert!(complaint(&many).contains("at most 100 over the phantom"));
+}
+
+#[test]
+fn a_policy_that_cannot_run_is_told_before_anything_is_played() {
+    // The footage would be missed next.
+    for (policies, told) in [
+        ("fixed,nonsense", "there is no policy 'nonsense'"),
+        ("file:no,such.pt", "cannot read no,such.pt"),
+        ("file:tests/vectors/flat-only.pt", "it returned no numbers"),
+    ] {
+        let output = evaluate(&["--policies", policies, "--footage", "/no/such.mp4"]).output().unwrap();
+        assert!(complaint(&output).contains(told), "{}", complaint(&output));
+    }
+}
+
+#[test]
+fn results_say_what_was_evaluated() {
+    let folder = TempDir::new().unwrap();
+    let (out, still, script) =
+        (folder.path().join("out"), folder.path().join("still.png"), folder.path().join("a,b&c.pt"));
+    fs::copy("tests/vectors/first-frame.pt", &script).unwrap();
+    let noise = |x: u32, y: u32| u8::try_from((x * 7919 + y * 104_729 + x * y * 31) % 200).unwrap();
+    image::GrayImage::from_fn(160, 120, |x, y| image::Luma([noise(x, y)])).save(&still).unwrap();
+    let policy = format!("file:{}", text(&script));
+    let arguments = ["--policies", "fixed,mgm-learned", "--policies", &policy, "--weights", "policies"];
+    let output = evaluate(&arguments).args(["--footage", text(&still), "--out", text(&out)]).output().unwrap();
+    assert!(output.status.success(), "{}", complaint(&output));
+    let read = |name: &str| fs::read_to_string(out.join(name)).unwrap();
+    let report: Value = serde_json::from_str(&read("results.json")).unwrap();
+    let sum = report["weights"]["mgm-learned"].as_str().unwrap();
+    assert_eq!((sum.len(), report["weights"].as_object().unwrap().len()), (64, 2));
+    assert_eq!((&report["weights_folder"], &report["rows"][3]["policy"]), (&"policies".into(), &policy.clone().into()));
+    let table = read("results.md");
+    assert_eq!(table, said(&output));
+    for told in [&format!("over {}, 1 of them", text(&still)), &format!("mgm-learned {}", &sum[..12]), "in policies"] {
+        assert!(table.contains(told), "{table}");
+    }
+    let csv = read("results.csv");
+    assert!(csv.lines().nth(3).unwrap().ends_with(&format!(",simulated,2023,{},{sum}", text(&still))), "{csv}");
+    assert!(read("figure.svg").contains("a,b&amp;c.pt</title>"));
+}
