@@ -31,7 +31,9 @@ pub enum ClipError {
     #[error("there are no pictures to scan")]
     Empty,
     /// A patch and its surroundings do not fit.
-    #[error("pictures must show at least 64x64 pixels to scan; these show {width}x{height}")]
+    #[error(
+        "pictures must show at least 64x64 pixels to scan, in the square within their content area where they have one; these show {width}x{height}"
+    )]
     TooSmall {
         /// Usable width in pixels.
         width: usize,
