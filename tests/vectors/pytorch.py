@@ -2,6 +2,9 @@
 
 The networks are built here from the paper's description and from docs alone. Weights and inputs are sines, so that the
 tests can make the same ones and only outputs need be stored.
+
+Imported, it only defines the networks that the shipped weights fit: `CnnLearned` (cnn-learned), `MetricLearned` (mgm-learned and
+mlr-learned) and `Belief` (parfocal). The paper's three take focal powers f in 0..1 as 2 (f - 0.5); `scaled_focal_powers` does that.
 """
 
 import json
@@ -24,14 +27,35 @@ def fill(module):
         parameter.data = wave(parameter.numel(), 0.37 + 0.01 * k, 0.2).view(parameter.shape)
 
 
+def scaled_focal_powers(focal_powers):
+    """Focal powers 0..1 as `CnnLearned` and `MetricLearned` take them."""
+    return 2 * (focal_powers - 0.5)
+
+
+def scaled_mgm(metrics):
+    """Mean gradient magnitudes as `MetricLearned` takes them."""
+    return (metrics + 0.5).log() - 3.5
+
+
+def scaled_mlr(metrics):
+    """Mean local ratios as `MetricLearned` takes them."""
+    return 0.5 * ((metrics - 1).clamp(min=0) + 1e-4).log() + 1.75
+
+
+def head(inputs):
+    return nn.Sequential(nn.Linear(inputs, 256), nn.ReLU(), nn.Linear(256, 256), nn.ReLU(), nn.Linear(256, 3))
+
+
 class CnnLearned(nn.Module):
+    """Patches `[8, 1024]` (0..255) and scaled focal powers `[8]`, oldest first, to the values `[1, 3]` of down, none, up."""
+
     def __init__(self):
         super().__init__()
         layers = [nn.Conv2d(1, 8, 3, 2)]
         for _ in range(3):
             layers += [nn.ReLU(), nn.Conv2d(8, 8, 3, 2)]
         self.encoder = nn.Sequential(*layers)
-        self.head = nn.Sequential(nn.Linear(72, 256), nn.ReLU(), nn.Linear(256, 256), nn.ReLU(), nn.Linear(256, 3))
+        self.head = head(8 * (8 + 1))
 
     def encode(self, patches):
         centred = patches - patches.mean(1, keepdim=True)
@@ -42,7 +66,20 @@ class CnnLearned(nn.Module):
         return self.head(torch.cat([self.encode(patches).flatten()[None], focal_powers[None]], 1))
 
 
+class MetricLearned(nn.Module):
+    """Scaled metrics `[8]` and scaled focal powers `[8]`, oldest first, to the values `[1, 3]` of down, none, up."""
+
+    def __init__(self):
+        super().__init__()
+        self.head = head(8 * (1 + 1))
+
+    def forward(self, metrics, focal_powers):
+        return self.head(torch.cat([metrics[None], focal_powers[None]], 1))
+
+
 class Belief(nn.Module):
+    """Inputs `[N, T, 87]`, as `server/autofocus/belief.rs` makes them of frames, to logits `[N, T, 41]` of the optimum's bins."""
+
     def __init__(self, inputs, units, bins):
         super().__init__()
         self.memory = nn.GRU(inputs, units, batch_first=True)
@@ -67,7 +104,8 @@ class WrongShape(nn.Module):
         return focal_powers
 
 
-with torch.no_grad():
+@torch.no_grad()
+def main():
     cnn = CnnLearned()
     fill(cnn)
     patches = wave(8 * 1024, 0.113, 100.0, 128.0).view(8, 1024)
@@ -85,3 +123,7 @@ with torch.no_grad():
     (HERE / "pytorch.json").write_text(json.dumps(vectors, indent=1) + "\n")
     torch.jit.script(SteepestFrame()).save(str(HERE / "steepest-frame.pt"))
     torch.jit.script(WrongShape()).save(str(HERE / "wrong-shape.pt"))
+
+
+if __name__ == "__main__":
+    main()
