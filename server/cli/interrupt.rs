@@ -4,9 +4,6 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Status of a process that Ctrl-C ended, as shells have it: 128 and the signal's number.
-const INTERRUPTED: i32 = 130;
-
 /// Whether Ctrl-C was pressed, and whether anything is left to save then.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
@@ -27,7 +24,8 @@ impl Interrupt {
             runtime.block_on(async {
                 while tokio::signal::ctrl_c().await.is_ok() {
                     if heard.asked.swap(true, Ordering::Relaxed) || heard.saved.load(Ordering::Relaxed) {
-                        std::process::exit(INTERRUPTED);
+                        // As though nobody listened. An exit would take libtorch down while another thread computes with it.
+                        let _ = signal_hook::low_level::emulate_default_handler(signal_hook::consts::SIGINT);
                     }
                     eprintln!("{notice}; Ctrl-C again to leave at once");
                 }
