@@ -12,7 +12,7 @@ use crate::imaging::{ContentArea, GrayImage, content_area};
 /// Most lines of a picture: the height the paper's walks are meant for.
 const LINES: u32 = 480;
 /// Most frames taken of one video: a minute at 25 a second.
-const FRAMES: u32 = 1500;
+const FRAMES: usize = 1500;
 const IMAGES: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
 /// Why footage cannot be scanned.
@@ -36,7 +36,8 @@ pub enum FootageError {
     },
 }
 
-/// The clips in `path`: one of a video or an image; one of each image of a folder.
+/// The clips in `path`: one of a video or an image; one of each image of a folder. What of a video is left out, since it is
+/// longer than 1500 frames or damaged, is told on the standard error.
 ///
 /// # Errors
 /// When it cannot be read, holds no picture, or its pictures are too small.
@@ -83,7 +84,10 @@ fn unreadable(path: &Path, reason: &str) -> FootageError {
 }
 
 fn image(path: &Path) -> Result<GrayImage, FootageError> {
-    let picture = image::open(path).map_err(|error| unreadable(path, &error.to_string()))?;
+    // By what the file holds: a name may lie about that.
+    let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
+    let reader = reader.map_err(|error| unreadable(path, &error.to_string()))?;
+    let picture = reader.decode().map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = if picture.height() > LINES {
         picture.resize(u32::MAX, LINES, image::imageops::FilterType::Triangle)
     } else {
@@ -101,16 +105,31 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     let output = Command::new("ffmpeg")
         .args(["-v", "error", "-nostdin", "-i"])
         .arg(path)
-        .args(["-frames:v", &FRAMES.to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
+        // One more, to know whether there are more.
+        .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
         .output()
         .map_err(|error| unreadable(path, &format!("ffmpeg, which decodes videos, cannot be started: {error}")))?;
+    let told = String::from_utf8_lossy(&output.stderr);
+    let told = told.lines().last();
     if !output.status.success() {
-        let told = String::from_utf8_lossy(&output.stderr);
-        return Err(unreadable(path, &format!("ffmpeg: {}", told.lines().last().unwrap_or("failed"))));
+        return Err(unreadable(path, &format!("ffmpeg: {}", told.unwrap_or("failed"))));
     }
-    let frames: Vec<Arc<GrayImage>> = pictures(&output.stdout).map(Arc::new).collect();
-    if frames.is_empty() { Err(unreadable(path, "it holds no frames")) } else { Ok(frames) }
+    let mut frames: Vec<Arc<GrayImage>> = pictures(&output.stdout).map(Arc::new).collect();
+    if frames.is_empty() {
+        return Err(unreadable(path, "it holds no frames"));
+    }
+    if let Some(told) = told {
+        eprintln!("note: {} is damaged (ffmpeg: {told}); {} frames of it could be read", path.display(), frames.len());
+    }
+    if frames.len() > FRAMES {
+        frames.truncate(FRAMES);
+        eprintln!(
+            "note: only the first {FRAMES} frames of {} are used; cut it into several to use more",
+            path.display()
+        );
+    }
+    Ok(frames)
 }
 
 /// The binary PGM pictures that follow one another in `bytes`, up to the first that is not whole.
@@ -178,5 +197,13 @@ mod tests {
         let small = folder.path().join("small.png");
         image::GrayImage::new(40, 40).save(&small).unwrap();
         assert!(clips(&small).unwrap_err().to_string().contains("at least 64x64"));
+    }
+
+    #[test]
+    fn a_picture_is_what_it_holds_whatever_its_name_says() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("is-a-png.jpg");
+        image::GrayImage::new(70, 70).save_with_format(&file, image::ImageFormat::Png).unwrap();
+        assert_eq!(clips(&file).unwrap().len(), 1);
     }
 }
