@@ -72,7 +72,7 @@ pub struct DqnRecipe {
     pub first_epsilon: f64,
     /// Share of random actions at last.
     pub last_epsilon: f64,
-    /// Frames over which the first decays exponentially to the last.
+    /// Frames over which the first decays exponentially to the last, or straight where one of them is 0.
     pub epsilon_frames: u64,
     /// Share of the online network that the target network takes over an update.
     pub target_share: f64,
@@ -87,6 +87,13 @@ impl DqnRecipe {
     #[must_use]
     pub fn epsilon(&self, frames: u64) -> f64 {
         let done = (frames as f64 / self.epsilon_frames.max(1) as f64).min(1.0);
-        self.first_epsilon * (self.last_epsilon / self.first_epsilon).powf(done)
+        let (first, last) = (self.first_epsilon, self.last_epsilon);
+        if first.min(last) > 0.0 {
+            // Rounding must not lead beyond what is a share.
+            (first * (last / first).powf(done)).min(1.0)
+        } else {
+            // Nothing decays to or from 0 exponentially.
+            first + (last - first) * done
+        }
     }
 }

@@ -19,6 +19,7 @@ pub mod optimiser;
 pub mod pictures;
 pub mod plot;
 pub mod recipe;
+mod recipe_check;
 pub mod recorded;
 pub mod recording;
 pub mod replay;

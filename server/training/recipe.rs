@@ -6,6 +6,8 @@ use super::belief::BeliefRecipe;
 use super::dqn_recipe::DqnRecipe;
 use super::error::TrainError;
 use super::evaluate::COUNT;
+pub use super::recipe_check::MAX_UPDATES;
+use super::recipe_check::check;
 use crate::autofocus::shipped::{Design, design};
 
 /// All that a training is made by, besides its seed and its footage.
@@ -64,15 +66,22 @@ impl Recipe {
     /// # Errors
     /// With line and key, when a key is unknown, missing or of the wrong type, or a number makes no sense.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let recipe: Self = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
-        recipe.check()?;
+        let recipe: Self = toml::from_str(text).map_err(|error| sentence(&error, text))?;
+        check(&recipe)?;
         Ok(recipe)
+    }
+
+    /// The first key, as `section.key`, whose value differs in `other`, with both values.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Option<(String, String, String)> {
+        let table = |recipe: &Self| toml::Table::try_from(recipe).unwrap_or_default();
+        difference("", &table(self), &table(other))
     }
 
     /// What the policy is made of.
     ///
     /// # Errors
-    /// When it is none that is learned.
+    /// When it is none that is learned, or the recipe's section is another's.
     pub fn design(&self) -> Result<Design, TrainError> {
         let unknown = || {
             TrainError::Recipe(format!(
@@ -80,35 +89,15 @@ impl Recipe {
                 self.policy
             ))
         };
-        design(&self.policy).ok_or_else(unknown)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        let positive = |name: &str, value: u64| {
-            if value == 0 { Err(format!("'{name}' must be at least 1")) } else { Ok(()) }
+        let design = design(&self.policy).ok_or_else(unknown)?;
+        let fits = match design {
+            Design::Values(_) => self.dqn.is_some(),
+            Design::Belief => self.belief.is_some(),
         };
-        positive("pictures", self.pictures)?;
-        positive("validate_every", self.validate_every)?;
-        match (&self.dqn, &self.belief) {
-            (Some(dqn), None) => {
-                positive("dqn.scans", dqn.scans as u64)?;
-                positive("dqn.frames_a_scan", dqn.frames_a_scan.into())?;
-                positive("dqn.windows", dqn.windows as u64)?;
-                positive("dqn.window", dqn.window as u64)?;
-                if dqn.warm_up < (dqn.window * dqn.scans) as u64 {
-                    return Err(format!("'dqn.warm_up' must be at least window * scans, {}", dqn.window * dqn.scans));
-                }
-                if dqn.replay < dqn.window * dqn.scans {
-                    return Err(format!("'dqn.replay' must be at least window * scans, {}", dqn.window * dqn.scans));
-                }
-                Ok(())
-            }
-            (None, Some(belief)) => {
-                positive("belief.scans", belief.scans as u64)?;
-                positive("belief.window", belief.window as u64)?;
-                positive("belief.windows_a_scan", belief.windows_a_scan as u64)
-            }
-            _ => Err("a recipe needs exactly one of [dqn] and [belief]".to_owned()),
+        if fits {
+            Ok(design)
+        } else {
+            Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", self.policy)))
         }
     }
 
@@ -131,6 +120,30 @@ impl Recipe {
     }
 }
 
+/// The error in `text` as one sentence; TOML's own is a small drawing.
+fn sentence(error: &toml::de::Error, text: &str) -> String {
+    let what = error.message().trim().replace('\n', ", ");
+    let before = error.span().and_then(|span| text.get(..span.start));
+    before.map_or(what.clone(), |before| format!("line {}: {what}", before.matches('\n').count() + 1))
+}
+
+fn difference(section: &str, one: &toml::Table, other: &toml::Table) -> Option<(String, String, String)> {
+    let nothing = || "not given".to_owned();
+    one.keys().chain(other.keys()).find_map(|key| {
+        let name = format!("{section}{key}");
+        match (one.get(key), other.get(key)) {
+            (Some(toml::Value::Table(one)), Some(toml::Value::Table(other))) => {
+                difference(&format!("{name}."), one, other)
+            }
+            (one, other) if one == other => None,
+            (one, other) => {
+                let [one, other] = [one, other].map(|value| value.map_or_else(nothing, ToString::to_string));
+                Some((name, one, other))
+            }
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,6 +160,17 @@ mod tests {
     fn an_unknown_key_is_told_with_its_line() {
         let text = shipped("parfocal").unwrap().replace("clip = 1.0", "clipp = 1.0");
         let error = Recipe::parse(&text).unwrap_err();
-        assert!(error.contains("clipp") && error.contains("line"), "{error}");
+        assert!(error.starts_with("line ") && error.contains("clipp") && !error.contains('\n'), "{error}");
+        let error = Recipe::parse("policy = \"a\"\npictures 3\n").unwrap_err();
+        assert!(error.starts_with("line 2: ") && !error.contains('\n'), "{error}");
+    }
+
+    #[test]
+    fn two_recipes_differ_in_a_key() {
+        let one = Recipe::parse(shipped("mgm-learned").unwrap()).unwrap();
+        assert_eq!(one.difference(&one), None);
+        let other = one.clone().with_updates(7);
+        let (key, one, other) = one.difference(&other).unwrap();
+        assert_eq!([key, one, other], ["dqn.updates", "24000", "7"]);
     }
 }
