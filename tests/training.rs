@@ -2,13 +2,16 @@
 //! figures.
 
 use std::cell::Cell;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 
 use parfocal::clock::SystemClock;
+use parfocal::training::asked::Asked;
 use parfocal::training::checkpoint::Checkpoint;
 use parfocal::training::recipe::{Recipe, shipped};
-use parfocal::training::run::{Beginning, LEG, Run};
+use parfocal::training::run::{LEG, Run};
 
 /// The recipe that ships for `policy`, small.
 fn small(policy: &str, updates: u64) -> Recipe {
@@ -25,10 +28,18 @@ fn small(policy: &str, updates: u64) -> Recipe {
     recipe
 }
 
-/// Trains for at most `legs` legs; returns whether the training is complete.
-fn train(recipe: &Recipe, folder: &Path, legs: u64, beginning: &Beginning) -> bool {
+fn begin(recipe: &Recipe, folder: &Path) -> Run {
     tch::set_num_threads(1);
-    let mut run = Run::start(recipe.clone(), 7, Vec::new(), folder, beginning, tch::Device::Cpu).unwrap();
+    Run::begin(recipe.clone(), 7, &[], folder, None, tch::Device::Cpu).unwrap()
+}
+
+fn resume(policy: &str, folder: &Path) -> Run {
+    let asked = Asked { name: policy.to_owned(), ..Asked::default() };
+    Run::resume(folder, &asked, tch::Device::Cpu).unwrap()
+}
+
+/// Trains for at most `legs` legs; returns whether the training is complete.
+fn train(mut run: Run, legs: u64) -> bool {
     let left = Cell::new(legs);
     run.go(&SystemClock, &|| left.replace(left.get().saturating_sub(1)) == 0, &mut |_| ()).unwrap()
 }
@@ -40,7 +51,7 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     if let Some(belief) = &mut recipe.belief {
         belief.scans = 32;
     }
-    assert!(train(&recipe, folder.path(), u64::MAX, &Beginning::Nothing));
+    assert!(train(begin(&recipe, folder.path()), u64::MAX));
     let curves = std::fs::read_to_string(folder.path().join("curves.csv")).unwrap();
     let mae: f64 = curves.trim_end().rsplit(',').next().unwrap().parse().unwrap();
     // `fixed` has 0.25: the mean distance of a uniformly spread optimum from the middle.
@@ -51,10 +62,7 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
 fn what_begins_with_weights_begins_with_what_they_know() {
     let folder = tempfile::tempdir().unwrap();
     let recipe = small("mgm-learned", 1);
-    let start = |file: &str| {
-        let beginning = Beginning::Weights(file.into());
-        Run::start(recipe.clone(), 7, Vec::new(), folder.path(), &beginning, tch::Device::Cpu)
-    };
+    let start = |file: &str| Run::begin(recipe.clone(), 7, &[], folder.path(), Some(Path::new(file)), tch::Device::Cpu);
     // Another policy's weights are refused, and leave nothing behind.
     assert!(
         start("policies/parfocal.safetensors").err().unwrap().to_string().contains("cannot begin with the weights")
@@ -79,18 +87,15 @@ fn training_resumed_is_training_never_stopped() {
     for policy in ["mgm-learned", "cnn-learned", "parfocal"] {
         let recipe = small(policy, 2 * LEG);
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        assert!(train(&recipe, whole.path(), u64::MAX, &Beginning::Nothing));
-        assert!(!train(&recipe, parts.path(), 1, &Beginning::Nothing));
-        let start = || {
-            Run::start(recipe.clone(), 7, Vec::new(), parts.path(), &Beginning::Checkpoint, tch::Device::Cpu).unwrap()
-        };
-        assert_eq!(start().other_version(), None);
+        assert!(train(begin(&recipe, whole.path()), u64::MAX));
+        assert!(!train(begin(&recipe, parts.path()), 1));
+        assert_eq!(resume(policy, parts.path()).other_version(), None);
         let file = parts.path().join("checkpoint.safetensors");
         let mut checkpoint = Checkpoint::read(&file).unwrap();
         checkpoint.notes.insert("version".to_owned(), "0.0.9".to_owned());
         checkpoint.write(&file).unwrap();
-        assert_eq!(start().other_version(), Some("0.0.9"));
-        assert!(train(&recipe, parts.path(), u64::MAX, &Beginning::Checkpoint));
+        assert_eq!(resume(policy, parts.path()).other_version(), Some("0.0.9"));
+        assert!(train(resume(policy, parts.path()), u64::MAX));
         for file in ["curves.csv", &format!("{policy}.safetensors")] {
             let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();
             assert!(read(&whole) == read(&parts), "{policy}: {file} differs");
@@ -100,6 +105,86 @@ fn training_resumed_is_training_never_stopped() {
 
 fn parfocal(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap()
+}
+
+/// A picture of noise, `side` pixels wide and high.
+fn picture(folder: &Path, name: &str, side: u32) -> PathBuf {
+    let path = folder.join(name);
+    let gray = |x: u32, y: u32| image::Luma([u8::try_from((7919 * x + 104_729 * y) % 251).unwrap()]);
+    image::GrayImage::from_fn(side, side, gray).save(&path).unwrap();
+    path
+}
+
+#[test]
+fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (first, other) = (picture(folder.path(), "first.png", 80), picture(folder.path(), "other.png", 90));
+    let run = folder.path().join("run");
+    let mut recipe = small("mgm-learned", 2 * LEG);
+    recipe.pictures = 1;
+    let begun = Run::begin(recipe, 7, std::slice::from_ref(&first), &run, None, tch::Device::Cpu).unwrap();
+    assert!(!train(begun, 1));
+    let again = |footage: &[&PathBuf], seed: Option<u64>| {
+        let footage = footage.iter().copied().cloned().collect();
+        let asked = Asked { name: "mgm-learned".to_owned(), footage, seed, ..Asked::default() };
+        Run::resume(&run, &asked, tch::Device::Cpu).map(|run| run.updates()).map_err(|error| error.to_string())
+    };
+    assert_eq!(again(&[], Some(7)), Ok(LEG));
+    assert_eq!(again(&[&first], None), Ok(LEG));
+    assert!(again(&[], Some(8)).unwrap_err().contains("begun with seed 7, not 8"));
+    assert!(again(&[&other], None).unwrap_err().contains("begun on other footage: "));
+    let moved = folder.path().join("moved.png");
+    std::fs::rename(&first, &moved).unwrap();
+    assert!(again(&[], None).unwrap_err().contains("is gone: cannot read"));
+    assert_eq!(again(&[&moved], None), Ok(LEG));
+    std::fs::rename(&other, &first).unwrap();
+    assert!(again(&[], None).unwrap_err().contains("has changed since"));
+    // The model card that follows says so too.
+    std::fs::rename(&moved, &first).unwrap();
+    assert!(train(resume("mgm-learned", &run), u64::MAX));
+    assert!(std::fs::read_to_string(run.join("MODEL_CARD.md")).unwrap().contains("on 1 clips of footage"));
+}
+
+#[test]
+fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, out) = (folder.path().join("recipe.toml"), folder.path().join("run"));
+    let mut recipe = small("mgm-learned", 1_000_000);
+    (recipe.pictures, recipe.validate_every) = (1, LEG);
+    if let Some(dqn) = &mut recipe.dqn {
+        dqn.windows = 64;
+    }
+    std::fs::write(&config, toml::to_string(&recipe).unwrap()).unwrap();
+    let out = out.to_str().unwrap();
+    let start = |arguments: &[&str]| {
+        let command = ["train", "mgm-learned", "--out", out];
+        let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+        process.args(command).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let interrupt = |process: &std::process::Child| {
+        let process = rustix::process::Pid::from_child(process);
+        rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
+    };
+    let mut process = start(&["--config", config.to_str().unwrap()]);
+    // Without a terminal it says how it does at each validation.
+    let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.starts_with("100 of 1000000 updates: loss ") && line.contains("validation MAE 0.")));
+    // Meanwhile nobody else trains there.
+    let second = start(&["--resume"]).wait_with_output().unwrap();
+    assert!(String::from_utf8_lossy(&second.stderr).contains("another training is running in"));
+    interrupt(&process);
+    let output = process.wait_with_output().unwrap();
+    assert!(output.status.success());
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(told.contains(&format!("go on with: parfocal train mgm-learned --out {out} --resume")), "{told}");
+
+    let mut process = start(&["--resume"]);
+    let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains(" of 1000000 updates: loss ")));
+    interrupt(&process);
+    assert!(lines.any(|line| line.contains("Ctrl-C again to leave at once")));
+    interrupt(&process);
+    assert_eq!(process.wait().unwrap().signal(), Some(2));
 }
 
 #[test]
@@ -150,13 +235,16 @@ fn bad_input_is_answered_with_one_sentence() {
     std::fs::write(&few, shipped("mgm-learned").unwrap().replace("pictures = 960", "pictures = 3")).unwrap();
     let few = few.to_str().unwrap();
     let foreign = "policies/parfocal.safetensors";
+    let occupied = folder.path().to_str().unwrap();
     for (arguments, told) in [
         (vec!["evaluate", "--policies", "nonsense", "--count", "1"], "there is no policy 'nonsense'"),
         (vec!["evaluate", "--footage", "/no/such.mp4"], "there is no such file"),
         (vec!["train", "fixed", "--out", out], "nothing trains 'fixed'"),
         (vec!["train", "parfocal", "--out", out, "--device", "cuda"], "use --device cpu"),
         (vec!["train", "mgm-learned", "--out", out, "--config", recipe], "unknown field `warmup`"),
-        (vec!["train", "parfocal", "--out", out, "--resume"], "cannot use the checkpoint"),
+        (vec!["train", "parfocal", "--out", "/proc/x"], "cannot write to /proc/x"),
+        (vec!["train", "parfocal", "--out", occupied], "choose a new or empty folder"),
+        (vec!["train", "parfocal", "--out", out, "--resume"], "holds no checkpoint to go on from"),
         (
             vec!["train", "mgm-learned", "--out", out, "--config", few, "--from", foreign],
             "the weights are of another network",

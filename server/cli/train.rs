@@ -8,9 +8,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::Failure;
 use super::interrupt::Interrupt;
 use crate::clock::SystemClock;
-use crate::training::recipe::{Recipe, names, shipped};
-use crate::training::run::{Beginning, LEG, Run};
-use crate::training::{footage, run::Progress};
+use crate::training::asked::Asked;
+use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
+use crate::training::run::{LEG, Progress, Run};
 
 /// Where to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -30,27 +30,28 @@ pub struct Arguments {
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A recipe of your own (TOML) in place of the one that ships.
+    /// A recipe of your own (TOML) in place of the one that ships; with `--resume` it need not be given again.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Updates in the place of the recipe's, for a shorter or longer training.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Updates in the place of the recipe's, for a shorter or longer training; with `--resume` they need not be given again.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_UPDATES))]
     updates: Option<u64>,
-    /// A video, an image or a folder of images to train on in place of drawn pictures.
+    /// A video (its first 1500 frames), an image or a folder of images to train on in place of drawn pictures; with `--resume`
+    /// it need not be given again.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
     /// Where to compute.
     #[arg(long, value_enum, default_value = "cpu")]
     device: Compute,
-    /// Go on where the run folder's checkpoint stands.
+    /// Go on where the run folder's checkpoint stands, with the recipe, seed and footage that the training was begun with.
     #[arg(long)]
     resume: bool,
     /// Weights (safetensors) of the same policy to begin with in the place of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     from: Option<PathBuf>,
-    /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Seed of everything random; 1 if not given.
+    #[arg(long)]
+    seed: Option<u64>,
 }
 
 /// Runs the command.
@@ -60,21 +61,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     tch::set_num_threads(1);
     let device = device(arguments.device)?;
-    let mut recipe = recipe(arguments)?;
-    if let Some(updates) = arguments.updates {
-        recipe = recipe.with_updates(updates);
-    }
-    let mut clips = Vec::new();
-    for path in &arguments.footage {
-        clips.extend(footage::clips(path)?);
-    }
-    let total = recipe.updates();
-    let beginning = match &arguments.from {
-        Some(file) => Beginning::Weights(file.clone()),
-        None if arguments.resume => Beginning::Checkpoint,
-        None => Beginning::Nothing,
-    };
-    let mut run = Run::start(recipe, arguments.seed, clips, &arguments.out, &beginning, device)?;
+    let mut run = if arguments.resume { resume(arguments, device)? } else { begin(arguments, device)? };
+    let total = run.recipe().updates();
     if let Some(version) = run.other_version() {
         eprintln!(
             "note: the checkpoint was made by parfocal {version}; what follows may differ from what it would have given"
@@ -86,12 +74,22 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let whole = run.go(&SystemClock, &|| interrupt.asked(), &mut |progress: &Progress| {
         validation = progress.validation.unwrap_or(validation);
         let epsilon = progress.epsilon.map_or(String::new(), |epsilon| format!(", epsilon {epsilon:.2}"));
+        let mae = if validation.is_finite() { format!(", validation MAE {validation:.4}") } else { String::new() };
+        let message = format!("loss {:.4}{epsilon}{mae}", progress.loss);
+        if bar.is_hidden() && progress.validation.is_some() {
+            eprintln!("{} of {total} updates: {message}", progress.updates);
+        }
         bar.set_position(progress.updates);
-        bar.set_message(format!("loss {:.4}{epsilon}, validation MAE {validation:.4}", progress.loss));
+        bar.set_message(message);
     })?;
     if !whole {
         bar.finish_and_clear();
-        println!("stopped after {} of {total} updates; go on with --resume", run.updates());
+        println!(
+            "stopped after {} of {total} updates; go on with: parfocal train {} --out {} --resume",
+            run.updates(),
+            arguments.policy,
+            arguments.out.display()
+        );
         return Ok(());
     }
     interrupt.all_is_saved();
@@ -122,19 +120,43 @@ fn device(compute: Compute) -> Result<tch::Device, Failure> {
     }
 }
 
-fn recipe(arguments: &Arguments) -> Result<Recipe, Failure> {
-    if let Some(file) = &arguments.config {
-        let text = std::fs::read_to_string(file)
-            .map_err(|error| format!("cannot read the recipe {}: {error}", file.display()))?;
-        let recipe = Recipe::parse(&text).map_err(|error| format!("in the recipe {}: {error}", file.display()))?;
-        if recipe.policy != arguments.policy {
-            return Err(format!("the recipe {} makes '{}'", file.display(), recipe.policy).into());
-        }
-        return Ok(recipe);
-    }
+fn begin(arguments: &Arguments, device: tch::Device) -> Result<Run, Failure> {
     let unknown = || format!("nothing trains '{}'; there are recipes for {}", arguments.policy, names().join(", "));
-    let text = shipped(&arguments.policy).ok_or_else(unknown)?;
-    Ok(Recipe::parse(text)?)
+    let mut recipe = match own_recipe(arguments)? {
+        Some(recipe) => recipe,
+        None => Recipe::parse(shipped(&arguments.policy).ok_or_else(unknown)?)?,
+    };
+    if let Some(updates) = arguments.updates {
+        recipe = recipe.with_updates(updates);
+    }
+    let (seed, from) = (arguments.seed.unwrap_or(1), arguments.from.as_deref());
+    Ok(Run::begin(recipe, seed, &arguments.footage, &arguments.out, from, device)?)
+}
+
+fn resume(arguments: &Arguments, device: tch::Device) -> Result<Run, Failure> {
+    let asked = Asked {
+        name: arguments.policy.clone(),
+        recipe: own_recipe(arguments)?,
+        updates: arguments.updates,
+        seed: arguments.seed,
+        footage: arguments.footage.clone(),
+    };
+    Ok(Run::resume(&arguments.out, &asked, device)?)
+}
+
+/// The recipe in the file that `--config` names.
+fn own_recipe(arguments: &Arguments) -> Result<Option<Recipe>, Failure> {
+    let Some(file) = &arguments.config else { return Ok(None) };
+    let text =
+        std::fs::read_to_string(file).map_err(|error| format!("cannot read the recipe {}: {error}", file.display()))?;
+    let recipe = Recipe::parse(&text).map_err(|error| format!("in the recipe {}: {error}", file.display()))?;
+    if recipe.policy != arguments.policy {
+        let (file, made, asked) = (file.display(), &recipe.policy, &arguments.policy);
+        return Err(
+            format!("the recipe {file} makes '{made}', not '{asked}'; name that policy, or another recipe").into()
+        );
+    }
+    Ok(Some(recipe))
 }
 
 fn bar(total: u64, done: u64) -> ProgressBar {

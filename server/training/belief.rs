@@ -165,13 +165,13 @@ impl Trainer for BeliefTrainer {
         loss.double_value(&[])
     }
 
-    fn save(&self, checkpoint: &mut Checkpoint) {
+    fn save<'a>(&'a self, checkpoint: &mut Checkpoint<'a>) {
         checkpoint.put_store("network", &self.store);
         self.optimiser.save(checkpoint);
         checkpoint.notes.insert("updates".to_owned(), self.updates.to_string());
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
         checkpoint.fill_store("network", &self.store)?;
         self.optimiser.restore(checkpoint)?;
         self.updates = checkpoint.number("updates")?;

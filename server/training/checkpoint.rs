@@ -1,50 +1,62 @@
 //! Checkpoints: everything a training needs to go on exactly as if it had never stopped, in one safetensors file that is
 //! replaced whole or not at all.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 use tch::{Kind, Tensor, nn};
 
 use crate::autofocus::weights::floats;
+use crate::whole_file;
 
-/// Why a checkpoint could not be written or read.
+/// Longest header that is read: some thousand times what one has.
+const MAX_HEADER: u64 = 1 << 28;
+
+/// Why a checkpoint could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// The file cannot be read or written.
-    #[error("cannot use the checkpoint {}: {source}", path.display())]
+    /// The file cannot be read.
+    #[error("cannot read the checkpoint {}: {source}", path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        source: io::Error,
     },
-    /// The content is damaged or of another training.
-    #[error(
-        "the checkpoint does not fit: {0}; start anew in another folder, or resume with the recipe it was made with"
-    )]
-    Unfit(String),
+    /// The content is damaged or of another program.
+    #[error("the checkpoint {} is damaged: {reason}; start anew in another folder", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
 }
 
-/// Named arrays and notes.
+/// Named arrays and notes. Arrays to be written may be borrowed: a replay memory is large.
 #[derive(Debug, Default)]
-pub struct Checkpoint {
-    arrays: BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>,
+pub struct Checkpoint<'a> {
+    arrays: BTreeMap<String, (Dtype, Cow<'a, [u8]>)>,
     /// Short texts by name.
     pub notes: BTreeMap<String, String>,
+    /// The file it was read from.
+    path: PathBuf,
 }
 
-impl Checkpoint {
+impl<'a> Checkpoint<'a> {
     /// Adds floats.
     pub fn put_floats(&mut self, name: &str, values: impl IntoIterator<Item = f32>) {
         let bytes: Vec<u8> = values.into_iter().flat_map(f32::to_le_bytes).collect();
-        self.arrays.insert(name.to_owned(), (Dtype::F32, vec![bytes.len() / 4], bytes));
+        self.arrays.insert(name.to_owned(), (Dtype::F32, bytes.into()));
     }
 
     /// Adds bytes.
-    pub fn put_bytes(&mut self, name: &str, bytes: Vec<u8>) {
-        self.arrays.insert(name.to_owned(), (Dtype::U8, vec![bytes.len()], bytes));
+    pub fn put_bytes(&mut self, name: &str, bytes: impl Into<Cow<'a, [u8]>>) {
+        self.arrays.insert(name.to_owned(), (Dtype::U8, bytes.into()));
     }
 
     /// Adds a tensor's values; its shape is known to whoever takes it back.
@@ -73,8 +85,16 @@ impl Checkpoint {
     /// # Errors
     /// When there are none of that name.
     pub fn bytes(&self, name: &str) -> Result<&[u8], CheckpointError> {
-        let array = self.arrays.get(name).ok_or_else(|| CheckpointError::Unfit(format!("'{name}' is missing")))?;
-        Ok(&array.2)
+        self.arrays.get(name).map(|array| &*array.1).ok_or_else(|| self.damaged(format!("'{name}' is missing")))
+    }
+
+    /// Bytes by name, out of the checkpoint: large ones need not be there twice.
+    ///
+    /// # Errors
+    /// When there are none of that name.
+    pub fn take_bytes(&mut self, name: &str) -> Result<Vec<u8>, CheckpointError> {
+        let array = self.arrays.remove(name);
+        array.map(|array| array.1.into_owned()).ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
 
     /// Fills `tensor` with the values of that name.
@@ -84,7 +104,7 @@ impl Checkpoint {
     pub fn fill(&self, name: &str, tensor: &mut Tensor) -> Result<(), CheckpointError> {
         let values = self.floats(name)?;
         if values.len() != tensor.numel() {
-            return Err(CheckpointError::Unfit(format!("'{name}' has {} values", values.len())));
+            return Err(self.damaged(format!("'{name}' has {} values", values.len())));
         }
         let saved = Tensor::from_slice(&values).to_kind(Kind::Float).view_as(tensor);
         tch::no_grad(|| tensor.copy_(&saved));
@@ -108,43 +128,133 @@ impl Checkpoint {
     /// When it is missing or no number.
     pub fn number<N: std::str::FromStr>(&self, name: &str) -> Result<N, CheckpointError> {
         let text = self.notes.get(name).and_then(|text| text.parse().ok());
-        text.ok_or_else(|| CheckpointError::Unfit(format!("'{name}' is missing")))
+        text.ok_or_else(|| self.damaged(format!("'{name}' is missing")))
     }
 
-    /// Writes to `path` by way of a file beside it, so that what lies there is always whole.
+    /// The error that says what is wrong with this checkpoint.
+    #[must_use]
+    pub fn damaged(&self, reason: impl Into<String>) -> CheckpointError {
+        CheckpointError::Damaged { path: self.path.clone(), reason: reason.into() }
+    }
+
+    /// Writes to `path` by way of a file beside it, so that what lies there is always whole; array by array, without a copy.
     ///
     /// # Errors
     /// When the disk is full or the folder cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), CheckpointError> {
-        let file = |source| CheckpointError::File { path: path.to_owned(), source };
-        let unfit = |error: safetensors::SafeTensorError| CheckpointError::Unfit(error.to_string());
-        let mut views = Vec::with_capacity(self.arrays.len());
-        for (name, (kind, shape, bytes)) in &self.arrays {
-            views.push((name.as_str(), TensorView::new(*kind, shape.clone(), bytes).map_err(unfit)?));
-        }
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        // Larger types first, as safetensors' own writer has it: each array is aligned.
+        let mut arrays: Vec<_> = self.arrays.iter().collect();
+        arrays.sort_by_key(|(_, (kind, _))| std::cmp::Reverse(kind.bitsize()));
+        let mut end = 0;
+        let info = |&(name, (kind, bytes)): &(&String, &(Dtype, Cow<[u8]>))| {
+            let begin = end;
+            end += bytes.len();
+            let shape = vec![8 * bytes.len() / kind.bitsize()];
+            (name.clone(), TensorInfo { dtype: *kind, shape, data_offsets: (begin, end) })
+        };
+        let infos = arrays.iter().map(info).collect();
         let notes: HashMap<String, String> = self.notes.clone().into_iter().collect();
-        let beside = path.with_extension("partial");
-        safetensors::serialize_to_file(views, Some(notes), &beside)
-            .map_err(|error| file(std::io::Error::other(error.to_string())))?;
-        std::fs::rename(&beside, path).map_err(file)
+        // A header of no notes is not written as JSON (safetensors 0.8.0).
+        let header = Metadata::new((!notes.is_empty()).then_some(notes), infos).map_err(io::Error::other)?;
+        let mut header = serde_json::to_vec(&header)?;
+        header.resize(header.len().next_multiple_of(8), b' ');
+        whole_file::write_with(path, |writer| {
+            writer.write_all(&(header.len() as u64).to_le_bytes())?;
+            writer.write_all(&header)?;
+            arrays.iter().try_for_each(|(_, (_, bytes))| writer.write_all(bytes))
+        })
     }
+}
 
+impl Checkpoint<'static> {
     /// Reads what [`Checkpoint::write`] wrote.
     ///
     /// # Errors
     /// When the file cannot be read or is damaged.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        let file = |source| CheckpointError::File { path: path.to_owned(), source };
-        let unfit = |error: safetensors::SafeTensorError| CheckpointError::Unfit(error.to_string());
-        let bytes = std::fs::read(path).map_err(file)?;
-        let (_, header) = SafeTensors::read_metadata(&bytes).map_err(unfit)?;
+        let failed = |source: io::Error| CheckpointError::File { path: path.to_owned(), source };
+        let damaged = |reason: String| CheckpointError::Damaged { path: path.to_owned(), reason };
+        let cut = |error: io::Error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => damaged("it is cut short".to_owned()),
+            _ => failed(error),
+        };
+        let file = File::open(path).map_err(failed)?;
+        let size = file.metadata().map_err(failed)?.len();
+        let mut file = BufReader::new(file);
+        let mut length = [0; 8];
+        file.read_exact(&mut length).map_err(cut)?;
+        let length = u64::from_le_bytes(length);
+        if length > MAX_HEADER.min(size) {
+            return Err(damaged("it is no safetensors file".to_owned()));
+        }
+        let mut header = Vec::new();
+        file.by_ref().take(length).read_to_end(&mut header).map_err(failed)?;
+        let header: Metadata = serde_json::from_slice(&header).map_err(|error| damaged(error.to_string()))?;
+        let data = header.data_len() as u64;
+        if size.checked_sub(8 + length) != Some(data) {
+            return Err(damaged("it is cut short or has something behind it".to_owned()));
+        }
+        let mut arrays = BTreeMap::new();
+        for name in header.offset_keys() {
+            let Some(info) = header.info(&name) else { continue };
+            let mut bytes = vec![0; info.data_offsets.1 - info.data_offsets.0];
+            file.read_exact(&mut bytes).map_err(cut)?;
+            arrays.insert(name, (info.dtype, bytes.into()));
+        }
         let notes = header.metadata().clone().unwrap_or_default().into_iter().collect();
-        let content = SafeTensors::deserialize(&bytes).map_err(unfit)?;
-        let arrays = content
-            .tensors()
-            .into_iter()
-            .map(|(name, view)| (name, (view.dtype(), view.shape().to_vec(), view.data().to_vec())))
-            .collect();
-        Ok(Self { arrays, notes })
+        Ok(Self { arrays, notes, path: path.to_owned() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_safetensors_and_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.safetensors");
+        let patches = vec![7u8; 13];
+        let mut checkpoint = Checkpoint::default();
+        checkpoint.put_bytes("a", &patches);
+        checkpoint.put_floats("b", [0.5, -2.0]);
+        checkpoint.notes.insert("updates".to_owned(), "3".to_owned());
+        checkpoint.write(&path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let seen = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        assert_eq!(seen.tensor("a").unwrap().data(), patches);
+        assert_eq!(seen.tensor("b").unwrap().shape(), [2]);
+        let mut back = Checkpoint::read(&path).unwrap();
+        assert_eq!((back.take_bytes("a").unwrap(), back.floats("b").unwrap()), (patches, vec![0.5, -2.0]));
+        assert_eq!(back.number::<u64>("updates").unwrap(), 3);
+        // Anyone may read it who may read the rest of the run folder.
+        let mode =
+            |path: &Path| std::os::unix::fs::PermissionsExt::mode(&std::fs::metadata(path).unwrap().permissions());
+        std::fs::write(folder.path().join("b"), "").unwrap();
+        assert_eq!(mode(&path), mode(&folder.path().join("b")));
+    }
+
+    #[test]
+    fn damage_is_told_with_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.safetensors");
+        let mut checkpoint = Checkpoint::default();
+        checkpoint.put_floats("b", [0.5, -2.0]);
+        checkpoint.write(&path).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for damaged in [
+            &whole[..whole.len() - 1],
+            &whole[..20],
+            &whole[..3],
+            b"",
+            &[255; 40],
+            &[whole.clone(), whole.clone()].concat(),
+        ] {
+            std::fs::write(&path, damaged).unwrap();
+            let error = Checkpoint::read(&path).unwrap_err().to_string();
+            assert!(error.contains("a.safetensors is damaged"), "{error}");
+        }
+        let error = checkpoint.floats("c").unwrap_err().to_string();
+        assert!(error.contains("'c' is missing"), "{error}");
     }
 }

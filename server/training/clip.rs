@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use sha2::{Digest, Sha256};
+
 use crate::imaging::GrayImage;
 
 /// Sharp pictures in order of time, one for a still, and where patches may lie on them.
@@ -92,6 +94,18 @@ impl Clip {
     #[allow(clippy::len_without_is_empty, reason = "a clip is never empty")]
     pub const fn len(&self) -> usize {
         self.frames.len()
+    }
+
+    /// Adds all that scans show of it to `hash`.
+    pub(super) fn digest(&self, hash: &mut Sha256) {
+        let Area { left, top, right, bottom } = self.area;
+        for number in [self.frames.len(), left, top, right, bottom] {
+            hash.update((number as u64).to_le_bytes());
+        }
+        for frame in &self.frames {
+            hash.update((frame.width as u64).to_le_bytes());
+            frame.data.iter().for_each(|value| hash.update(value.to_le_bytes()));
+        }
     }
 
     /// Where patches may lie.

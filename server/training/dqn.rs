@@ -209,7 +209,7 @@ impl Trainer for DqnTrainer {
         Ok(())
     }
 
-    fn save(&self, checkpoint: &mut Checkpoint) {
+    fn save<'a>(&'a self, checkpoint: &mut Checkpoint<'a>) {
         checkpoint.put_store("network", &self.online.store);
         checkpoint.put_store("target", &self.target.store);
         self.optimiser.save(checkpoint);
@@ -218,7 +218,7 @@ impl Trainer for DqnTrainer {
         checkpoint.notes.insert("frames".to_owned(), self.frames.to_string());
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
         checkpoint.fill_store("network", &self.online.store)?;
         checkpoint.fill_store("target", &self.target.store)?;
         self.optimiser.restore(checkpoint)?;

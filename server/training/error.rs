@@ -1,8 +1,10 @@
 //! Why a training ends without its weights.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use super::checkpoint::CheckpointError;
+use super::footage::FootageError;
 
 /// Why a training could not start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -13,14 +15,49 @@ pub enum TrainError {
     /// A checkpoint cannot be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// The footage cannot be used.
+    #[error(transparent)]
+    Footage(#[from] FootageError),
+    /// What is asked for is not what the checkpoint's training was begun with.
+    #[error("{0}")]
+    Differs(String),
     /// The run folder cannot be written.
-    #[error("cannot write to {}: {source}", path.display())]
+    #[error("cannot write to {}: {source}; choose a folder that can be written, or make this one so", path.display())]
     Folder {
         /// The file or folder.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        source: io::Error,
     },
+    /// There is no room in the run folder.
+    #[error(
+        "the disk is too full to write {}; make room, then go on from the last checkpoint with --resume",
+        path.display()
+    )]
+    Full {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file of the run folder cannot be read.
+    #[error("cannot read {}: {source}; it belongs to the training and must stay where it is", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The folder for a new training holds one.
+    #[error("{} holds a training already; go on with it by --resume, or choose another folder", .0.display())]
+    Begun(PathBuf),
+    /// The folder for a new training holds something else.
+    #[error("{} holds other files, or a training that ended before its first checkpoint; choose a new or empty folder", .0.display())]
+    Occupied(PathBuf),
+    /// Another process trains in the folder.
+    #[error("another training is running in {}; choose another folder, or wait for its end", .0.display())]
+    Busy(PathBuf),
+    /// There is no checkpoint in the folder.
+    #[error("{} holds no checkpoint to go on from; check the folder, or start anew without --resume", .0.display())]
+    NothingToResume(PathBuf),
     /// The weights to begin with cannot be used.
     #[error("cannot begin with the weights {}: {reason}", path.display())]
     Weights {
@@ -32,4 +69,15 @@ pub enum TrainError {
     /// The weights came out damaged: the training diverged.
     #[error("the training diverged: {0}; lower the learning rate")]
     Diverged(String),
+}
+
+impl TrainError {
+    /// That `path` could not be written.
+    pub(super) fn writing(path: &Path, source: io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full { path },
+            _ => Self::Folder { path, source },
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Training: focal-time scans, replay memory, DQN, evaluation. Knows no web.
 
+pub mod asked;
 pub mod belief;
 pub mod checkpoint;
 pub mod clip;
@@ -14,6 +15,7 @@ pub mod error;
 pub mod evaluate;
 pub mod footage;
 mod head;
+mod material;
 mod model_card;
 pub mod optimiser;
 pub mod pictures;
@@ -26,6 +28,7 @@ pub mod replay;
 pub mod report;
 pub mod rollout;
 pub mod run;
+mod run_folder;
 pub mod scan;
 pub mod session;
 pub mod statistics;

@@ -125,7 +125,7 @@ impl Optimiser {
     }
 
     /// Adds the optimiser's state to a checkpoint: both averages, variable by variable.
-    pub fn save(&self, checkpoint: &mut Checkpoint) {
+    pub fn save(&self, checkpoint: &mut Checkpoint<'_>) {
         for (name, tensor) in self.named_state() {
             checkpoint.put_tensor(&name, &tensor);
         }
@@ -136,7 +136,7 @@ impl Optimiser {
     ///
     /// # Errors
     /// When the checkpoint is of another network.
-    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+    pub fn restore(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), CheckpointError> {
         for (name, mut tensor) in self.named_state() {
             checkpoint.fill(&name, &mut tensor)?;
         }

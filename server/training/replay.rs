@@ -4,7 +4,11 @@
 use rand::{Rng, RngExt};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
-use crate::imaging::Patch;
+use crate::autofocus::networks::ACTIONS;
+use crate::imaging::{PATCH_SIDE, Patch};
+
+/// Bytes of a patch.
+const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
 
 /// What one frame leaves behind, besides what was seen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -79,13 +83,14 @@ pub struct Window {
 }
 
 impl Ring {
-    /// Makes room for `capacity` frames like `seen`: growing bit by bit would hold all twice at times. What is never
-    /// filled costs no memory.
-    fn reserve(&mut self, capacity: usize, seen: &Seen) {
-        self.steps.reserve_exact(capacity);
-        match seen {
-            Seen::Patch(bytes) => self.patches.reserve_exact(capacity * bytes.len()),
-            Seen::Metric(_) => self.metrics.reserve_exact(capacity),
+    /// Makes room for `more` frames like those held: growing bit by bit would hold all twice at times. What is never filled
+    /// costs no memory.
+    fn reserve(&mut self, more: usize) {
+        self.steps.reserve_exact(more);
+        if self.metrics.is_empty() {
+            self.patches.reserve_exact(more * PIXELS);
+        } else {
+            self.metrics.reserve_exact(more);
         }
     }
 }
@@ -114,13 +119,13 @@ impl Replay {
         let capacity = self.capacity;
         let ring = &mut self.seats[seat];
         if ring.steps.len() < capacity {
-            if ring.steps.is_empty() {
-                ring.reserve(capacity, seen);
-            }
             ring.steps.push(step);
             match seen {
                 Seen::Patch(bytes) => ring.patches.extend_from_slice(bytes),
                 Seen::Metric(metric) => ring.metrics.push(*metric),
+            }
+            if ring.steps.len() == 1 {
+                ring.reserve(capacity - 1);
             }
             return;
         }
@@ -133,52 +138,58 @@ impl Replay {
         ring.head = (at + 1) % capacity;
     }
 
-    /// Adds all frames to a checkpoint, each seat's oldest first.
-    pub fn save(&self, checkpoint: &mut Checkpoint) {
+    /// Adds all frames to a checkpoint: patches as they lie in memory, since a copy of them would take as much again.
+    pub fn save<'a>(&'a self, checkpoint: &mut Checkpoint<'a>) {
         for (index, ring) in self.seats.iter().enumerate() {
-            let (newer, older) = ring.steps.split_at(ring.head);
-            let steps = || older.iter().chain(newer);
             let name = |part: &str| format!("replay.{index}.{part}");
+            let steps = || ring.steps.iter();
             checkpoint.put_floats(&name("focal_power"), steps().map(|step| step.focal_power));
             checkpoint.put_floats(&name("next_optimum"), steps().map(|step| step.next_optimum));
-            checkpoint.put_bytes(&name("action"), steps().map(|step| step.action).collect());
-            checkpoint.put_bytes(&name("age"), steps().flat_map(|step| step.age.to_le_bytes()).collect());
-            let patch = ring.patches.len() / ring.steps.len().max(1);
-            let mut patches = ring.patches.clone();
-            patches.rotate_left(ring.head * patch);
-            checkpoint.put_bytes(&name("patches"), patches);
-            let mut metrics = ring.metrics.clone();
-            let turned = if metrics.is_empty() { 0 } else { ring.head };
-            metrics.rotate_left(turned);
-            checkpoint.put_floats(&name("metrics"), metrics);
+            checkpoint.put_bytes(&name("action"), steps().map(|step| step.action).collect::<Vec<u8>>());
+            checkpoint.put_bytes(&name("age"), steps().flat_map(|step| step.age.to_le_bytes()).collect::<Vec<u8>>());
+            checkpoint.put_bytes(&name("patches"), &ring.patches);
+            checkpoint.put_floats(&name("metrics"), ring.metrics.iter().copied());
+            checkpoint.notes.insert(name("head"), ring.head.to_string());
         }
     }
 
-    /// Takes back what [`Replay::save`] added.
+    /// Takes back what [`Replay::save`] added, patches out of the checkpoint.
     ///
     /// # Errors
-    /// When the checkpoint is of another training.
-    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+    /// When the checkpoint is damaged or of another training.
+    pub fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
+        let capacity = self.capacity;
         for (index, ring) in self.seats.iter_mut().enumerate() {
             let name = |part: &str| format!("replay.{index}.{part}");
             let focal_powers = checkpoint.floats(&name("focal_power"))?;
             let optima = checkpoint.floats(&name("next_optimum"))?;
+            let patches = checkpoint.take_bytes(&name("patches"))?;
+            let metrics = checkpoint.floats(&name("metrics"))?;
+            // Of a seat that had not wrapped, and in checkpoints older than the note: the oldest is the first.
+            let head =
+                if checkpoint.notes.contains_key(&name("head")) { checkpoint.number(&name("head"))? } else { 0 };
             let (actions, ages) = (checkpoint.bytes(&name("action"))?, checkpoint.bytes(&name("age"))?);
             let ages = ages.as_chunks::<2>().0;
-            ring.steps = focal_powers
-                .into_iter()
-                .zip(optima)
-                .zip(actions.iter().zip(ages))
-                .map(|((focal_power, next_optimum), (&action, &age))| Step {
+            let count = focal_powers.len();
+            let seen =
+                [patches.len(), metrics.len()] == [count * PIXELS, 0] || [patches.len(), metrics.len()] == [0, count];
+            let known = [optima.len(), actions.len(), ages.len()] == [count; 3];
+            let fits = count <= capacity && (head == 0 || count == capacity && head < count);
+            if !(seen && known && fits && actions.iter().all(|&action| usize::from(action) < ACTIONS)) {
+                return Err(checkpoint.damaged(format!("frames of seat {index} are missing")));
+            }
+            let steps = focal_powers.into_iter().zip(optima).zip(actions.iter().zip(ages)).map(
+                |((focal_power, next_optimum), (&action, &age))| Step {
                     focal_power,
                     next_optimum,
                     action,
                     age: u16::from_le_bytes(age),
-                })
-                .collect();
-            ring.patches = checkpoint.bytes(&name("patches"))?.to_vec();
-            ring.metrics = checkpoint.floats(&name("metrics"))?;
-            ring.head = 0;
+                },
+            );
+            *ring = Ring { steps: steps.collect(), patches, metrics, head };
+            if count > 0 {
+                ring.reserve(capacity - count);
+            }
         }
         Ok(())
     }
@@ -228,5 +239,61 @@ mod tests {
             oldest = oldest.min(steps[0].age);
         }
         assert_eq!(oldest, 27);
+    }
+    /// Eleven frames a seat, so that rings of ten have wrapped; and what a replay memory restored from it holds.
+    fn saved(seen: impl Fn(u16) -> Seen) -> (Replay, tempfile::TempDir) {
+        let mut replay = Replay::new(20, 2);
+        for time in 0..13u16 {
+            replay.push(0, &seen(time), Step { age: time, ..Step::default() });
+        }
+        replay.push(1, &seen(40), Step { age: 40, ..Step::default() });
+        let folder = tempfile::tempdir().unwrap();
+        let mut checkpoint = Checkpoint::default();
+        replay.save(&mut checkpoint);
+        // What a checkpoint borrows it does not copy.
+        assert_eq!(checkpoint.bytes("replay.0.patches").unwrap().as_ptr(), replay.seats[0].patches.as_ptr());
+        checkpoint.write(&folder.path().join("a")).unwrap();
+        (replay, folder)
+    }
+
+    #[test]
+    fn a_memory_comes_back_as_it_was_with_room_for_the_rest() {
+        for patches in [true, false] {
+            let seen = |time: u16| {
+                if patches { Seen::Patch(vec![time as u8; PIXELS].into()) } else { Seen::Metric(f32::from(time)) }
+            };
+            let (mut replay, folder) = saved(seen);
+            let mut back = Replay::new(20, 2);
+            back.restore(&mut Checkpoint::read(&folder.path().join("a")).unwrap()).unwrap();
+            for time in 50..53 {
+                for memory in [&mut replay, &mut back] {
+                    memory.push(1, &seen(time), Step { age: time, ..Step::default() });
+                    memory.push(0, &seen(time), Step { age: time, ..Step::default() });
+                }
+            }
+            for (one, other) in replay.seats.iter().zip(&back.seats) {
+                assert_eq!((&one.steps, one.head), (&other.steps, other.head));
+                assert!(one.patches == other.patches && one.metrics == other.metrics);
+            }
+            assert!(!patches || back.seats[1].patches.capacity() == 10 * PIXELS);
+        }
+    }
+
+    #[test]
+    fn a_damaged_memory_is_told() {
+        let (_replay, folder) = saved(|_| Seen::Patch(vec![1; PIXELS].into()));
+        let path = folder.path().join("a");
+        let damage: [fn(&mut Checkpoint<'_>); 4] = [
+            |checkpoint| checkpoint.put_bytes("replay.0.patches", vec![0; 77]),
+            |checkpoint| checkpoint.put_bytes("replay.1.action", vec![9]),
+            |checkpoint| checkpoint.put_floats("replay.1.next_optimum", []),
+            |checkpoint| drop(checkpoint.notes.insert("replay.0.head".to_owned(), "10".to_owned())),
+        ];
+        for damage in damage {
+            let mut checkpoint = Checkpoint::read(&path).unwrap();
+            damage(&mut checkpoint);
+            let error = Replay::new(20, 2).restore(&mut checkpoint).unwrap_err().to_string();
+            assert!(error.contains("is damaged: frames of seat"), "{error}");
+        }
     }
 }

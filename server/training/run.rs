@@ -4,18 +4,19 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use tch::Device;
 
-use super::checkpoint::{Checkpoint, CheckpointError};
-use super::clip::Clip;
+use super::asked::Asked;
+use super::checkpoint::Checkpoint;
 use super::curves::{self, Point};
 use super::error::TrainError;
 use super::evaluate::{Benchmark, Conditions, FRAMES, Outcome, Row, evaluate};
+use super::material::Material;
 use super::model_card::{self, Made};
 use super::pictures::{Split, varied};
 use super::recipe::Recipe;
+use super::run_folder::RunFolder;
 use super::tensorboard::EventFile;
 use super::trainer::{Trainer, trainer};
 use crate::autofocus::shipped::{self, Design};
@@ -24,7 +25,7 @@ use crate::clock::Clock;
 
 /// Updates between two moments at which a training may stop. All scans begin anew at each, so that none need be saved.
 pub const LEG: u64 = 100;
-const CHECKPOINT: &str = "checkpoint.safetensors";
+const RECIPE: &str = "recipe.toml";
 const CARD: &str = "MODEL_CARD.md";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -41,79 +42,94 @@ pub struct Progress {
     pub validation: Option<f64>,
 }
 
-/// What a training begins with.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Beginning {
-    /// Random weights.
-    Nothing,
-    /// The weights in a file (safetensors) of the same policy.
-    Weights(PathBuf),
-    /// The checkpoint in its run folder.
-    Checkpoint,
-}
-
 /// A training in a run folder.
 pub struct Run {
     recipe: Recipe,
     design: Design,
     seed: u64,
-    folder: PathBuf,
+    folder: RunFolder,
     trainer: Box<dyn Trainer>,
     validation: Benchmark,
     curve: Vec<Point>,
     best: f64,
     other_version: Option<String>,
-    /// What it trains on, in words.
-    data: String,
+    material: Material,
     /// Weights it began with, if not with random ones.
     origin: Option<String>,
 }
 
 impl Run {
-    /// A training by `recipe` in `folder`, on `footage`, or on drawn pictures where there is none, with its networks on
-    /// `device`.
+    /// A training by `recipe` in `folder`, new or empty, on `footage`, or on drawn pictures where there is none, from the
+    /// weights in the file `from` (safetensors) on, or from random ones, with its networks on `device`.
     ///
     /// # Errors
     /// When the recipe fits no policy, the folder cannot be written, or what it should begin with cannot be used.
-    pub fn start(
+    pub fn begin(
         recipe: Recipe,
         seed: u64,
-        footage: Vec<Arc<Clip>>,
+        footage: &[PathBuf],
         folder: &Path,
-        beginning: &Beginning,
+        from: Option<&Path>,
         device: Device,
     ) -> Result<Self, TrainError> {
+        // Drawing pictures takes a while: all that can be wrong is looked at before.
         let design = recipe.design()?;
-        // Read first: drawing pictures takes a while, and a checkpoint that is not there should be told at once.
-        let resume = matches!(beginning, Beginning::Checkpoint);
-        let checkpoint = if resume { Some(Checkpoint::read(&folder.join(CHECKPOINT))?) } else { None };
-        let unfit = |error: super::clip::ClipError| TrainError::Recipe(error.to_string());
-        let data = match footage.len() {
-            0 => format!("{} drawn pictures and brain phantoms", recipe.pictures),
-            count => format!("{count} clips of footage"),
-        };
-        let clips = if footage.is_empty() { varied(Split::Training, recipe.pictures).map_err(unfit)? } else { footage };
-        let held_out = varied(Split::Validation, recipe.pictures.min(60)).map_err(unfit)?;
+        let weights = from.map(|file| beginning(design, file)).transpose()?;
+        let folder = RunFolder::begin(folder)?;
+        let material = Material::open(footage, recipe.pictures)?;
+        let mut run = Self::new(recipe, design, seed, folder, material, device)?;
+        if let (Some(bytes), Some(file)) = (weights, from) {
+            run.trainer.begin_from(&bytes).map_err(|error| unfit(file, &error))?;
+            run.origin = Some(file.display().to_string());
+        }
+        run.folder.write(RECIPE, run.recipe_text().as_bytes())?;
+        Ok(run)
+    }
+
+    /// The training in `folder` from its checkpoint on, which must be the one `asked` for.
+    ///
+    /// # Errors
+    /// When there is no checkpoint, it is damaged or of another training, or its footage is no more.
+    pub fn resume(folder: &Path, asked: &Asked, device: Device) -> Result<Self, TrainError> {
+        let (folder, mut checkpoint) = RunFolder::go_on(folder)?;
+        let text = checkpoint.notes.get("recipe").map_or("", String::as_str);
+        let recipe = Recipe::parse(text).map_err(|error| checkpoint.damaged(format!("its recipe: {error}")))?;
+        let seed = checkpoint.number("seed")?;
+        asked.check(folder.path(), &recipe, seed)?;
+        let design = recipe.design()?;
+        let material = Material::again(&checkpoint, &asked.footage, recipe.pictures)?;
+        let mut run = Self::new(recipe, design, seed, folder, material, device)?;
+        let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
+        run.other_version = (version != VERSION).then(|| version.to_owned());
+        run.best = checkpoint.number("best")?;
+        run.origin = checkpoint.notes.get("origin").cloned();
+        run.curve = curves::parse(checkpoint.notes.get("curve").map_or("", String::as_str));
+        run.trainer.restore(&mut checkpoint)?;
+        Ok(run)
+    }
+
+    fn new(
+        recipe: Recipe,
+        design: Design,
+        seed: u64,
+        folder: RunFolder,
+        material: Material,
+        device: Device,
+    ) -> Result<Self, TrainError> {
+        let held_out = varied(Split::Validation, recipe.pictures.min(60))
+            .map_err(|error| TrainError::Recipe(error.to_string()))?;
         let count = 2 * held_out.len();
         let validation =
             Benchmark { clips: held_out, conditions: Conditions::HalfVaried, seed: 1, count, frames: FRAMES };
-        let mut trainer = trainer(design, &recipe, clips, seed, device)?;
-        let mut origin = None;
-        if let Beginning::Weights(file) = beginning {
-            let unfit = |reason: String| TrainError::Weights { path: file.clone(), reason };
-            let bytes = fs::read(file).map_err(|error| unfit(error.to_string()))?;
-            trainer.begin_from(&bytes).map_err(|error| unfit(error.to_string()))?;
-            origin = Some(file.display().to_string());
-        }
-        let folder = folder.to_owned();
-        let (curve, best, other_version) = (Vec::new(), f64::INFINITY, None);
-        let mut run =
-            Self { recipe, design, seed, folder, trainer, validation, curve, best, other_version, data, origin };
-        match checkpoint {
-            Some(checkpoint) => run.restore(&checkpoint)?,
-            None => run.open_folder()?,
-        }
-        Ok(run)
+        let trainer = trainer(design, &recipe, material.clips.clone(), seed, device)?;
+        let (curve, best, other_version, origin) = (Vec::new(), f64::INFINITY, None, None);
+        Ok(Self { recipe, design, seed, folder, trainer, validation, curve, best, other_version, material, origin })
+    }
+
+    /// What it is made by.
+    #[must_use]
+    pub const fn recipe(&self) -> &Recipe {
+        &self.recipe
     }
 
     /// Updates done.
@@ -146,9 +162,9 @@ impl Run {
         stop: &dyn Fn() -> bool,
         tell: &mut dyn FnMut(&Progress),
     ) -> Result<bool, TrainError> {
-        let folder = self.folder.clone();
-        let file = |source| TrainError::Folder { path: folder.clone(), source };
-        let mut events = EventFile::create(&self.folder, clock, self.updates()).map_err(file)?;
+        let folder = self.folder.path().to_owned();
+        let file = |source| TrainError::writing(&folder, source);
+        let mut events = EventFile::create(&folder, clock, self.updates()).map_err(file)?;
         let end = self.recipe.updates();
         while self.updates() < end && !stop() {
             let loss = self.leg(end);
@@ -196,15 +212,15 @@ impl Run {
         let row = self.figures(bytes.clone(), &self.validation)?;
         if row.mae < self.best {
             self.best = row.mae;
-            self.write(&self.weights_file(), &bytes)?;
+            self.folder.write(&self.weights_file(), &bytes)?;
             let made = Made {
                 policy: &self.recipe.policy,
                 seed: self.seed,
                 updates: self.updates(),
                 origin: self.origin.as_deref(),
-                data: &self.data,
+                data: &self.material.words(),
             };
-            self.write(CARD, model_card::validated(&made, &row, self.validation.count).as_bytes())?;
+            self.folder.write(CARD, model_card::validated(&made, &row, self.validation.count).as_bytes())?;
         }
         Ok(row.mae)
     }
@@ -218,14 +234,10 @@ impl Run {
         if count == 0 || !self.best.is_finite() {
             return Ok(());
         }
-        let read = |name: &str| {
-            let path = self.folder.join(name);
-            fs::read(&path).map_err(|source| TrainError::Folder { path, source })
-        };
         let benchmark = Benchmark::reference(count).map_err(|error| TrainError::Recipe(error.to_string()))?;
-        let row = self.figures(read(&self.weights_file())?, &benchmark)?;
-        let card = model_card::benchmarked(&String::from_utf8_lossy(&read(CARD)?), &row, count);
-        self.write(CARD, card.as_bytes())
+        let row = self.figures(self.folder.read(&self.weights_file())?, &benchmark)?;
+        let card = model_card::benchmarked(&String::from_utf8_lossy(&self.folder.read(CARD)?), &row, count);
+        self.folder.write(CARD, card.as_bytes())
     }
 
     /// The figures of the weights in `bytes` on `scans`.
@@ -245,19 +257,6 @@ impl Run {
         format!("{}.safetensors", self.recipe.policy)
     }
 
-    fn open_folder(&self) -> Result<(), TrainError> {
-        let file = |source| TrainError::Folder { path: self.folder.clone(), source };
-        if self.folder.join(CHECKPOINT).exists() {
-            let text = format!(
-                "{} holds a training already; go on with it by --resume, or choose another folder",
-                self.folder.display()
-            );
-            return Err(TrainError::Recipe(text));
-        }
-        fs::create_dir_all(&self.folder).map_err(file)?;
-        self.write("recipe.toml", self.recipe_text().as_bytes())
-    }
-
     fn recipe_text(&self) -> String {
         toml::to_string(&self.recipe).unwrap_or_default()
     }
@@ -274,31 +273,21 @@ impl Run {
             note("origin", origin.clone());
         }
         let points = curves::text(&self.curve);
-        self.write("curves.csv", format!("updates,loss,validation_mae\n{points}\n").as_bytes())?;
-        self.write("curves.svg", curves::svg(&self.curve).as_bytes())?;
+        self.folder.write("curves.csv", format!("updates,loss,validation_mae\n{points}\n").as_bytes())?;
+        self.folder.write("curves.svg", curves::svg(&self.curve).as_bytes())?;
         note("curve", points);
-        Ok(checkpoint.write(&self.folder.join(CHECKPOINT))?)
+        self.material.note(&mut checkpoint);
+        self.folder.save(&checkpoint)
     }
+}
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), TrainError> {
-        let recipe = checkpoint.notes.get("recipe").map(|text| Recipe::parse(text));
-        if recipe != Some(Ok(self.recipe.clone())) {
-            return Err(CheckpointError::Unfit("it was made by another recipe".to_owned()).into());
-        }
-        let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
-        self.other_version = (version != VERSION).then(|| version.to_owned());
-        self.seed = checkpoint.number("seed")?;
-        self.best = checkpoint.number("best")?;
-        self.origin = checkpoint.notes.get("origin").cloned();
-        self.curve = curves::parse(checkpoint.notes.get("curve").map_or("", String::as_str));
-        self.trainer.restore(checkpoint)?;
-        Ok(())
-    }
+/// The weights in `file` for a policy of `design`.
+fn beginning(design: Design, file: &Path) -> Result<Vec<u8>, TrainError> {
+    let bytes = fs::read(file).map_err(|error| unfit(file, &error))?;
+    shipped::build(design, &bytes).map_err(|error| unfit(file, &error))?;
+    Ok(bytes)
+}
 
-    fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
-        let path = self.folder.join(name);
-        let beside = path.with_extension("partial");
-        let done = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &path));
-        done.map_err(|source| TrainError::Folder { path, source })
-    }
+fn unfit(file: &Path, reason: &dyn std::fmt::Display) -> TrainError {
+    TrainError::Weights { path: file.to_owned(), reason: reason.to_string() }
 }

@@ -41,13 +41,13 @@ pub trait Trainer {
     }
 
     /// Adds all that [`Trainer::restore`] needs, between two legs.
-    fn save(&self, checkpoint: &mut Checkpoint);
+    fn save<'a>(&'a self, checkpoint: &mut Checkpoint<'a>);
 
     /// Takes back what [`Trainer::save`] added.
     ///
     /// # Errors
     /// When the checkpoint is of another training.
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError>;
+    fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError>;
 }
 
 /// A trainer from nothing, by `recipe`, of a policy of `design`; its network on `device`.
