@@ -1,22 +1,29 @@
 //! Files that are there whole or not at all, whenever the disk is full or the power goes.
 
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Puts a file with these bytes at `path`. They are written beside it first, so that what was there before stays until all
-/// of it is on the disk.
+/// Puts a file with these bytes at `path` (see [`replace_with`]). A device or a pipe is written to, never replaced.
 ///
 /// # Errors
 /// When it cannot be written; then nothing of it is left.
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // A device or a pipe is written to, never replaced.
     if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return fs::write(path, bytes);
     }
+    replace_with(path, |writer| writer.write_all(bytes))
+}
+
+/// Puts a file with what `fill` writes at `path`. It is written beside it first, so that what was there before stays until
+/// all of it is on the disk.
+///
+/// # Errors
+/// When it cannot be written; then nothing of it is left.
+pub fn replace_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let beside = path.with_file_name(format!(".{name}.partial"));
-    let written = write_through(&beside, bytes).and_then(|()| fs::rename(&beside, path));
+    let written = write_through_with(&beside, fill).and_then(|()| fs::rename(&beside, path));
     if written.is_err() {
         let _ = fs::remove_file(&beside);
     }
@@ -28,9 +35,20 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// When it cannot be written; a part of it may be there then.
 pub fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::create(path)?;
-    file.write_all(bytes)?;
-    file.sync_data()
+    write_through_with(path, |writer| writer.write_all(bytes))
+}
+
+fn write_through_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let mut writer = BufWriter::with_capacity(1 << 20, File::create(path)?);
+    fill(&mut writer)?;
+    // A file renamed before the disk has it may be empty after a power cut.
+    writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()
+}
+
+/// Whether `name` is that of a file that a process killed in [`replace`] left behind.
+#[must_use]
+pub fn is_partial(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(".partial")
 }
 
 #[cfg(test)]
@@ -53,9 +71,30 @@ mod tests {
     }
 
     #[test]
+    fn what_cannot_be_written_whole_leaves_what_was_there_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        replace(&path, b"before").unwrap();
+        let full = |writer: &mut BufWriter<File>| -> io::Result<()> {
+            writer.write_all(b"half")?;
+            writer.flush()?;
+            Err(io::ErrorKind::StorageFull.into())
+        };
+        assert_eq!(replace_with(&path, full).unwrap_err().kind(), io::ErrorKind::StorageFull);
+        assert_eq!(fs::read(&path).unwrap(), b"before");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+    }
+
+    #[test]
     fn a_device_is_written_to_and_stays_a_device() {
         let full = Path::new("/dev/full");
         assert_eq!(replace(full, b"text").unwrap_err().kind(), io::ErrorKind::StorageFull);
         assert!(!fs::metadata(full).unwrap().is_file());
+    }
+
+    #[test]
+    fn only_what_was_written_aside_is_partial() {
+        assert!(is_partial(".checkpoint.safetensors.partial"));
+        assert!(!is_partial("my.partial") && !is_partial(".hidden"));
     }
 }

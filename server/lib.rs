@@ -10,7 +10,6 @@ pub mod imaging;
 pub mod lens;
 pub mod options;
 pub mod priority;
-pub mod whole_file;
 
 pub mod autofocus;
 pub mod camera;

@@ -11,7 +11,7 @@ use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 use tch::{Kind, Tensor, nn};
 
 use crate::autofocus::weights::floats;
-use crate::whole_file;
+use crate::files;
 
 /// Longest header that is read: some thousand times what one has.
 const MAX_HEADER: u64 = 1 << 28;
@@ -158,7 +158,7 @@ impl<'a> Checkpoint<'a> {
         let header = Metadata::new((!notes.is_empty()).then_some(notes), infos).map_err(io::Error::other)?;
         let mut header = serde_json::to_vec(&header)?;
         header.resize(header.len().next_multiple_of(8), b' ');
-        whole_file::write_with(path, |writer| {
+        files::replace_with(path, |writer| {
             writer.write_all(&(header.len() as u64).to_le_bytes())?;
             writer.write_all(&header)?;
             arrays.iter().try_for_each(|(_, (_, bytes))| writer.write_all(bytes))

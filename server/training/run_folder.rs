@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;
-use crate::whole_file;
+use crate::files;
 
 const CHECKPOINT: &str = "checkpoint.safetensors";
 const LOCK: &str = ".lock";
@@ -31,7 +31,7 @@ impl RunFolder {
         let lock = lock(path)?;
         let foreign = |entry: fs::DirEntry| {
             let name = entry.file_name();
-            name != LOCK && !whole_file::is_partial(&name.to_string_lossy())
+            name != LOCK && !files::is_partial(&name.to_string_lossy())
         };
         if fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok).any(foreign) {
             if !was_locked_before {
@@ -56,7 +56,7 @@ impl RunFolder {
         let lock = lock(path)?;
         let unwritable = |source| TrainError::writing(path, source);
         for entry in fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok) {
-            if whole_file::is_partial(&entry.file_name().to_string_lossy()) {
+            if files::is_partial(&entry.file_name().to_string_lossy()) {
                 fs::remove_file(entry.path()).map_err(unwritable)?;
             }
         }
@@ -72,7 +72,7 @@ impl RunFolder {
     /// Writes file `name`.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
         let path = self.path.join(name);
-        whole_file::write(&path, bytes).map_err(|source| TrainError::writing(&path, source))
+        files::replace(&path, bytes).map_err(|source| TrainError::writing(&path, source))
     }
 
     /// Writes the checkpoint.
