@@ -49,7 +49,8 @@ pub struct Path {
 pub struct PathFigures {
     /// Mean absolute focal power error.
     pub mae: f64,
-    /// Share of frames with an error below [`IN_FOCUS`].
+    /// Share of frames with an error below [`IN_FOCUS`]. On a grid of focal powers errors of exactly that fall on either side by
+    /// rounding; `docs/results.md` tells how much hangs on it.
     pub in_focus: f64,
     /// Mean absolute change of focal power a frame.
     pub travel: f64,

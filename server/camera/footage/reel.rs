@@ -78,7 +78,10 @@ impl Stills {
 
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
-    let picture = image::open(file).map_err(|error| FootageError::unreadable(file, error))?;
+    // By what the file holds: a name may lie about that.
+    let reader = image::ImageReader::open(file).and_then(image::ImageReader::with_guessed_format);
+    let reader = reader.map_err(|error| FootageError::unreadable(file, error))?;
+    let picture = reader.decode().map_err(|error| FootageError::unreadable(file, error))?;
     let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
     let scaled = if fits {
         picture
