@@ -27,7 +27,7 @@ pub struct Arguments {
     /// What a recorded scan shows between two of its focal powers.
     #[arg(long, value_enum, default_value_t)]
     between: Between,
-    /// A video, an image or a folder of images to scan in place of the reference pictures.
+    /// A video (its first 1500 frames), an image or a folder of images to scan in place of the reference pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
     /// Policies by name, separated by commas, `all` for all that can run; `file:PATH` for one from a `TorchScript` file, whose
