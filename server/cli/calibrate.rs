@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Failure, calibration, tables};
+use super::{Failure, calibration, print, tables};
 use crate::camera::{self, CameraSettings, FrameImage};
 use crate::clock::{Clock, SystemClock};
 use crate::imaging::{Average, Calibration, Reference};
@@ -177,7 +177,6 @@ impl Destination {
             calibration.unit.clone_from(&self.unit);
         }
         let path = calibration::save(Path::new(&self.out), &calibration, changed)?;
-        println!("{}\nkept in {}", calibration.title(), path.display());
-        Ok(())
+        print(&format!("{}\nkept in {}\n", calibration.title(), path.display()))
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Failure;
+use super::{Failure, print};
 use crate::ids::SessionId;
 use crate::store::Reader;
 use crate::store::export::export;
@@ -40,11 +40,9 @@ async fn write(arguments: &Arguments) -> Result<(), Failure> {
     let reader = Reader::open(&arguments.data_dir).await?;
     let summary = export(&reader, arguments.session, &arguments.out, arguments.unblinded).await?;
     if arguments.json {
-        println!("{}", serde_json::to_string(&summary)?);
-    } else {
-        let kind = if summary.unblinded { "unblinded" } else { "blinded" };
-        let practice = if summary.practice { ", practice" } else { "" };
-        println!("{} files ({kind}{practice}) in {}", summary.files.len(), summary.folder.display());
+        return print(&(serde_json::to_string(&summary)? + "\n"));
     }
-    Ok(())
+    let kind = if summary.unblinded { "unblinded" } else { "blinded" };
+    let practice = if summary.practice { ", practice" } else { "" };
+    print(&format!("{} files ({kind}{practice}) in {}\n", summary.files.len(), summary.folder.display()))
 }

@@ -4,13 +4,12 @@ mod emulate;
 mod measure;
 mod sweep;
 
-use std::io::Write;
 use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
 
-use super::Failure;
+use super::{Failure, print};
 use crate::clock::SystemClock;
 use crate::lens::{self, FocalPower, Lens, LensInfo};
 
@@ -129,9 +128,4 @@ fn dioptre(info: &LensInfo, power: FocalPower) -> f64 {
 fn parse_focal_power(text: &str) -> Result<FocalPower, String> {
     let value: f64 = text.parse().map_err(|_| "must be a number from 0 to 1".to_owned())?;
     FocalPower::new(value).map_err(|error| error.to_string())
-}
-
-fn print(text: &str) -> Result<(), Failure> {
-    std::io::stdout().write_all(text.as_bytes())?;
-    Ok(())
 }

@@ -250,7 +250,8 @@ fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
     }
 }
 
-/// Ctrl-C, the end that a service manager asks for, or that of the terminal, with which a lens must not keep its current. Made before anything is announced, so that no signal is missed.
+/// Ctrl-C, the end that a service manager asks for, or that of the terminal, after which a lens must not keep its current.
+/// Made before anything is announced, so that no signal is missed.
 struct Signals {
     interrupt: Signal,
     terminate: Signal,

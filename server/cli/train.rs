@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Failure;
 use super::interrupt::Interrupt;
+use super::{Failure, print};
 use crate::clock::SystemClock;
 use crate::training::asked::Asked;
 use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
@@ -84,28 +84,25 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })?;
     if !whole {
         bar.finish_and_clear();
-        println!(
-            "stopped after {} of {total} updates; go on with: parfocal train {} --out {} --resume",
+        return print(&format!(
+            "stopped after {} of {total} updates; go on with: parfocal train {} --out {} --resume\n",
             run.updates(),
             arguments.policy,
             arguments.out.display()
-        );
-        return Ok(());
+        ));
     }
     interrupt.all_is_saved();
     if interrupt.asked() {
         bar.finish_and_clear();
-        println!(
-            "trained and saved in {}; --resume adds the benchmark's figures to the model card",
+        return print(&format!(
+            "trained and saved in {}; --resume adds the benchmark's figures to the model card\n",
             arguments.out.display()
-        );
-        return Ok(());
+        ));
     }
     bar.set_message("running the best weights on the reference benchmark; Ctrl-C leaves that out");
     run.report()?;
     bar.finish_and_clear();
-    println!("best validation MAE {:.4}; weights and model card in {}", run.best(), arguments.out.display());
-    Ok(())
+    print(&format!("best validation MAE {:.4}; weights and model card in {}\n", run.best(), arguments.out.display()))
 }
 
 fn device(compute: Compute) -> Result<tch::Device, Failure> {

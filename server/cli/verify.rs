@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Failure;
-use crate::store::export::verify::{Verdict, verify};
+use super::{Failure, print};
+use crate::store::export::verify::{Check, Verdict, verify};
 
 /// Arguments of `parfocal verify`.
 #[derive(Debug, Args)]
@@ -26,21 +26,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(format!("{} is no folder; name one that `parfocal export` wrote", arguments.dir.display()).into());
     }
     let checks = verify(&arguments.dir);
-    if arguments.json {
-        println!("{}", serde_json::to_string(&checks)?);
-    } else {
-        for check in &checks {
-            let (verdict, detail) = match &check.verdict {
-                Verdict::Passed(detail) => ("passed", detail),
-                Verdict::Failed(detail) => ("FAILED", detail),
-                Verdict::NotChecked(detail) => ("not checked", detail),
-            };
-            println!("{:<11} {verdict:<11} {detail}", check.name);
-        }
-    }
+    print(&if arguments.json { serde_json::to_string(&checks)? + "\n" } else { checks.iter().map(line).collect() })?;
     let failed = checks.iter().filter(|check| matches!(check.verdict, Verdict::Failed(_))).count();
     if failed == 0 {
         return Ok(());
     }
     Err(format!("{failed} of {} checks failed: do not rely on this export", checks.len()).into())
+}
+
+fn line(check: &Check) -> String {
+    let (verdict, detail) = match &check.verdict {
+        Verdict::Passed(detail) => ("passed", detail),
+        Verdict::Failed(detail) => ("FAILED", detail),
+        Verdict::NotChecked(detail) => ("not checked", detail),
+    };
+    format!("{:<11} {verdict:<11} {detail}\n", check.name)
 }

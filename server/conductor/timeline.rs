@@ -1,5 +1,7 @@
 //! A session over time: when each setting was inspected, the focal path, and what was said.
 
+use std::time::Duration;
+
 use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -7,7 +9,7 @@ use utoipa::ToSchema;
 use super::course::Course;
 use super::{ConductError, Conductor};
 use crate::ids::SessionId;
-use crate::store::{Comment, PathPoint};
+use crate::store::PathPoint;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::view::Said;
 
@@ -103,12 +105,15 @@ impl Conductor {
             optimal: point.optimal,
         };
         let comments = reader.comments(session).await?;
-        let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
-            at: comment.stamp.wall,
-            seconds: (seconds(start, runs.wall(run, comment.stamp.at)) - waited(&comment)).max(0.0),
-            setting: comment.segment.map(|segment| course.setting(segment)),
-            frame: comment.frame,
-            said: comment.said,
+        let comments = comments.into_iter().map(|(run, comment)| {
+            let waited = comment.waited_ms.map_or(0.0, |waited| milliseconds(waited.unsigned_abs()));
+            TimelineComment {
+                at: comment.stamp.wall,
+                seconds: (seconds(start, runs.wall(run, comment.stamp.at)) - waited).max(0.0),
+                setting: comment.segment.map(|segment| course.setting(segment)),
+                frame: comment.frame,
+                said: comment.said,
+            }
         });
         let events: Vec<(f64, &EventKind)> =
             events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
@@ -173,14 +178,9 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
     spans
 }
 
-#[allow(clippy::cast_precision_loss, reason = "segments last at most an hour")]
+/// That many milliseconds in seconds.
 fn milliseconds(count: u64) -> f64 {
-    count as f64 / 1000.0
-}
-
-#[allow(clippy::cast_precision_loss, reason = "milliseconds of a session")]
-fn waited(comment: &Comment) -> f64 {
-    comment.waited_ms.unwrap_or(0) as f64 / 1000.0
+    Duration::from_millis(count).as_secs_f64()
 }
 
 fn seconds(from: Timestamp, to: Timestamp) -> f64 {

@@ -138,8 +138,8 @@ pub struct ControlledFrame {
     pub belief: Option<Arc<[f32]>>,
 }
 
-/// The loop as the operator sees it; published a few times a second and at every change.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The loop's state; published a few times a second and at every change. Each role is told a part of it.
+#[derive(Debug, Clone, PartialEq)]
 pub struct ControlStatus {
     /// The camera.
     pub camera: CameraHealth,

@@ -73,12 +73,12 @@ impl Worker {
                 Err(error) => tracing::error!(%error, "a picture could not be encoded"),
             }
         }
+        // After the picture has left: nobody waits for this.
         if detect {
             self.looked = Some(number);
-        }
-        // After the picture has left: nobody waits for this.
-        if detect && let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {
-            self.control.send(Command::ContentArea(news));
+            if let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {
+                self.control.send(Command::ContentArea(news));
+            }
         }
     }
 

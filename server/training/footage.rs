@@ -7,6 +7,7 @@ use std::process::Command;
 use std::sync::Arc;
 
 use super::clip::{Area, Clip, ClipError};
+use crate::camera::footage::picture_reader;
 use crate::imaging::{ContentArea, GrayImage, content_area};
 
 /// Most lines of a picture: the height the paper's walks are meant for.
@@ -84,9 +85,7 @@ fn unreadable(path: &Path, reason: &str) -> FootageError {
 }
 
 fn image(path: &Path) -> Result<GrayImage, FootageError> {
-    // By what the file holds: a name may lie about that.
-    let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
-    let reader = reader.map_err(|error| unreadable(path, &error.to_string()))?;
+    let reader = picture_reader(path).map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = reader.decode().map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = if picture.height() > LINES {
         picture.resize(u32::MAX, LINES, image::imageops::FilterType::Triangle)

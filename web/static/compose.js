@@ -119,8 +119,10 @@ export function composer(outbox, now) {
   function refused(entry, reason) {
     const { body } = entry;
     if (body.session !== shown) return;
-    if (body.kind === "text") outbox.takeBack(entry);
-    if (body.kind === "text") write(box.value === "" ? body.text : `${body.text}\n${box.value}`);
+    if (body.kind === "text") {
+      outbox.forget(entry);
+      write(box.value === "" ? body.text : `${body.text}\n${box.value}`);
+    }
     const what = body.kind === "text" ? "The comment was not saved, it is back in the box" : body.kind === "mark" ? "The mark was not saved" : `“${body.text}” was not saved`;
     setText(trouble, `${what}: ${reason}`);
   }

@@ -53,9 +53,9 @@ export class Outbox extends EventTarget {
    */
   add(path, body, slot = null) {
     const order = `${String(Date.now()).padStart(15, "0")}-${String(this.#count++).padStart(5, "0")}`;
-    const entry = { id: `${order}-${uuid()}`, path, slot, at: Date.now(), body: { key: uuid(), ...body } };
+    const entry = { id: `${order}-${uuid()}`, path, slot, body: { key: uuid(), ...body } };
     if (slot) {
-      for (const other of [...this.waiting, ...this.#refused.values()]) if (other.slot === slot && !other.sending) this.#forget(other);
+      for (const other of [...this.waiting, ...this.#refused.values()]) if (other.slot === slot && !other.sending) this.forget(other);
     }
     this.#entries.set(entry.id, entry);
     entry.stored = store(entry);
@@ -106,9 +106,9 @@ export class Outbox extends EventTarget {
   async #send(entry) {
     entry.sending = true;
     try {
-      await post(entry.path, { ...entry.body, waited_millis: Math.max(0, Date.now() - entry.at) });
+      await post(entry.path, withWait(entry.body));
       this.trouble = null;
-      this.#forget(entry);
+      this.forget(entry);
       this.#tell(entry, "saved");
       return true;
     } catch (error) {
@@ -121,7 +121,7 @@ export class Outbox extends EventTarget {
       }
       this.trouble = inWords(error, "No connection: trying again by itself.");
       // Tried again later it would be the last to arrive, and count.
-      if (this.#replaced(entry)) this.#forget(entry);
+      if (this.#replaced(entry)) this.forget(entry);
       this.#tell(entry, "waiting", this.trouble);
       return error instanceof Refused;
     }
@@ -129,11 +129,6 @@ export class Outbox extends EventTarget {
 
   #replaced({ id, slot }) {
     return slot !== null && this.waiting.some((other) => other.slot === slot && other.id > id);
-  }
-
-  /** Takes back an entry that was refused: it is in a person's hands again. */
-  takeBack(entry) {
-    this.#forget(entry);
   }
 
   /** Another tab saved or replaced what both held. */
@@ -144,7 +139,8 @@ export class Outbox extends EventTarget {
     this.#tell(entry, "saved");
   }
 
-  #forget(entry) {
+  /** Takes `entry` off this device: it is saved, replaced, or in a person's hands again. */
+  forget(entry) {
     this.#entries.delete(entry.id);
     this.#refused.delete(entry.id);
     try {
@@ -157,6 +153,11 @@ export class Outbox extends EventTarget {
   #tell(entry, state, reason = null) {
     this.dispatchEvent(new CustomEvent("change", { detail: { entry, state, reason } }));
   }
+}
+
+/** What says when it was said also says how long it has waited since. */
+function withWait(body) {
+  return body.client_millis === undefined ? body : { ...body, waited_millis: Math.max(0, Date.now() - body.client_millis) };
 }
 
 function store(entry) {

@@ -7,6 +7,7 @@ mod defocus;
 mod reel;
 mod video;
 
+pub use reel::picture_reader;
 pub use video::{FootageError, Video};
 
 use std::time::Duration;

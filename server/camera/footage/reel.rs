@@ -1,7 +1,11 @@
 //! The pictures of a footage camera over time: a video, or stills one after another.
 
+use std::fs::File;
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+use image::ImageReader;
 
 use super::clip::Clip;
 use super::video::FootageError;
@@ -76,11 +80,17 @@ impl Stills {
     }
 }
 
+/// Reads the picture in `file` as what the file holds: its name may lie about that.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
+    ImageReader::open(file).and_then(ImageReader::with_guessed_format)
+}
+
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
-    // By what the file holds: a name may lie about that.
-    let reader = image::ImageReader::open(file).and_then(image::ImageReader::with_guessed_format);
-    let reader = reader.map_err(|error| FootageError::unreadable(file, error))?;
+    let reader = picture_reader(file).map_err(|error| FootageError::unreadable(file, error))?;
     let picture = reader.decode().map_err(|error| FootageError::unreadable(file, error))?;
     let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
     let scaled = if fits {

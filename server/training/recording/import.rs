@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::import_error::ImportError;
 use super::{Taken, shot};
+use crate::camera::footage::picture_reader;
 use crate::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
 };
@@ -167,9 +168,7 @@ impl Reader {
             error: DecodeError::Damaged(error.to_string()),
         };
         let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
-        // By its content, as `read` does: a name may lie.
-        let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
-        let (width, height) = reader.map_err(unreadable)?.into_dimensions().map_err(damaged)?;
+        let (width, height) = picture_reader(path).map_err(unreadable)?.into_dimensions().map_err(damaged)?;
         self.check(path, (width as usize, height as usize))
     }
 
