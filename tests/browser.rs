@@ -42,3 +42,5 @@ mod wait;
 mod webdriver;
 #[path = "browser/wire.rs"]
 mod wire;
+#[path = "browser/writing.rs"]
+mod writing;

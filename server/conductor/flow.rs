@@ -33,13 +33,21 @@ impl Shared {
             let text = "a session of the same balanced set is under way, and this one's order would tell its own; wait for its end";
             return Err(ConductError::Conflict(text.to_owned()));
         }
+        if matches!(action, Action::Unblind { .. })
+            && let Some((participant, made)) = self.store.reader().blinded_twin(session).await?
+        {
+            let text = format!(
+                "the session of {participant} made at {made} took this one's place and has the same order; unblind that one first"
+            );
+            return Err(ConductError::Conflict(text));
+        }
         let kinds = decide(&earlier.state, by, action, self.clock.now())?;
         self.record(&mut earlier, by, kinds).await
     }
 
     pub(super) async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
         let course = Course::load(self.store.reader(), session).await?;
-        course.ok_or_else(|| ConductError::NotFound("there is no such session; reload the page".to_owned()))
+        course.ok_or_else(ConductError::no_session)
     }
 
     /// Takes up the session that was under way when the server ended.

@@ -96,6 +96,12 @@ pub enum ConductError {
     Storage(String),
 }
 
+impl ConductError {
+    fn no_session() -> Self {
+        Self::NotFound("there is no such session; reload the page".to_owned())
+    }
+}
+
 impl From<StoreError> for ConductError {
     fn from(error: StoreError) -> Self {
         Self::Storage(error.to_string())

@@ -12,7 +12,7 @@ impl Shared {
         check_said(&new.said)?;
         let mut live = self.live.lock().await;
         let earlier = self.earlier(&live, new.session).await?;
-        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(no_session()) };
+        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(ConductError::no_session()) };
         // A segment that is not this session's can only come from a broken page: what was said is kept all the same.
         let segment = new.segment.filter(|&segment| course.state.plan().position(segment).is_some());
         let comment = Comment {
@@ -40,7 +40,7 @@ impl Shared {
     pub(super) async fn answer(&self, new: NewAnswer) -> Result<(), ConductError> {
         let mut live = self.live.lock().await;
         let earlier = self.earlier(&live, new.session).await?;
-        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(no_session()) };
+        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(ConductError::no_session()) };
         check_answer(course, &new)?;
         let answer = Answer {
             key: new.key,
@@ -102,8 +102,4 @@ fn unless_taken(kept: Kept) -> Result<(), ConductError> {
             Err(ConductError::Conflict("its key already stands for something else; send it with a new key".to_owned()))
         }
     }
-}
-
-fn no_session() -> ConductError {
-    ConductError::NotFound("there is no such session; reload the page".to_owned())
 }

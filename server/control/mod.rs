@@ -19,6 +19,7 @@ pub use stepper::Stepper;
 pub use window::LatencyFigures;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::ids::SegmentId;
 use serde::Serialize;
@@ -108,6 +109,13 @@ pub enum Hold {
 }
 
 impl Hold {
+    /// Whether the policy is the reason. A policy that takes time to start or to think is one that was learned: this tells policies
+    /// apart.
+    #[must_use]
+    pub const fn is_the_policys(self) -> bool {
+        matches!(self, Self::PolicyPanicked | Self::PolicyNonsense | Self::PolicySlow | Self::PolicyUnavailable)
+    }
+
     /// Its name, as in the database and in exports.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -153,6 +161,8 @@ pub struct ControlStatus {
     pub focal_power: FocalPower,
     /// Why the lens is being held, if it is.
     pub held: Option<Hold>,
+    /// For how long it has been held without a break, for whatever reasons.
+    pub held_for: Duration,
     /// The hold in words, and what to do.
     pub message: Option<Arc<str>>,
     /// Loop steps a second over the last second.

@@ -117,6 +117,8 @@ struct Worker {
     last_frame_at: Moment,
     /// Why frames lead to nothing: none come, or they hold no patch.
     camera_fault: Option<HoldReason>,
+    /// Since when the lens has been held without a break.
+    held_since: Option<Moment>,
     window: LatencyWindow,
     steps: u64,
     telemetry_dropped: u64,
@@ -139,6 +141,7 @@ impl Worker {
             policy: None,
             focal_power: stepper.focal_power(),
             held: None,
+            held_for: Duration::ZERO,
             message: None,
             steps_per_second: 0.0,
             steps: 0,
@@ -157,6 +160,7 @@ impl Worker {
             published_at: now,
             last_frame_at: now,
             camera_fault: None,
+            held_since: None,
             window: LatencyWindow::default(),
             steps: 0,
             telemetry_dropped: 0,
@@ -217,6 +221,7 @@ impl Worker {
     fn publish(&mut self) {
         let now = self.clock.now();
         let reason = self.camera_fault.as_ref().or(self.stepper.hold_reason());
+        self.held_since = reason.and(self.held_since.or(Some(now)));
         let (held, message) = (reason.map(|reason| reason.hold), reason.map(|reason| reason.message.clone()));
         let changed = {
             let last = self.status.borrow();
@@ -236,6 +241,7 @@ impl Worker {
             policy: self.stepper.policy().cloned(),
             focal_power: self.stepper.focal_power(),
             held,
+            held_for: self.held_since.map_or(Duration::ZERO, |since| now.since(since)),
             message,
             #[allow(clippy::cast_precision_loss, reason = "a few hundred at most")]
             steps_per_second: figures.steps as f64,

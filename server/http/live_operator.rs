@@ -3,6 +3,7 @@
 //! hill-climbers by 0.05 each frame), how long a step takes, the metric, by its scale, and the belief, which few have.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde::Serialize;
 use tokio::sync::watch;
@@ -25,7 +26,7 @@ pub(super) struct ForOperator;
 pub(super) struct OperatorFrame {
     #[serde(flatten)]
     picture: SurgeonFrame,
-    /// Why the lens was held, if it was.
+    /// Why the lens was held, if it was; not for the policy's sake while a session is under way.
     held: Option<Hold>,
     /// What the loop did with the frame; each null while a session is under way.
     #[serde(flatten)]
@@ -66,7 +67,7 @@ pub(super) struct OperatorStatus {
     policy: Option<PolicyName>,
     /// Last focal power asked for; not while a session is under way.
     focal_power: Option<FocalPower>,
-    /// Why the lens is being held, if it is. A policy that fails is the operator's business, session or not.
+    /// Why the lens is being held, if it is; while a session is under way, see [`told_blinded`].
     held: Option<Hold>,
     /// The hold in words, and what to do.
     message: Option<Arc<str>>,
@@ -81,14 +82,18 @@ pub(super) struct OperatorStatus {
 
 impl OperatorStatus {
     fn new(status: &ControlStatus, blinded: bool) -> Self {
+        let (held, message) = match status.held {
+            Some(hold) if blinded => told_blinded(hold, status.held_for, status.message.as_ref()),
+            held => (held, status.message.clone()),
+        };
         Self {
             camera: status.camera.clone(),
             camera_offer: status.camera_offer.clone(),
             lens: status.lens.clone(),
             policy: status.policy.clone().filter(|_| !blinded),
             focal_power: (!blinded).then_some(status.focal_power),
-            held: status.held,
-            message: status.message.clone(),
+            held,
+            message,
             steps_per_second: status.steps_per_second,
             steps: status.steps,
             telemetry_dropped: status.telemetry_dropped,
@@ -96,6 +101,24 @@ impl OperatorStatus {
             latency_p99_micros: (!blinded).then_some(status.latency_p99_micros),
         }
     }
+}
+
+/// A hold that lasts as long is no slow start, but a fault that the operator must know of.
+const LASTING: Duration = Duration::from_secs(3);
+
+/// A hold that has gone on for `held_for`, and the words for it, as far as they may be told while a session is under way: one by the
+/// policy when it lasts, and then in the same words whatever went wrong. Only learned policies take time to start and to think.
+fn told_blinded(hold: Hold, held_for: Duration, message: Option<&Arc<str>>) -> (Option<Hold>, Option<Arc<str>>) {
+    if !hold.is_the_policys() {
+        return (Some(hold), message.cloned());
+    }
+    if held_for < LASTING {
+        return (None, None);
+    }
+    (
+        Some(Hold::PolicySlow),
+        Some(Arc::from("the focus has been held for some time; if it stays so, abort the session")),
+    )
 }
 
 impl Audience for ForOperator {
@@ -106,7 +129,8 @@ impl Audience for ForOperator {
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
         let (age, seen) =
             if app.blinded() { (coarse(age_ms), Seen::default()) } else { (age_ms, Seen::new(&frame.insight)) };
-        OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, app), held: frame.insight.held, seen }
+        let held = frame.insight.held.filter(|hold| !(app.blinded() && hold.is_the_policys()));
+        OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, app), held, seen }
     }
 
     fn sessions(app: &App) -> watch::Receiver<Option<Arc<OperatorView>>> {
@@ -115,5 +139,25 @@ impl Audience for ForOperator {
 
     fn status(status: &ControlStatus, app: &App) -> OperatorStatus {
         OperatorStatus::new(status, app.blinded())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_policys_holds_are_told_in_a_session_only_when_they_last_and_then_all_alike() {
+        let message: Arc<str> = Arc::from("the policy is starting");
+        let told = |hold, seconds| told_blinded(hold, Duration::from_secs(seconds), Some(&message));
+        let policys = [Hold::PolicyPanicked, Hold::PolicyNonsense, Hold::PolicySlow, Hold::PolicyUnavailable];
+        for hold in policys {
+            assert_eq!(told(hold, 1), (None, None));
+            assert_eq!(told(hold, 10), told(policys[0], 10));
+            assert!(told(hold, 10).1.is_some_and(|told| !told.contains("policy")));
+        }
+        for hold in [Hold::LensFailed, Hold::CameraFailed, Hold::Paused] {
+            assert_eq!(told(hold, 0), (Some(hold), Some(Arc::clone(&message))));
+        }
     }
 }

@@ -5,6 +5,7 @@ use sqlx::sqlite::SqliteRow;
 
 use super::sessions::{index, seed};
 use super::{Reader, StoreError};
+use crate::ids::SessionId;
 use crate::trial::allocation::{Algorithm, Seed};
 
 /// A session of a set that shares a seed.
@@ -42,6 +43,25 @@ impl Reader {
             Ok(SetMember { seed: seed(row)?, index: index(row)?, aborted, unblinded })
         };
         rows.iter().map(member).collect()
+    }
+
+    /// Participant and wall time of the session that has the same place in its set as `session`, and so the same order, if it is
+    /// neither aborted nor unblinded.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn blinded_twin(&self, session: SessionId) -> Result<Option<(String, String)>, StoreError> {
+        let twin = sqlx::query_as(
+            "SELECT other.participant, (SELECT wall FROM events WHERE events.session = other.session ORDER BY number LIMIT 1)
+                 FROM sessions AS s JOIN sessions AS other
+                 ON other.seed = s.seed AND other.set_index = s.set_index AND other.session != s.session
+             WHERE s.session = ? AND NOT EXISTS (
+                 SELECT 1 FROM events WHERE events.session = other.session AND kind IN ('aborted', 'unblinded'))",
+        )
+        .bind(session.to_string())
+        .fetch_optional(self.pool())
+        .await?;
+        Ok(twin)
     }
 
     /// Whether every session that shares `seed` was unblinded, so that the seed gives nothing away.

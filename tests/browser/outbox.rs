@@ -78,4 +78,16 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         return [posted, ...after, kept(), next.refused("s").length];
     "#;
     assert_eq!(run(&page, script).await, json!([["b", "b"], 1, 1, 0, 0, 0]));
+
+    // Who waits for the answers hears that the server is not heard, also while a comment is the first in line.
+    let script = r#"
+        const outbox = new Outbox();
+        answers.push(Promise.reject(new TypeError("Failed to fetch")));
+        outbox.add("/comments", { value: "c" });
+        outbox.add("/answers", { value: 4 }, "sharpness");
+        const settled = await outbox.settled("/answers");
+        await saved(outbox);
+        return [settled, posted];
+    "#;
+    assert_eq!(run(&page, script).await, json!([false, ["c", "c", 4]]));
 }

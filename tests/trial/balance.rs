@@ -95,6 +95,22 @@ async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
 }
 
 #[tokio::test]
+async fn an_aborted_session_does_not_unblind_the_one_in_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    balanced(folder.path());
+    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
+    let left = session_that_is_left(&bench).await.session;
+    let second = bench.whole_session("balanced").await;
+    let (one, other) = (made(&bench, left).await, made(&bench, second).await);
+    assert!(one.segments.iter().zip(&other.segments).all(|(one, other)| one.1 == other.1), "both have the same order");
+    let refused =
+        bench.conductor.act(Role::Researcher, left, Action::Unblind { reason: "to see".to_owned() }).await.unwrap_err();
+    assert!(refused.to_string().contains("unblind that one first"), "{refused}");
+    bench.unblind(second).await;
+    bench.unblind(left).await;
+}
+
+#[tokio::test]
 async fn a_fixed_seed_makes_other_ids_and_seeds_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let bench = Bench::start(folder.path()).await;

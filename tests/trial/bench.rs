@@ -211,6 +211,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         policy: None,
         focal_power: FocalPower::MIDDLE,
         held: None,
+        held_for: std::time::Duration::ZERO,
         message: None,
         steps_per_second: 50.0,
         steps: 0,

@@ -4,20 +4,43 @@
 import { byId, setText } from "./dom.js";
 
 const NOT_MEANT_MS = 600;
+/** A key this soon after another belongs to what was being typed. */
+const TYPING_MS = 600;
 
-/** `accept(segment)` is called when the surgeon taps the notice of `segment`. */
-export function changeNotice(accept) {
+/**
+ * `accept(segment)` is called when the surgeon taps the notice of `segment`. Who is writing in `box` when it appears goes on
+ * writing there: keys that are not meant for the notice do not accept it.
+ */
+export function changeNotice(box, accept) {
   const dialog = byId("change");
   const button = byId("change-tap");
   let segment = null;
   let shownAt = 0;
   let focusBefore = null;
+  let keyAt = -Infinity;
+  let typedAt = -Infinity;
 
+  document.addEventListener("keydown", (event) => {
+    const now = performance.now();
+    const typing = event.repeat || now - keyAt < TYPING_MS || now - shownAt < NOT_MEANT_MS;
+    keyAt = now;
+    if (!dialog.open) return;
+    const letter = event.key.length === 1 && !event.ctrlKey && !event.metaKey && !event.altKey;
+    const writing = focusBefore === box && box.value !== "";
+    if (event.key === "Enter" ? !typing : !letter || (!typing && !writing)) return;
+    event.preventDefault();
+    typedAt = now;
+    if (!letter || !writing) return;
+    box.setRangeText(event.key, box.selectionStart, box.selectionEnd, "end");
+    box.dispatchEvent(new Event("input"));
+  }, true);
   dialog.addEventListener("cancel", (event) => event.preventDefault());
   // A browser may close a dialog against that (Escape, a tablet's back gesture): then it comes back.
   dialog.addEventListener("close", () => segment !== null && dialog.showModal());
-  button.onclick = () => {
-    if (performance.now() - shownAt < NOT_MEANT_MS) return;
+  button.onclick = ({ detail }) => {
+    const now = performance.now();
+    // Some browsers take a space's release for a click, whatever became of its press.
+    if (now - shownAt < NOT_MEANT_MS || (detail === 0 && now - typedAt < TYPING_MS)) return;
     setText(byId("change-go"), "One moment…");
     accept(segment);
   };

@@ -27,6 +27,7 @@ export function composer(outbox, now) {
   function follow(state) {
     const session = state?.session ?? null;
     if (session !== shown) {
+      sendBox();
       shown = session;
       sendLeft(session);
       draft = session && new Draft(`comment.${session}`);
@@ -44,6 +45,14 @@ export function composer(outbox, now) {
     kept = state?.comments ?? 0;
     drawQuick(looking ? state.quick_comments : []);
     drawState();
+  }
+
+  /** What stands in the box is sent as it stands: it is about the session that goes. */
+  function sendBox() {
+    const text = box.value.trim();
+    if (!shown || text === "") return;
+    outbox.add(PATH, said({ kind: "text", text }, { session: shown, ...begun }));
+    draft.write(null);
   }
 
   /** Half-written comments on sessions that were put away are sent as they stand: their box is gone. */

@@ -109,3 +109,17 @@ export class Live extends EventTarget {
     this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 }
+
+/**
+ * Returns what hands an answer's view of the session to `follow`, unless a view came over `live` while the answer was on its
+ * way: that one is newer, or soon followed by one that is.
+ */
+export function unlessOvertaken(live, follow) {
+  let heard = 0;
+  live.addEventListener("session", () => heard++);
+  return async (answer) => {
+    const before = heard;
+    const view = await answer;
+    if (heard === before) follow(view);
+  };
+}

@@ -5,12 +5,14 @@ import { drawCamera } from "./camera.js";
 import { askIn, askReason, askWhetherMeant } from "./dialogs.js";
 import { byId, clockText, make, redraw, setText } from "./dom.js";
 import { drawDevices, drawDeviceWords, drawWarnings } from "./devices.js";
+import { unlessOvertaken } from "./live.js";
 import { mountViewer } from "./viewer.js";
 
 const BY_HAND = "by-hand";
 /** What the list of policies shows while nobody is told which one runs. */
 const UNTOLD = "";
 const viewer = mountViewer(byId("view"), { role: "operator", traces: byId("traces") });
+const followAnswer = unlessOvertaken(viewer.live, followSession);
 let session = null;
 let choices = null;
 let endsAt = null;
@@ -169,7 +171,7 @@ function abort() {
 
 async function dismiss() {
   try {
-    followSession(await post("/api/operator/dismissals", { session: session.session }));
+    await followAnswer(post("/api/operator/dismissals", { session: session.session }));
   } catch (error) {
     tellTrouble(byId("session-trouble"), error);
   }
@@ -178,7 +180,7 @@ async function dismiss() {
 /** Does `action` on the session that was shown when it was asked for: another operator may have closed that one. */
 async function send(shown, action) {
   if (session?.session !== shown) throw new Refused(409, "This session was closed meanwhile: nothing was done.", true);
-  followSession(await post("/api/operator/actions", { session: shown, ...action }));
+  await followAnswer(post("/api/operator/actions", { session: shown, ...action }));
 }
 
 async function act(action) {
@@ -229,7 +231,7 @@ byId("protocol").addEventListener("change", drawSummary);
 byId("new-session").addEventListener("submit", async (event) => {
   event.preventDefault();
   try {
-    followSession(await post("/api/operator/sessions", { participant: byId("participant").value, protocol: byId("protocol").value }));
+    await followAnswer(post("/api/operator/sessions", { participant: byId("participant").value, protocol: byId("protocol").value }));
     setText(byId("session-trouble"), "");
   } catch (error) {
     tellTrouble(byId("session-trouble"), error);

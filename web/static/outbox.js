@@ -9,7 +9,8 @@ const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
 
-/** Fires `change` whenever an entry is added, saved or refused; the event's detail is `{ entry, state, reason }`. */
+/** Fires `change` whenever an entry is added, saved or refused; the event's detail is `{ entry, state, reason, heard }`, `heard` whether the server
+ * answered. */
 export class Outbox extends EventTarget {
   #entries = new Map();
   #refused = new Map();
@@ -76,12 +77,12 @@ export class Outbox extends EventTarget {
     this.#flush();
   }
 
-  /** Waits until nothing for `path` waits: true; or until an attempt at such an entry failed: false. */
+  /** Waits until nothing for `path` waits: true; or until an attempt at such an entry failed, or the server was not heard: false. */
   async settled(path) {
     this.nudge();
     while (this.waiting.some((entry) => entry.path === path)) {
-      const { entry, state } = await new Promise((resolve) => this.addEventListener("change", (event) => resolve(event.detail), { once: true }));
-      if (state === "waiting" && entry.path === path) return false;
+      const { entry, state, heard } = await new Promise((resolve) => this.addEventListener("change", (event) => resolve(event.detail), { once: true }));
+      if (state === "waiting" && (entry.path === path || !heard)) return false;
     }
     return true;
   }
@@ -122,8 +123,9 @@ export class Outbox extends EventTarget {
       this.trouble = inWords(error, "No connection: trying again by itself.");
       // Tried again later it would be the last to arrive, and count.
       if (this.#replaced(entry)) this.forget(entry);
-      this.#tell(entry, "waiting", this.trouble);
-      return error instanceof Refused;
+      const heard = error instanceof Refused;
+      this.#tell(entry, "waiting", this.trouble, heard);
+      return heard;
     }
   }
 
@@ -150,8 +152,8 @@ export class Outbox extends EventTarget {
     }
   }
 
-  #tell(entry, state, reason = null) {
-    this.dispatchEvent(new CustomEvent("change", { detail: { entry, state, reason } }));
+  #tell(entry, state, reason = null, heard = true) {
+    this.dispatchEvent(new CustomEvent("change", { detail: { entry, state, reason, heard } }));
   }
 }
 

@@ -78,16 +78,22 @@ function asked(question, tag = "legend") {
 }
 
 function textQuestion(question, answered, context) {
-  const area = make("textarea", { rows: 3, "aria-labelledby": `ask-${question.id}`, value: context.draft.read() ?? answered ?? "" });
+  const left = context.draft.read();
+  const area = make("textarea", { rows: 3, "aria-labelledby": `ask-${question.id}`, value: left ?? answered ?? "" });
+  // Not asked of the draft, which a full device does not keep.
+  let written = left !== null;
   let timer = null;
   const given = () => {
     clearTimeout(timer);
-    if (context.draft.read() === null) return;
+    if (!written) return;
+    const text = area.value.trim();
+    if (text === "") context.partly(answered ? "The earlier answer stays until you write another." : "");
+    else context.give(text);
+    written = false;
     context.draft.write(null);
-    if (area.value.trim() === "") return context.partly(answered ? "The earlier answer stays until you write another." : "");
-    context.give(area.value.trim());
   };
   area.addEventListener("input", () => {
+    written = true;
     context.draft.write(area.value);
     context.partly("Writing…");
     clearTimeout(timer);
@@ -95,9 +101,9 @@ function textQuestion(question, answered, context) {
   });
   area.addEventListener("change", given);
   area.give = given;
-  if (context.draft.read() !== null) timer = setTimeout(given, TYPING_PAUSE_MS);
+  if (written) timer = setTimeout(given, TYPING_PAUSE_MS);
   const take = (value) => {
-    const free = context.draft.read() === null && document.activeElement !== area && area.value.trim() !== value;
+    const free = !written && document.activeElement !== area && area.value.trim() !== value;
     if (free) area.value = value;
     return free;
   };

@@ -4,7 +4,8 @@ import { get, heardAgain, post, Refused, tellTrouble } from "./api.js";
 import { changeNotice } from "./change.js";
 import { composer } from "./compose.js";
 import { byId, clockText, make, setText } from "./dom.js";
-import { Draft, Outbox } from "./outbox.js";
+import { unlessOvertaken } from "./live.js";
+import { Draft, draftsOf, Outbox } from "./outbox.js";
 import { onTopOf, questionForm } from "./questions.js";
 import { twoTaps } from "./twice.js";
 import { mountViewer } from "./viewer.js";
@@ -18,7 +19,7 @@ let endsAt = null;
 
 const here = () => state && { session: state.session, segment: state.segment, setting: state.setting, frame: viewer.frame ?? null, run: viewer.run ?? null };
 const comments = composer(outbox, here);
-const change = changeNotice((segment) => act({ action: "acknowledge", segment }));
+const change = changeNotice(byId("comment"), (segment) => act({ action: "acknowledge", segment }));
 const finishUntapped = twoTaps(byId("finish"), byId("finish-heard"), () => act({ action: "finish-segment", segment: state.segment }));
 
 /* State in */
@@ -26,6 +27,7 @@ const finishUntapped = twoTaps(byId("finish"), byId("finish-heard"), () => act({
 function follow(next) {
   known = true;
   state = next;
+  sendLeftAnswers();
   endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
   drawBar();
   comments.follow(state);
@@ -35,9 +37,11 @@ function follow(next) {
   else change.hide();
 }
 
+const followAnswer = unlessOvertaken(viewer.live, follow);
+
 async function refresh() {
   try {
-    follow(await get("/api/surgeon/session"));
+    await followAnswer(get("/api/surgeon/session"));
   } catch (error) {
     tellTrouble(byId("trouble"), error);
   }
@@ -46,7 +50,7 @@ async function refresh() {
 /** Does `action`; the page then shows what the server's state says, whether this tab or another moved it. */
 async function act(action) {
   try {
-    follow(await post("/api/surgeon/actions", { session: state.session, ...action }));
+    await followAnswer(post("/api/surgeon/actions", { session: state.session, ...action }));
     setText(byId("trouble"), "");
   } catch (error) {
     const refused = error instanceof Refused;
@@ -161,26 +165,39 @@ function paused() {
 
 /* Questions */
 
-const slot = (question) => `${state.session}/${state.segment ?? "closing"}/${question.id}`;
+const asked = () => ({ session: state.session, segment: state.phase === "questions" ? state.segment : null });
+const slot = ({ id }, { session, segment } = asked()) => `${session}/${segment ?? "closing"}/${id}`;
+
+/** Text answers left half-written by questions that are no longer on screen are sent as they stand. */
+function sendLeftAnswers() {
+  const present = /questions|closing/.test(state?.phase) ? slot({ id: "" }) : null;
+  for (const [place, text] of draftsOf("answer.")) {
+    if (typeof text !== "string" || (present !== null && place.startsWith(present))) continue;
+    const [session, segment, ...question] = place.split("/");
+    if (text.trim()) outbox.add(ANSWERS, { session, segment: segment === "closing" ? null : segment, question: question.join("/"), value: text.trim() }, place);
+    new Draft(`answer.${place}`).write(null);
+  }
+}
 
 function questions(heading) {
-  const { session, phase } = state;
-  const segment = phase === "questions" ? state.segment : null;
+  // What is given belongs here, wherever the session has gone meanwhile.
+  const place = asked();
+  const { segment } = place;
   const answers = { ...state.answers };
   for (const question of state.questions) {
-    for (const { body } of outbox.pending(slot(question))) answers[question.id] = onTopOf(answers[question.id], body.value);
+    for (const { body } of outbox.pending(slot(question, place))) answers[question.id] = onTopOf(answers[question.id], body.value);
   }
   const boxes = questionForm(state.questions, {
     answers,
     settings: state.settings,
-    draft: (question) => new Draft(`answer.${slot(question)}`),
+    draft: (question) => new Draft(`answer.${slot(question, place)}`),
     give(question, value, part = null) {
-      const place = part === null ? slot(question) : `${slot(question)}/${part}`;
-      outbox.add(ANSWERS, { session, segment, question: question.id, value }, place);
+      const whole = slot(question, place);
+      outbox.add(ANSWERS, { ...place, question: question.id, value }, part === null ? whole : `${whole}/${part}`);
       settle(question);
     },
   });
-  const done = make("button", { type: "button", className: "primary", onclick: () => finishQuestions(segment) }, phase === "closing" ? "Finish" : "Continue");
+  const done = make("button", { type: "button", className: "primary", onclick: () => finishQuestions(segment) }, segment === null ? "Finish" : "Continue");
   const missing = make("p", { id: "missing", className: "message", role: "alert" });
   const title = make("h2", { tabIndex: -1 }, heading);
   return { className: "", nodes: [make("div", { className: "questions" }, title, ...boxes, make("div", { className: "done" }, missing, done))] };
@@ -236,7 +253,7 @@ outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }
   if (state) drawPanel();
   if (entry.path !== ANSWERS) return;
   const { session, segment, question: id, value } = entry.body;
-  if (!state || session !== state.session || segment !== (state.phase === "questions" ? state.segment : null)) return;
+  if (!state || session !== state.session || segment !== asked().segment) return;
   if (reached === "saved") state.answers[id] = onTopOf(state.answers[id], value);
   if (reached !== "saved" || outbox.pending(slot({ id })).length === 0) boxOf(id)?.show(reached, reason);
 });

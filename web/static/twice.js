@@ -21,6 +21,8 @@ export function twoTaps(button, heard, done) {
     if (at !== null) timer = setTimeout(() => arm(null), FORGOTTEN_MS);
   }
 
+  // A key held down is one press.
+  button.addEventListener("keydown", (event) => event.repeat && event.preventDefault());
   button.addEventListener("click", () => {
     const now = performance.now();
     if (armedAt === null) return arm(now);

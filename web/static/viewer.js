@@ -33,6 +33,7 @@ class Viewer extends EventTarget {
   #picture = makeCanvas("viewer-picture").getContext("2d", { alpha: false });
   #overlay = makeCanvas("viewer-overlay").getContext("2d");
   #stale = Object.assign(document.createElement("p"), { className: "viewer-stale" });
+  #heard = Object.assign(document.createElement("p"), { className: "visually-hidden" });
   #colour = Object.assign(document.createElement("p"), { className: "viewer-colour", hidden: true });
   #shown = new Set();
   #peaking = new Peaking();
@@ -43,9 +44,13 @@ class Viewer extends EventTarget {
   constructor(element, { role, traces }) {
     super();
     this.#element = element;
-    this.#stale.setAttribute("role", "status");
+    this.#picture.canvas.setAttribute("role", "img");
+    this.#picture.canvas.setAttribute("aria-label", "Live view");
+    // Its seconds count on; only that it is not live, and that it is again, are worth a screen reader's word.
+    this.#stale.setAttribute("aria-hidden", "true");
+    this.#heard.setAttribute("role", "status");
     this.#colour.textContent = "Colours estimated from 460–600 nm; reds are inferred.";
-    element.append(this.#picture.canvas, this.#overlay.canvas, this.#colour, this.#stale);
+    element.append(this.#picture.canvas, this.#overlay.canvas, this.#colour, this.#stale, this.#heard);
     this.#traces = traces && new Traces(traces);
     onResize(this.#overlay.canvas, () => this.#drawOverlays());
     this.live = new Live(role);
@@ -113,6 +118,7 @@ class Viewer extends EventTarget {
     const { age } = this;
     const isStale = age === null || age > STALE_MS;
     this.#element.classList.toggle("viewer-is-stale", isStale);
+    if (this.#stale.hidden === isStale) this.#heard.textContent = isStale ? "The picture is not live" : "The picture is live again";
     this.#stale.hidden = !isStale;
     if (!isStale) return;
     const told = age === null ? "Waiting for the first picture" : `Not live: the picture is ${inWords(age)} old`;

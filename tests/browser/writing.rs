@@ -1,0 +1,126 @@
+//! What a surgeon is writing while the page changes underneath: nothing of it is lost, and no key of it does something else.
+
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+
+use crate::theatre::Theatre;
+use crate::wait::until;
+use crate::webdriver::{Browser, Driver};
+
+const REMARKS: &str = "[data-question=remarks] textarea";
+
+impl Theatre<'_> {
+    /// The operator ends the session and takes it off the screens.
+    async fn put_away(&self) {
+        self.operator.click("#session-actions .danger").await;
+        self.give_reason("Enough").await;
+        self.operator.sees("#phase", "Aborted").await;
+        self.operator.click("#session-actions .primary").await;
+        self.operator.sees("#new-session", "Participant").await;
+    }
+
+    /// Waits until what `sql` gives, in the database, is `expected`.
+    async fn keeps(&self, sql: &'static str, expected: &[&str]) {
+        let file = self.server.data.path().join("parfocal.db");
+        let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+        until(&format!("{sql} to give {expected:?}"), || async {
+            sqlx::query_scalar::<_, String>(sql).fetch_all(&pool).await.unwrap() == expected
+        })
+        .await;
+        pool.close().await;
+    }
+}
+
+/// A key as a keyboard sends it; `text` where it writes something.
+async fn press(page: &Browser<'_>, key: &str, text: &str, repeat: bool) {
+    let code = if key == "Enter" { 13 } else { 0 };
+    let down =
+        json!({ "type": "keyDown", "key": key, "text": text, "autoRepeat": repeat, "windowsVirtualKeyCode": code });
+    page.tools("Input.dispatchKeyEvent", down).await;
+    if !repeat {
+        page.tools("Input.dispatchKeyEvent", json!({ "type": "keyUp", "key": key, "windowsVirtualKeyCode": code }))
+            .await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_left_half_written_is_sent_when_its_question_is_gone() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let surgeon = &theatre.surgeon;
+    theatre.begin("S-07", "short").await;
+    theatre.tap_notice(1).await;
+    theatre.finish().await;
+    surgeon.sees("#panel h2", "a few questions").await;
+    // Written and left at once, before the page has sent it.
+    let write = "const area = document.querySelector(arguments[0]); area.value = 'Half an answer';
+                 area.dispatchEvent(new Event('input')); location.replace('about:blank')";
+    surgeon.run(write, json!([REMARKS])).await;
+    theatre.put_away().await;
+    surgeon.open(&format!("http://{}/surgeon", theatre.proxy.address)).await;
+    theatre.keeps("SELECT value FROM answers", &["\"Half an answer\""]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_tablet_that_stores_nothing_loses_nothing_that_is_written() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let surgeon = &theatre.surgeon;
+    let refuse = "Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError'); };";
+    surgeon.tools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": refuse })).await;
+    surgeon.reload().await;
+    theatre.begin("S-08", "short").await;
+    theatre.tap_notice(1).await;
+    theatre.finish().await;
+    surgeon.type_into(REMARKS, "Good at rest").await;
+    theatre.answer_questions(4).await;
+    theatre.keeps("SELECT value FROM answers WHERE question = 'remarks'", &["\"Good at rest\""]).await;
+    theatre.tap_notice(2).await;
+    theatre.write("Half a comment").await;
+    theatre.put_away().await;
+    theatre.keeps("SELECT text FROM comments", &["Half a comment"]).await;
+    assert_eq!(theatre.comment_box().await, "");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish() {
+    const TEXT: &str = "before we begin the light is dim and the view is wet";
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let surgeon = &theatre.surgeon;
+    theatre.begin("S-09", "short").await;
+    theatre.tap_notice(1).await;
+    theatre.finish().await;
+    surgeon.click("#comment").await;
+    let (first, rest) = TEXT.split_at(TEXT.len() / 2);
+    for letter in first.chars() {
+        press(surgeon, &letter.to_string(), &letter.to_string(), false).await;
+    }
+    // The questions answered on another device bring the notice of the next setting.
+    let page = theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")));
+    let other = driver.browser().await;
+    other.open(&page).await;
+    other.click("input[name=sharpness][value='3']").await;
+    other.sees("[data-question=sharpness] > .state", "Saved").await;
+    other.click(".questions .done button").await;
+    surgeon.sees("#change-title", "Setting 2 of ").await;
+    for letter in rest.chars() {
+        press(surgeon, &letter.to_string(), &letter.to_string(), false).await;
+    }
+    assert_eq!(theatre.comment_box().await, TEXT);
+    surgeon.sees("#change-title", "Setting 2 of ").await;
+    theatre.tap_notice(2).await;
+
+    surgeon.run("document.getElementById('finish').focus()", json!([])).await;
+    press(surgeon, "Enter", "\r", false).await;
+    surgeon.sees("#finish", "Tap again to finish").await;
+    let since = Instant::now();
+    while since.elapsed() < Duration::from_secs(1) {
+        press(surgeon, "Enter", "\r", true).await;
+    }
+    assert!(surgeon.text("#finish").await.contains("Tap again"), "a key held down is one press");
+    press(surgeon, "Enter", "\r", false).await;
+    surgeon.sees("#panel h2", "a few questions").await;
+}
