@@ -4,15 +4,18 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Puts a file with these bytes at `path` (see [`replace_with`]). A device or a pipe is written to, never replaced.
+/// Puts a file with these bytes at `path` (see [`replace_with`]), or where a link there leads. A device or a pipe is written to, never
+/// replaced.
 ///
 /// # Errors
 /// When it cannot be written; then nothing of it is left.
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+    // What a shell lends there, such as /dev/stdout, may lead to a plain file that others hold open.
+    let lent = path.starts_with("/dev") || path.starts_with("/proc");
+    if lent || fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return fs::write(path, bytes);
     }
-    replace_with(path, |writer| writer.write_all(bytes))
+    replace_with(&fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()), |writer| writer.write_all(bytes))
 }
 
 /// Puts a file with what `fill` writes at `path`. It is written beside it first, so that what was there before stays until
@@ -90,6 +93,17 @@ mod tests {
         let full = Path::new("/dev/full");
         assert_eq!(replace(full, b"text").unwrap_err().kind(), io::ErrorKind::StorageFull);
         assert!(!fs::metadata(full).unwrap().is_file());
+    }
+
+    #[test]
+    fn a_link_leads_to_the_file_that_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("real.svg"), folder.path().join("link.svg"));
+        fs::write(&file, "before").unwrap();
+        std::os::unix::fs::symlink("real.svg", &link).unwrap();
+        replace(&link, b"after").unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"after");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod files;
 pub mod ids;
 pub mod imaging;
 pub mod lens;
+pub mod notices;
 pub mod options;
 pub mod priority;
 

@@ -216,6 +216,13 @@ fn bad_sources_are_refused_in_words() {
     assert!(refused(&inside("notes.mp4")).contains("ffmpeg finds no video in it"));
     std::fs::write(inside("broken.png"), "no picture").unwrap();
     assert!(refused(&inside("broken.png")).contains("broken.png"));
+    stripes(&inside("cut.jpg"), 200, 100);
+    let whole = std::fs::read(inside("cut.jpg")).unwrap();
+    std::fs::write(inside("cut.jpg"), &whole[..whole.len() / 2]).unwrap();
+    assert!(refused(&inside("cut.jpg")).contains("damaged or cut short"));
+    stripes(&inside("a.png"), 100, 100);
+    std::fs::rename(inside("a.png"), inside("is-a-png.jpg")).unwrap();
+    assert!(open(&format!("footage:{}", inside("is-a-png.jpg").display()), 1).0.is_ok());
     stripes(&inside("small.png"), 100, 48);
     assert!(refused(&inside("small.png")).contains("is 100x48 pixels, but at least 64x64 are needed"));
     for unknown in ["kinect", "footage", "footage:", "phantom:3"] {

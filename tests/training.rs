@@ -188,6 +188,48 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
 }
 
 #[test]
+fn a_training_outlives_its_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, out) = (folder.path().join("recipe.toml"), folder.path().join("run"));
+    let mut recipe = small("mgm-learned", 200);
+    (recipe.pictures, recipe.validate_every) = (1, LEG);
+    std::fs::write(&config, toml::to_string(&recipe).unwrap()).unwrap();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    process.args(["train", "mgm-learned", "--config"]).arg(&config).arg("--out").arg(&out);
+    let output = process.stderr(full).output().unwrap();
+    assert!(output.status.success(), "{:?}", output.status);
+    assert!(out.join("mgm-learned.safetensors").exists());
+}
+
+#[test]
+fn footage_is_read_as_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let evaluate = |name: &str| {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+        process.current_dir(folder.path()).args(["evaluate", "--policies", "fixed", "--count", "1", "--footage", name]);
+        process.output().unwrap()
+    };
+    let whole = std::fs::read(picture(folder.path(), "cut.jpg", 200)).unwrap();
+    std::fs::write(folder.path().join("cut.jpg"), &whole[..whole.len() / 2]).unwrap();
+    let output = evaluate("cut.jpg");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("damaged or cut short"));
+
+    // Recorders name files by the time.
+    let made = Command::new("ffmpeg")
+        .args(["-v", "error", "-f", "lavfi", "-i", "testsrc=s=128x128:r=10", "-frames:v", "10", "-c:v", "ffv1"])
+        .arg(folder.path().join("10:30.mkv"))
+        .status();
+    if !made.is_ok_and(|status| status.success()) {
+        println!("skipped: no ffmpeg to make a video with");
+        return;
+    }
+    let output = evaluate("10:30.mkv");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
 fn the_same_seed_gives_the_same_figures_to_the_last_digit() {
     let evaluate =
         || parfocal(&["evaluate", "--count", "2", "--policies", "fixed,mgm-hill-climber,parfocal", "--json"]);

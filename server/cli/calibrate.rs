@@ -162,6 +162,7 @@ fn import(arguments: &Import) -> Result<(), Failure> {
 impl Destination {
     /// The calibration that is there, or a typical unit's to begin with.
     fn begun(&self) -> Result<Calibration, Failure> {
+        calibration::check_history(&self.out)?;
         calibration::read_or_default(Some(self.out.as_path()).filter(|folder| folder.join("calibration.toml").exists()))
     }
 

@@ -1,11 +1,13 @@
 //! Calibrations in files: TOML, with pictures of 16 bit beside it for references per pixel.
 
 use std::fs;
+use std::io::{Cursor, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use image::{ImageBuffer, ImageFormat, Luma};
 
 use super::Failure;
+use crate::files::replace;
 use crate::imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
 
 /// Name of the current calibration in its folder. Earlier ones stay beside it, by their version.
@@ -53,13 +55,35 @@ fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
     }
 }
 
+/// Refuses a folder whose current calibration is gone while versions before it are there: a new one would take their names.
+///
+/// # Errors
+/// When it is so.
+pub fn check_history(folder: &Path) -> Result<(), Failure> {
+    if folder.join(CURRENT).exists() {
+        return Ok(());
+    }
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let number = |name: &String| name.strip_prefix("calibration-")?.strip_suffix(".toml")?.parse::<u32>().ok();
+    let Some(latest) = names.filter_map(|name| number(&name)).max() else { return Ok(()) };
+    Err(format!(
+        "{} holds earlier calibrations but no {CURRENT}: copy calibration-{latest}.toml to that name, or give another folder",
+        folder.display()
+    )
+    .into())
+}
+
 /// Keeps `calibration` in `folder` as the current one; the one before stays there under its version's name. `changed`
 /// names the references that are new. Returns the file's name.
 pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, Failure> {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
     let current = folder.join(CURRENT);
-    let before = fs::read_to_string(&current).unwrap_or_default();
+    let before = match fs::read_to_string(&current) {
+        Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+        before => before.map_err(failed)?,
+    };
     let mut names = ["dark", "white"].map(|key| named(&before, key));
     let references = [("dark", &calibration.dark), ("white", &calibration.white)];
     for ((key, reference), name) in references.into_iter().zip(&mut names) {
@@ -73,11 +97,9 @@ pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Resul
     let text = calibration.to_toml(&names[0], &names[1]);
     if !before.is_empty() {
         let version = named(&before, "version");
-        fs::rename(&current, folder.join(format!("calibration-{version}.toml"))).map_err(failed)?;
+        replace(&folder.join(format!("calibration-{version}.toml")), before.as_bytes()).map_err(failed)?;
     }
-    // Renamed into place: whoever reads finds a whole one.
-    let fresh = folder.join(format!("{CURRENT}.new"));
-    fs::write(&fresh, text).and_then(|()| fs::rename(&fresh, &current)).map_err(failed)?;
+    replace(&current, text.as_bytes()).map_err(failed)?;
     Ok(current)
 }
 
@@ -93,5 +115,7 @@ fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), Failure> {
     let picture: Option<ImageBuffer<Luma<u16>, _>> =
         ImageBuffer::from_raw(size(frame.width())?, size(frame.height())?, frame.samples());
     let picture = picture.ok_or_else(|| failed(&"its size is wrong"))?;
-    Ok(picture.save_with_format(path, ImageFormat::Tiff).map_err(|error| failed(&error))?)
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Tiff).map_err(|error| failed(&error))?;
+    Ok(replace(path, bytes.get_ref()).map_err(|error| failed(&error))?)
 }

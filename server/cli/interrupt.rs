@@ -4,6 +4,8 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::notices::tell;
+
 /// Whether Ctrl-C was pressed, and whether anything is left to save then.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
@@ -27,7 +29,7 @@ impl Interrupt {
                         // As though nobody listened. An exit would take libtorch down while another thread computes with it.
                         let _ = signal_hook::low_level::emulate_default_handler(signal_hook::consts::SIGINT);
                     }
-                    eprintln!("{notice}; Ctrl-C again to leave at once");
+                    tell(format_args!("{notice}; Ctrl-C again to leave at once"));
                 }
             });
         })?;

@@ -21,6 +21,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::notices::tell;
+
 /// Keeps a hyperspectral video exoscope in focus and runs blinded trials of its autofocus policies.
 #[derive(Debug, Parser)]
 #[command(version, about, max_term_width = 100)]
@@ -63,7 +65,7 @@ pub fn main() -> ExitCode {
     match run(arguments.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("parfocal: {failure}");
+            tell(format_args!("parfocal: {failure}"));
             ExitCode::FAILURE
         }
     }

@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::interrupt::Interrupt;
 use super::{Failure, print};
 use crate::clock::SystemClock;
+use crate::notices::tell;
 use crate::training::asked::Asked;
 use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
 use crate::training::run::{LEG, Progress, Run};
@@ -64,9 +65,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut run = if arguments.resume { resume(arguments, device)? } else { begin(arguments, device)? };
     let total = run.recipe().updates();
     if let Some(version) = run.other_version() {
-        eprintln!(
+        tell(format_args!(
             "note: the checkpoint was made by parfocal {version}; what follows may differ from what it would have given"
-        );
+        ));
     }
     let interrupt = Interrupt::listen(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());
@@ -77,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let mae = if validation.is_finite() { format!(", validation MAE {validation:.4}") } else { String::new() };
         let message = format!("loss {:.4}{epsilon}{mae}", progress.loss);
         if bar.is_hidden() && progress.validation.is_some() {
-            eprintln!("{} of {total} updates: {message}", progress.updates);
+            tell(format_args!("{} of {total} updates: {message}", progress.updates));
         }
         bar.set_position(progress.updates);
         bar.set_message(message);

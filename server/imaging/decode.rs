@@ -76,7 +76,7 @@ pub enum DecodeError {
 /// # Errors
 /// When the bytes are not such a picture, or not all of one.
 pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
-    let picture = read(bytes)?;
+    let picture = decode_any(bytes)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     match picture {
         DynamicImage::ImageLuma16(samples) if mosaic || (width, height) == SENSOR_SIZE => {
@@ -123,7 +123,11 @@ pub fn decode_raw(bytes: &[u8]) -> Result<MosaicFrame, DecodeError> {
     Ok(MosaicFrame::new(width, height, samples)?)
 }
 
-fn read(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
+/// Reads a PNG, JPEG or TIFF picture, whatever its pixels.
+///
+/// # Errors
+/// When the bytes are not such a picture, not all of one, or one too large.
+pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     if bytes.is_empty() {
         return Err(DecodeError::Empty);
     }

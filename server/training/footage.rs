@@ -7,8 +7,9 @@ use std::process::Command;
 use std::sync::Arc;
 
 use super::clip::{Area, Clip, ClipError};
-use crate::camera::footage::picture_reader;
-use crate::imaging::{ContentArea, GrayImage, content_area};
+use crate::camera::footage::as_file;
+use crate::imaging::{ContentArea, GrayImage, content_area, decode_any};
+use crate::notices::tell;
 
 /// Most lines of a picture: the height the paper's walks are meant for.
 const LINES: u32 = 480;
@@ -85,8 +86,8 @@ fn unreadable(path: &Path, reason: &str) -> FootageError {
 }
 
 fn image(path: &Path) -> Result<GrayImage, FootageError> {
-    let reader = picture_reader(path).map_err(|error| unreadable(path, &error.to_string()))?;
-    let picture = reader.decode().map_err(|error| unreadable(path, &error.to_string()))?;
+    let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
+    let picture = decode_any(&bytes).map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = if picture.height() > LINES {
         picture.resize(u32::MAX, LINES, image::imageops::FilterType::Triangle)
     } else {
@@ -103,7 +104,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     }
     let output = Command::new("ffmpeg")
         .args(["-v", "error", "-nostdin", "-i"])
-        .arg(path)
+        .arg(as_file(path))
         // One more, to know whether there are more.
         .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
@@ -119,14 +120,18 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
         return Err(unreadable(path, "it holds no frames"));
     }
     if let Some(told) = told {
-        eprintln!("note: {} is damaged (ffmpeg: {told}); {} frames of it could be read", path.display(), frames.len());
+        tell(format_args!(
+            "note: {} is damaged (ffmpeg: {told}); {} frames of it could be read",
+            path.display(),
+            frames.len()
+        ));
     }
     if frames.len() > FRAMES {
         frames.truncate(FRAMES);
-        eprintln!(
+        tell(format_args!(
             "note: only the first {FRAMES} frames of {} are used; cut it into several to use more",
             path.display()
-        );
+        ));
     }
     Ok(frames)
 }

@@ -56,6 +56,29 @@ fn dark_and_white_make_a_calibration_that_names_itself_and_flattens_the_picture(
 }
 
 #[test]
+fn a_calibration_that_cannot_be_kept_leaves_the_one_before_and_its_history() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("unit");
+    let current = out.join("calibration.toml");
+    done(&capture("dark", "phantom:dark", &out));
+    let before = fs::read(&current).unwrap();
+    // What is written aside has no place, as on a full disk.
+    let aside = out.join(".calibration.toml.partial");
+    fs::create_dir(&aside).unwrap();
+    assert!(refused(&capture("white", "phantom:white", &out)).contains("cannot write to"));
+    assert_eq!(fs::read(&current).unwrap(), before);
+    fs::remove_dir(&aside).unwrap();
+    assert!(done(&capture("white", "phantom:white", &out)).contains("version 2 of 20"));
+
+    // A folder that holds versions and no current one is not begun anew: its names are taken.
+    fs::remove_file(&current).unwrap();
+    let dark = fs::read(out.join("dark-1.tiff")).unwrap();
+    let said = refused(&capture("dark", "phantom:dark", &out));
+    assert!(said.contains("copy calibration-1.toml to that name"), "{said}");
+    assert_eq!(fs::read(out.join("dark-1.tiff")).unwrap(), dark);
+}
+
+#[test]
 fn references_of_another_size_are_refused_when_the_camera_opens() {
     let folder = tempfile::tempdir().unwrap();
     let reference = image::ImageBuffer::from_pixel(8, 8, image::Luma([40_u16]));

@@ -9,7 +9,7 @@ use image::ImageReader;
 
 use super::clip::Clip;
 use super::video::FootageError;
-use crate::imaging::RgbImage;
+use crate::imaging::{RgbImage, decode_any};
 
 /// Most pixels across and down: what the blur can follow in real time.
 pub(super) const WIDTH: usize = 1024;
@@ -61,8 +61,8 @@ pub(super) struct Stills {
 impl Stills {
     fn open(files: Vec<PathBuf>) -> Result<Self, FootageError> {
         for file in &files {
-            let (width, height) =
-                image::image_dimensions(file).map_err(|error| FootageError::unreadable(file, error))?;
+            let reader = picture_reader(file).map_err(|error| FootageError::unreadable(file, error))?;
+            let (width, height) = reader.into_dimensions().map_err(|error| FootageError::unreadable(file, error))?;
             large_enough(file, width as usize, height as usize)?;
         }
         let picture = still(&files[0])?;
@@ -80,7 +80,7 @@ impl Stills {
     }
 }
 
-/// Reads the picture in `file` as what the file holds: its name may lie about that.
+/// Begins to read the picture in `file` as what the file holds: its name may lie about that.
 ///
 /// # Errors
 /// When the file cannot be read.
@@ -90,8 +90,8 @@ pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
 
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
-    let reader = picture_reader(file).map_err(|error| FootageError::unreadable(file, error))?;
-    let picture = reader.decode().map_err(|error| FootageError::unreadable(file, error))?;
+    let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
+    let picture = decode_any(&bytes).map_err(|error| FootageError::unreadable(file, error))?;
     let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
     let scaled = if fits {
         picture

@@ -1,5 +1,6 @@
 //! Videos, decoded by the `ffmpeg` program.
 
+use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -106,9 +107,17 @@ fn check(path: &Path) -> Result<(), FootageError> {
     Err(FootageError::unreadable(path, format!("ffmpeg finds no video in it ({last})")))
 }
 
+/// A file's name as ffmpeg takes it: what stands before a colon in a bare one would count as a protocol.
+#[must_use]
+pub fn as_file(path: &Path) -> OsString {
+    let mut name = OsString::from("file:");
+    name.push(path);
+    name
+}
+
 fn ffmpeg(path: &Path) -> Command {
     let mut command = Command::new("ffmpeg");
-    command.args(["-v", "error", "-nostdin", "-i"]).arg(path).stdin(Stdio::null());
+    command.args(["-v", "error", "-nostdin", "-i"]).arg(as_file(path)).stdin(Stdio::null());
     command
 }
 

@@ -6,15 +6,17 @@ mod report;
 use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fs;
-use std::io::Write;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use super::{Failure, calibration};
+use super::{Failure, calibration, print};
 use crate::autofocus::{mgm, mlr};
+use crate::files::replace;
 use crate::imaging::{
     Calibration, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode,
     decode_raw,
 };
+use crate::notices::tell;
 use report::{Kind, Report};
 
 /// Arguments of `parfocal inspect`.
@@ -49,18 +51,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut failed = 0;
     for path in &arguments.paths {
         match inspector.inspect(path) {
-            Ok(report) if arguments.json => writeln!(std::io::stdout(), "{}", serde_json::to_string(&report)?)?,
+            Ok(report) if arguments.json => print(&(serde_json::to_string(&report)? + "\n"))?,
             Ok(report) => reports.push(report),
             Err(failure) if arguments.paths.len() == 1 => return Err(failure),
             Err(failure) => {
-                eprintln!("parfocal: {failure}");
+                tell(format_args!("parfocal: {failure}"));
                 failed += 1;
             }
         }
     }
-    std::io::stdout().write_all(report::table(&reports).as_bytes())?;
+    print(&report::table(&reports))?;
     if let Some(title) = inspector.titled.filter(|_| !arguments.json) {
-        writeln!(std::io::stdout(), "mosaics by the calibration {title}")?;
+        print(&format!("mosaics by the calibration {title}\n"))?;
     }
     if failed > 0 {
         return Err(format!("{failed} of {} files could not be inspected", arguments.paths.len()).into());
@@ -123,9 +125,12 @@ impl<'a> Inspector<'a> {
         };
         if let Some(out) = self.out {
             let target = out.join(self.overlay_name(path));
-            overlay::draw(seen.rgb, &report)
-                .save_with_format(&target, image::ImageFormat::Png)
-                .map_err(|error| named(&format_args!("cannot write {}: {error}", target.display())))?;
+            let failed =
+                |error: &dyn std::fmt::Display| named(&format_args!("cannot write {}: {error}", target.display()));
+            let mut picture = Cursor::new(Vec::new());
+            let drawn = overlay::draw(seen.rgb, &report).write_to(&mut picture, image::ImageFormat::Png);
+            drawn.map_err(|error| failed(&error))?;
+            replace(&target, picture.get_ref()).map_err(|error| failed(&error))?;
         }
         Ok(report)
     }
@@ -145,12 +150,12 @@ impl<'a> Inspector<'a> {
                 let most = frame.samples().iter().copied().max().unwrap_or(0);
                 if f32::from(most) > self.calibration.full_scale() {
                     let limit = self.calibration.full_scale();
-                    eprintln!(
+                    tell(format_args!(
                         "parfocal: {}",
                         named(&format_args!(
                             "warning: counts reach {most}, above the {limit} of the calibration's bit depth, and are cut"
                         ))
-                    );
+                    ));
                 }
                 let mut seen = Seen { kind: Kind::Mosaic, rgb: RgbImage::default(), gray: GrayImage::default() };
                 self.reconstructor.reconstruct(&frame, &mut seen.rgb, &mut seen.gray);

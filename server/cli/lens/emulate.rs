@@ -11,6 +11,7 @@ use super::{Failure, print};
 use crate::clock::{Clock, SystemClock};
 use crate::lens::emulator::{Emulator, Fault, LENS_DIOPTRES, Model};
 use crate::lens::{LensDynamics, Optics};
+use crate::notices::tell;
 
 const HELP: &str = "type what shall befall it, then Enter:
   unplug | plug-in | restart       its USB cable, its power
@@ -69,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     emulator.set_temperature(arguments.temperature);
     emulator.set_fault(arguments.fault);
     print(&format!("{}\n", emulator.path().display()))?;
-    eprintln!("{HELP}");
+    tell(HELP);
     tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(serve(&mut emulator))
 }
 
@@ -82,7 +83,7 @@ async fn serve(emulator: &mut Emulator) -> Result<(), Failure> {
             _ = terminate.recv() => return Ok(()),
             Some(line) = lines.recv() => {
                 let answer = befall(emulator, &line).unwrap_or_else(|problem| problem);
-                eprintln!("{answer}");
+                tell(answer);
             }
         }
     }

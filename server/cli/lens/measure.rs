@@ -12,6 +12,7 @@ use crate::bench::{Fit, Measurement, Plan, View, measure, plot};
 use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
 use crate::control::Eye;
+use crate::files::replace;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens::{LensInfo, MeasuredDynamics};
 
@@ -129,7 +130,7 @@ fn millis(seconds: f64) -> f64 {
 fn save(folder: &Path, report: &Report, measured: &Measurement) -> Result<(), Failure> {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     std::fs::create_dir_all(folder).map_err(failed)?;
-    std::fs::write(folder.join("dynamics.toml"), report.found.to_toml()?).map_err(failed)?;
-    std::fs::write(folder.join("steps.svg"), plot(measured)).map_err(failed)?;
+    replace(&folder.join("dynamics.toml"), report.found.to_toml()?.as_bytes()).map_err(failed)?;
+    replace(&folder.join("steps.svg"), plot(measured).as_bytes()).map_err(failed)?;
     Ok(())
 }

@@ -7,6 +7,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{Failure, Which, dioptre, go, print};
+use crate::files::replace;
 use crate::lens::FocalPower;
 
 /// Arguments of `parfocal lens sweep`.
@@ -107,6 +108,6 @@ fn plot(stops: &[Stop]) -> String {
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text)
+    replace(path, text.as_bytes())
         .map_err(|error| format!("the plot could not be saved to {}: {error}", path.display()).into())
 }

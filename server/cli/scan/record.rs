@@ -1,6 +1,6 @@
 //! `parfocal scan record`: from the phantom, each pose held still, or from a bench of camera, lens and stepper.
 
-use std::io::BufRead;
+use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -17,6 +17,7 @@ use crate::cli::interrupt::Interrupt;
 use crate::clock::SystemClock;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens;
+use crate::notices::tell;
 use crate::training::evaluate::SEED;
 use crate::training::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
 use crate::training::recording::{Bench, Devices, PhantomBench, RecordError, Stepper, StepperError, record};
@@ -155,8 +156,11 @@ fn asker(
             }
         }
     });
+    let typed = std::io::stdin().is_terminal();
     move |pose| {
-        progress.suspend(|| eprintln!("pose {pose} of {poses}: move the camera there, then press Enter"));
+        // An Enter from before the question, of a key that bounces or was pressed in vain, is no answer to it.
+        while typed && lines.try_recv().is_ok() {}
+        progress.suspend(|| tell(format_args!("pose {pose} of {poses}: move the camera there, then press Enter")));
         loop {
             match lines.recv_timeout(Duration::from_millis(100)) {
                 Ok(_) => return Ok(()),
