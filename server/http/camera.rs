@@ -32,7 +32,8 @@ struct Change {
 #[utoipa::path(post, path = "/api/operator/camera", tag = "operator", request_body = Change, responses(
     (status = 204, description = "The camera was asked"),
     (status = 409, description = "The camera does not offer this setting now", body = ErrorBody),
-    (status = 422, description = "Outside the camera's bounds", body = ErrorBody)))]
+    (status = 422, description = "Outside the camera's bounds", body = ErrorBody),
+    (status = 507, description = "The camera was asked, but the log could not be written", body = ErrorBody)))]
 async fn change(_: Operator, State(app): State<AppState>, Json(change): Json<Change>) -> Result<StatusCode, Error> {
     let Change { setting, value } = change;
     let asked = app.control.camera.as_ref().map_or(Err(ControlError::NotOffered), |camera| camera.ask(setting, value));

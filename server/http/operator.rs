@@ -178,6 +178,9 @@ async fn create(_: Operator, State(app): State<AppState>, Json(new): Json<NewSes
 /// Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then.
 #[utoipa::path(post, path = "/api/operator/actions", tag = "operator", request_body = Act, responses(
     (status = 200, body = Option<OperatorView>),
+    (status = 403, description = "Another role does this", body = ErrorBody),
+    (status = 404, description = "No such session or segment", body = ErrorBody),
+    (status = 422, description = "No reason was given", body = ErrorBody),
     (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
 async fn act(_: Operator, State(app): State<AppState>, Json(act): Json<Act>) -> Result<View, Error> {
     app.conductor.act(Role::Operator, act.session, act.action).await?;

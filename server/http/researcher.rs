@@ -194,7 +194,10 @@ struct Reason {
 /// Tells which policies ran; on a session still under way this is emergency unblinding and marked so for good.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/unblind", tag = "researcher", params(("session" = SessionId, Path)),
     request_body = Reason, responses(
-    (status = 204, description = "Unblinded"), (status = 422, description = "No reason was given", body = ErrorBody)))]
+    (status = 204, description = "Unblinded"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "Its order would tell that of another session of its balanced set", body = ErrorBody),
+    (status = 422, description = "No reason was given", body = ErrorBody)))]
 async fn unblind(
     _: Researcher,
     State(app): State<AppState>,

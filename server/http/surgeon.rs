@@ -51,6 +51,8 @@ pub(super) struct Act {
 /// Moves the session on; doing again what was done already changes nothing. Answers with the session as it is then.
 #[utoipa::path(post, path = "/api/surgeon/actions", tag = "surgeon", request_body = Act, responses(
     (status = 200, body = Option<SurgeonView>),
+    (status = 403, description = "Another role does this", body = ErrorBody),
+    (status = 404, description = "No such session or segment", body = ErrorBody),
     (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
 async fn act(_: Surgeon, State(app): State<AppState>, Json(act): Json<Act>) -> Result<View, Error> {
     app.conductor.act(Role::Surgeon, act.session, act.action).await?;
@@ -60,6 +62,8 @@ async fn act(_: Surgeon, State(app): State<AppState>, Json(act): Json<Act>) -> R
 /// Keeps a comment: once this has answered, it is on disk. The same key again is the same comment.
 #[utoipa::path(post, path = "/api/surgeon/comments", tag = "surgeon", request_body = NewComment, responses(
     (status = 204, description = "Kept"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "The key stands for another comment", body = ErrorBody),
     (status = 422, description = "Empty or too long", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn comment(
@@ -74,6 +78,8 @@ async fn comment(
 /// Keeps an answer: once this has answered, it is on disk. A later answer to the same question replaces it.
 #[utoipa::path(post, path = "/api/surgeon/answers", tag = "surgeon", request_body = NewAnswer, responses(
     (status = 204, description = "Kept"),
+    (status = 404, description = "No such session or question", body = ErrorBody),
+    (status = 409, description = "It has not been asked yet, or the key stands for another answer", body = ErrorBody),
     (status = 422, description = "The value does not fit the question", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn answer(_: Surgeon, State(app): State<AppState>, Json(answer): Json<NewAnswer>) -> Result<StatusCode, Error> {

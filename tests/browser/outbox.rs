@@ -79,6 +79,16 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     "#;
     assert_eq!(run(&page, script).await, json!([["b", "b"], 1, 1, 0, 0, 0]));
 
+    // Half an emoji, where a text was cut, does not stop the rest.
+    let script = r#"
+        const outbox = new Outbox();
+        const done = saved(outbox);
+        outbox.add("/comments", { value: "cut \ud83d" });
+        await done;
+        return posted;
+    "#;
+    assert_eq!(run(&page, script).await, json!(["cut \u{fffd}"]));
+
     // Who waits for the answers hears that the server is not heard, also while a comment is the first in line.
     let script = r#"
         const outbox = new Outbox();

@@ -19,11 +19,14 @@ export class Refused extends Error {
 
 const PATIENCE_MS = 10000;
 
+/** Half an emoji, which a cut text may end with, is no text to the server: it goes as the mark for what cannot be read. */
+const whole = (_, value) => (typeof value === "string" && value.toWellFormed ? value.toWellFormed() : value);
+
 async function request(method, path, body) {
   const response = await fetch(path, {
     method,
     headers: body === undefined ? {} : { "content-type": "application/json" },
-    body: body === undefined ? undefined : JSON.stringify(body),
+    body: body === undefined ? undefined : JSON.stringify(body, whole),
     signal: AbortSignal.timeout(PATIENCE_MS),
     cache: "no-store",
   });

@@ -47,7 +47,9 @@ function settings(list, policies, total, x, y) {
     const roomy = box.width > 70;
     const name = shape("text", { class: "segment-name", x: box.x + 6, y: y(1) - 22 }, roomy ? `Setting ${setting}` : setting);
     const policy = policies[setting - 1];
-    const ran = policy && roomy ? [shape("text", { class: "policy", x: box.x + 6, y: y(1) - 6 }, policy)] : [];
+    // A name that would leave the picture ends with it.
+    const place = x(total) - box.x < 130 ? { x: x(total), "text-anchor": "end" } : { x: box.x + 6 };
+    const ran = policy && roomy ? [shape("text", { class: "policy", y: y(1) - 6, ...place }, policy)] : [];
     return [shape("rect", { class: `segment ${setting % 2 ? "odd" : ""}`, ...box }), name, ...ran];
   });
 }
