@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn dark(capture: &Capture) -> Result<(), Failure> {
-    let mut calibration = capture.to.begun()?;
+    let mut calibration = calibration::begun(&capture.to.out)?;
     let dark = take(capture, &calibration)?.dark().map_err(|error| refused("dark", &error))?;
     let size = (dark.width(), dark.height());
     if calibration.size().is_some_and(|before| before != size) {
@@ -100,7 +100,7 @@ fn dark(capture: &Capture) -> Result<(), Failure> {
 }
 
 fn white(capture: &Capture) -> Result<(), Failure> {
-    let mut calibration = capture.to.begun()?;
+    let mut calibration = calibration::begun(&capture.to.out)?;
     let Reference::PerPixel(dark) = &calibration.dark else {
         return Err(format!(
             "there is no dark reference in {} yet: put the lens cap on and run `parfocal calibrate dark` first",
@@ -144,7 +144,7 @@ fn import(arguments: &Import) -> Result<(), Failure> {
     if arguments.from.is_none() && arguments.responses.is_none() && arguments.correction.is_none() {
         return Err("there is nothing to import: name a TOML file, --responses or --correction".into());
     }
-    let mut calibration = arguments.to.begun()?;
+    let mut calibration = calibration::begun(&arguments.to.out)?;
     let mut changed = Vec::new();
     if let Some(path) = &arguments.from {
         calibration = Calibration { version: calibration.version, ..calibration::read(path)? };
@@ -160,12 +160,6 @@ fn import(arguments: &Import) -> Result<(), Failure> {
 }
 
 impl Destination {
-    /// The calibration that is there, or a typical unit's to begin with.
-    fn begun(&self) -> Result<Calibration, Failure> {
-        calibration::check_history(&self.out)?;
-        calibration::read_or_default(Some(self.out.as_path()).filter(|folder| folder.join("calibration.toml").exists()))
-    }
-
     /// Keeps `calibration` as the next version, of today.
     fn save(&self, mut calibration: Calibration, changed: &[&str]) -> Result<(), Failure> {
         let before = calibration.version.parse::<u32>().unwrap_or(0);

@@ -55,18 +55,18 @@ fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
     }
 }
 
-/// Refuses a folder whose current calibration is gone while versions before it are there: a new one would take their names.
+/// What a new version in `folder` builds upon: the current calibration, or a typical unit's where there is none yet.
 ///
 /// # Errors
-/// When it is so.
-pub fn check_history(folder: &Path) -> Result<(), Failure> {
+/// When it cannot be read; or is gone while versions before it are there, whose names a new one would take.
+pub fn begun(folder: &Path) -> Result<Calibration, Failure> {
     if folder.join(CURRENT).exists() {
-        return Ok(());
+        return read(folder);
     }
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
     let number = |name: &String| name.strip_prefix("calibration-")?.strip_suffix(".toml")?.parse::<u32>().ok();
-    let Some(latest) = names.filter_map(|name| number(&name)).max() else { return Ok(()) };
+    let Some(latest) = names.filter_map(|name| number(&name)).max() else { return Ok(Calibration::default()) };
     Err(format!(
         "{} holds earlier calibrations but no {CURRENT}: copy calibration-{latest}.toml to that name, or give another folder",
         folder.display()

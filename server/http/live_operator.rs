@@ -127,9 +127,10 @@ impl Audience for ForOperator {
     type Status = OperatorStatus;
 
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
-        let (age, seen) =
-            if app.blinded() { (coarse(age_ms), Seen::default()) } else { (age_ms, Seen::new(&frame.insight)) };
-        let held = frame.insight.held.filter(|hold| !(app.blinded() && hold.is_the_policys()));
+        // Asked once: a session may begin meanwhile.
+        let blinded = app.blinded();
+        let (age, seen) = if blinded { (coarse(age_ms), Seen::default()) } else { (age_ms, Seen::new(&frame.insight)) };
+        let held = frame.insight.held.filter(|hold| !(blinded && hold.is_the_policys()));
         OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, app), held, seen }
     }
 

@@ -3,11 +3,10 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 
 use super::clip::{Area, Clip, ClipError};
-use crate::camera::footage::as_file;
+use crate::camera::footage::ffmpeg;
 use crate::imaging::{ContentArea, GrayImage, content_area, decode_any};
 use crate::notices::tell;
 
@@ -102,9 +101,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     if !path.is_file() {
         return Err(unreadable(path, "there is no such file"));
     }
-    let output = Command::new("ffmpeg")
-        .args(["-v", "error", "-nostdin", "-i"])
-        .arg(as_file(path))
+    let output = ffmpeg(path)
         // One more, to know whether there are more.
         .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])

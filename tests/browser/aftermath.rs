@@ -4,7 +4,6 @@ use std::process::Command;
 
 use serde_json::json;
 use sqlx::Row;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::screenshots::shoot;
 use crate::theatre::Theatre;
@@ -60,8 +59,7 @@ async fn fetched(page: &Browser<'_>, path: &str) -> String {
 
 /// What is in the database, read by another program than the server.
 pub async fn database(theatre: &Theatre<'_>, session: &str) {
-    let file = theatre.server.data.path().join("parfocal.db");
-    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+    let pool = crate::theatre::database(theatre.server.data.path()).await;
     let rows = sqlx::query(
         "SELECT kind, text, setting, frame FROM comments LEFT JOIN segments USING (segment) WHERE comments.session = ? ORDER BY comments.number",
     );

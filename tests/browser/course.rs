@@ -3,7 +3,6 @@
 
 use serde_json::{Value, json};
 use sqlx::Row;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::blinding;
 use crate::screenshots::shoot;
@@ -152,7 +151,8 @@ async fn emergency_unblinding(theatre: &Theatre<'_>) -> String {
 /// What stands on the surgeon's page, seen or not.
 async fn shown(theatre: &Theatre<'_>) -> Value {
     // But for what the stream is doing, which hangs on the moment.
-    let text = "const page = document.body.cloneNode(true); page.querySelector('.viewer-stale').remove();
+    let text = "const page = document.body.cloneNode(true);
+                for (const told of page.querySelectorAll('.viewer-stale, .viewer-heard')) told.remove();
                 return page.textContent.replace(/\\s+/g, ' ')";
     theatre.surgeon.run(text, json!([])).await
 }
@@ -185,8 +185,7 @@ async fn practice_stays_apart(theatre: &Theatre<'_>, researcher: &str) {
 }
 
 async fn database(theatre: &Theatre<'_>) {
-    let file = theatre.server.data.path().join("parfocal.db");
-    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+    let pool = crate::theatre::database(theatre.server.data.path()).await;
     let sql = "SELECT protocol, practice, (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments
                FROM sessions AS s ORDER BY rowid";
     let sessions = sqlx::query(sql).fetch_all(&pool).await.unwrap();

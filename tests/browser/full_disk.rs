@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use serde_json::json;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::disk::SmallDisk;
 use crate::screenshots::shoot;
@@ -45,8 +44,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     disk.empty();
     theatre.sees_saved(said.len()).await;
 
-    let file = disk.folder.path().join("parfocal.db");
-    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+    let pool = crate::theatre::database(disk.folder.path()).await;
     let kept: Vec<String> =
         sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
     assert_eq!(kept, said, "each once, in the order said");

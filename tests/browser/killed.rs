@@ -3,7 +3,6 @@
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use uuid::Uuid;
 
 use crate::support::{Server, client};
@@ -103,8 +102,7 @@ impl Trial {
 
     /// The comments in the database.
     async fn kept(&self) -> Vec<String> {
-        let file = self.server.data.path().join("parfocal.db");
-        let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+        let pool = crate::theatre::database(self.server.data.path()).await;
         let comments = sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
         pool.close().await;
         comments

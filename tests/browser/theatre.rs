@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 
 use crate::proxy::Proxy;
@@ -28,6 +29,12 @@ pub struct Theatre<'a> {
 /// A server on the phantom and the simulated lens, with the test's protocol.
 pub fn server() -> Server {
     start(Arc::new(tempfile::tempdir().unwrap()), "127.0.0.1:0")
+}
+
+/// The database in a server's data folder, opened by another program than the server.
+pub async fn database(folder: &Path) -> SqlitePool {
+    let file = SqliteConnectOptions::new().filename(folder.join("parfocal.db")).read_only(true);
+    SqlitePool::connect_with(file).await.unwrap()
 }
 
 /// A browser on the operator's page of `server`.

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use parfocal::clock::{Clock, SystemClock};
 use serde_json::json;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::theatre::Theatre;
 use crate::wait::until;
@@ -24,8 +23,7 @@ impl Theatre<'_> {
 
     /// Waits until what `sql` gives, in the database, is `expected`.
     async fn keeps(&self, sql: &'static str, expected: &[&str]) {
-        let file = self.server.data.path().join("parfocal.db");
-        let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(file).read_only(true)).await.unwrap();
+        let pool = crate::theatre::database(self.server.data.path()).await;
         until(&format!("{sql} to give {expected:?}"), || async {
             sqlx::query_scalar::<_, String>(sql).fetch_all(&pool).await.unwrap() == expected
         })

@@ -27,11 +27,12 @@ const finishUntapped = twoTaps(byId("finish"), byId("finish-heard"), () => act({
 function follow(next) {
   known = true;
   state = next;
-  sendLeftAnswers();
   endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
   drawBar();
   comments.follow(state);
   drawPanel();
+  // After the form has gone, which hands over what stood in it.
+  sendLeftAnswers();
   takeAnswers();
   if (state?.phase === "notice" && !state.paused) change.show(state);
   else change.hide();

@@ -33,7 +33,7 @@ class Viewer extends EventTarget {
   #picture = makeCanvas("viewer-picture").getContext("2d", { alpha: false });
   #overlay = makeCanvas("viewer-overlay").getContext("2d");
   #stale = Object.assign(document.createElement("p"), { className: "viewer-stale" });
-  #heard = Object.assign(document.createElement("p"), { className: "visually-hidden" });
+  #heard = Object.assign(document.createElement("p"), { className: "viewer-heard visually-hidden" });
   #colour = Object.assign(document.createElement("p"), { className: "viewer-colour", hidden: true });
   #shown = new Set();
   #peaking = new Peaking();

@@ -8,7 +8,7 @@ mod reel;
 mod video;
 
 pub use reel::picture_reader;
-pub use video::{FootageError, Video, as_file};
+pub use video::{FootageError, Video, ffmpeg};
 
 use std::time::Duration;
 

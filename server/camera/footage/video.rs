@@ -107,17 +107,14 @@ fn check(path: &Path) -> Result<(), FootageError> {
     Err(FootageError::unreadable(path, format!("ffmpeg finds no video in it ({last})")))
 }
 
-/// A file's name as ffmpeg takes it: what stands before a colon in a bare one would count as a protocol.
+/// The program on the file at `path`; what it is to make of it is for the caller to add.
 #[must_use]
-pub fn as_file(path: &Path) -> OsString {
+pub fn ffmpeg(path: &Path) -> Command {
+    // What stands before a colon in a bare name would count as a protocol.
     let mut name = OsString::from("file:");
     name.push(path);
-    name
-}
-
-fn ffmpeg(path: &Path) -> Command {
     let mut command = Command::new("ffmpeg");
-    command.args(["-v", "error", "-nostdin", "-i"]).arg(as_file(path)).stdin(Stdio::null());
+    command.args(["-v", "error", "-nostdin", "-i"]).arg(name).stdin(Stdio::null());
     command
 }
 
