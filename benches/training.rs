@@ -13,6 +13,7 @@ use std::process::Command;
 use std::sync::Arc;
 
 use parfocal::autofocus::learned::Sight;
+use parfocal::autofocus::networks::compute_on_this_thread;
 use parfocal::clock::{Clock, SystemClock};
 use parfocal::imaging::{PATCH_SIDE, Patch};
 use parfocal::training::clip::Clip;
@@ -66,6 +67,23 @@ fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, batch: usize, times: u
     println!("ours {name}, {batch} transitions: {rate:.1} updates a second, {:.0} transitions", rate * batch as f64);
 }
 
+/// Updates a second of a whole training, frames played too: on one thread, and on one for each core.
+fn trainings(clips: &[Arc<Clip>]) {
+    for threads in [1, 0] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let (rate, threads) = pool.install(|| {
+            compute_on_this_thread();
+            let recipe = Recipe::parse(shipped("cnn-learned").unwrap()).unwrap().dqn.unwrap();
+            let mut trainer = DqnTrainer::new(Sight::Patch, recipe, clips.to_vec(), 1, tch::Device::Cpu);
+            let update = || {
+                black_box(trainer.update());
+            };
+            (rate(500, update), rayon::current_num_threads())
+        });
+        println!("training cnn-learned, {threads} threads: {rate:.1} updates a second");
+    }
+}
+
 fn memory() {
     const FRAMES: usize = 2_500_000;
     let mut replay = Replay::new(FRAMES, 8);
@@ -81,14 +99,18 @@ fn memory() {
 }
 
 fn main() {
-    tch::set_num_threads(1);
     let clips = varied(Split::Training, 12).unwrap();
-    environment(&clips);
-    // The batches of `peer.py`.
-    for batch in [32, 256] {
-        updates(&clips, "mgm-learned-paper", Sight::Mgm, batch, 300);
-        updates(&clips, "cnn-learned-paper", Sight::Patch, batch, 60);
-    }
+    // One thread, as `peer.py` has.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| {
+        compute_on_this_thread();
+        environment(&clips);
+        // The batches of `peer.py`.
+        for batch in [32, 256] {
+            updates(&clips, "mgm-learned-paper", Sight::Mgm, batch, 300);
+            updates(&clips, "cnn-learned-paper", Sight::Patch, batch, 60);
+        }
+    });
+    trainings(&clips);
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_owned());
     match Command::new(&python).arg("benches/peer.py").status() {
         Ok(status) if status.success() => {}

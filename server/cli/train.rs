@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt::Interrupt;
 use super::{Failure, print};
+use crate::autofocus::networks::compute_on_this_thread;
 use crate::clock::SystemClock;
 use crate::notices::tell;
 use crate::training::asked::Asked;
@@ -60,7 +61,7 @@ pub struct Arguments {
 /// # Errors
 /// When recipe, footage, folder or checkpoint are unusable.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    tch::set_num_threads(1);
+    compute_on_this_thread();
     let device = device(arguments.device)?;
     let mut run = if arguments.resume { resume(arguments, device)? } else { begin(arguments, device)? };
     let total = run.recipe().updates();
@@ -72,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());
     let mut validation = run.best();
-    let whole = run.go(&SystemClock, &|| interrupt.asked(), &mut |progress: &Progress| {
+    let mut tell_progress = |progress: &Progress| {
         validation = progress.validation.unwrap_or(validation);
         let epsilon = progress.epsilon.map_or(String::new(), |epsilon| format!(", epsilon {epsilon:.2}"));
         let mae = if validation.is_finite() { format!(", validation MAE {validation:.4}") } else { String::new() };
@@ -82,7 +83,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         bar.set_position(progress.updates);
         bar.set_message(message);
-    })?;
+    };
+    // On one of the threads that share the work: it need not wait for another to wake up whenever there is some to share.
+    let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| compute_on_this_thread()).build()?;
+    let whole = threads.install(|| run.go(&SystemClock, &|| interrupt.asked(), &mut tell_progress))?;
     if !whole {
         bar.finish_and_clear();
         return print(&format!(

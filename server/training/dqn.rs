@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use tch::{Device, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
@@ -79,7 +80,7 @@ impl DqnTrainer {
         let sight = self.online.network.sight;
         let seen: Vec<Seen> = self
             .seats
-            .iter_mut()
+            .par_iter_mut()
             .map(|seat| {
                 let patch = seat.session.observe();
                 sight.metric(&patch).map_or_else(|| Seen::patch(&patch), |metric| Seen::Metric(sight.scaled(metric)))
@@ -189,7 +190,7 @@ impl Trainer for DqnTrainer {
         let values = floats(&pass.values);
         let (loss, slopes) = smooth_l1(&values, &self.wanted(&batch, &values));
         let slopes = Tensor::from_slice(&slopes).view_as(&pass.values).to_device(self.device());
-        let gradient = self.online.gradient(self.optimiser.flat(), &batch, &encodings, &pass, slopes);
+        let gradient = self.online.gradient(self.optimiser.flat(), &batch, &encodings, pass, &slopes);
         let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.descend(gradient, self.recipe.clip, rate);
         if matches!(self.recipe.target, Target::Bellman { .. }) {

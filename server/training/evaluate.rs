@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::clip::{Clip, ClipError};
@@ -13,6 +14,7 @@ use super::rollout::{FocalTimeScan, NoTarget, Path, PathFigures, roll_out, roll_
 use super::scan::{Scan, ScanSettings};
 use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
 use super::variety::Variety;
+use crate::autofocus::networks::compute_on_this_thread;
 use crate::autofocus::{PolicyError, PolicyName, Registry};
 
 /// Name of the row that knows the next optimum.
@@ -25,7 +27,7 @@ pub const COUNT: usize = 200;
 pub const SEED: u64 = 2023;
 
 /// What policies are evaluated on.
-pub trait ScanSet {
+pub trait ScanSet: Sync {
     /// Number of scans.
     fn count(&self) -> usize;
 
@@ -166,7 +168,8 @@ pub enum EvaluateError {
     },
 }
 
-/// Runs the named policies, and the oracle first, over `scans`. `progress` is told after each policy's scan.
+/// Runs the named policies, and the oracle first, over `scans`, several at once where there are cores for it. `progress` is
+/// told after each policy's scan.
 ///
 /// # Errors
 /// When a policy is unknown or cannot run, or answers what is no focal power.
@@ -174,24 +177,26 @@ pub fn evaluate(
     registry: &Registry,
     policies: &[PolicyName],
     scans: &dyn ScanSet,
-    progress: &dyn Fn(&str),
+    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Vec<Outcome>, EvaluateError> {
     let (count, parts) = (scans.count(), scans.parts());
     let perfect = |index| {
         let (mut scan, frames) = scans.scan(index);
         roll_out_oracle(scan.as_mut(), frames)
     };
-    let mut outcomes = vec![Outcome { policy: ORACLE.to_owned(), paths: (0..count).map(perfect).collect(), parts }];
+    let paths = (0..count).into_par_iter().map(perfect).collect();
+    let mut outcomes = vec![Outcome { policy: ORACLE.to_owned(), paths, parts }];
     for name in policies {
-        let mut paths = Vec::with_capacity(count);
-        for index in 0..count {
+        let run = |index| {
+            compute_on_this_thread();
             let (mut scan, frames) = scans.scan(index);
-            let mut policy = registry.build(name)?;
-            let path = roll_out(policy.as_mut(), scan.as_mut(), frames);
-            let failed = |error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error };
-            paths.push(path.map_err(failed)?);
+            let path = roll_out(registry.build(name)?.as_mut(), scan.as_mut(), frames);
             progress(name.as_str());
-        }
+            path.map_err(|error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error })
+        };
+        // All of them first: of several that failed, the first is told, however the cores took turns.
+        let paths: Vec<Result<_, EvaluateError>> = (0..count).into_par_iter().map(run).collect();
+        let paths = paths.into_iter().collect::<Result<_, _>>()?;
         outcomes.push(Outcome { policy: name.to_string(), paths, parts });
     }
     Ok(outcomes)

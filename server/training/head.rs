@@ -1,43 +1,83 @@
 //! The value head's gradient by hand: a third of the operations that libtorch records and replays, which it is tested against.
 
-use tch::Tensor;
-use tch::nn::Module;
+#![allow(clippy::cast_possible_wrap, reason = "small counts as tensor sizes")]
 
-use crate::autofocus::networks::ValueHead;
+use rayon::prelude::*;
+use tch::nn::{Linear, Module};
+use tch::{Device, Tensor};
+
+use crate::autofocus::networks::{ValueHead, compute_on_this_thread};
+
+/// Most states that a core works on at once. What is summed over states is summed over these parts first, in a fixed order:
+/// how many cores share them changes no digit.
+const STATES_AT_ONCE: i64 = 256;
 
 /// What a head made of states, with all that its gradient needs.
 #[derive(Debug)]
 pub(super) struct Pass {
-    /// What each layer took: `[S, input]`, then twice `[S, 256]`.
-    inputs: [Tensor; 3],
+    parts: Vec<Part>,
     /// Action values `[S, 3]`.
     pub values: Tensor,
 }
 
+/// The same of some of the states.
+#[derive(Debug)]
+struct Part {
+    /// The head's layers.
+    layers: [Linear; 3],
+    /// What each layer took: `[S, input]`, then twice `[S, 256]`.
+    inputs: [Tensor; 3],
+    values: Tensor,
+}
+
 impl Pass {
     /// Action values of states `[S, input]` by `head`. Nothing is recorded for libtorch's own gradients.
-    pub fn through(head: &ValueHead, states: Tensor) -> Self {
+    pub fn through(head: &ValueHead, states: &Tensor) -> Self {
+        let parts = split(states).into_iter().map(|states| (head.layers.each_ref().map(shared), states));
+        let parts = on_all_cores(parts.collect(), |(layers, states)| Part::through(layers, states));
+        let values: Vec<&Tensor> = parts.iter().map(|part| &part.values).collect();
+        Self { values: Tensor::cat(&values, 0), parts }
+    }
+
+    /// Writes to `gradient`, which has the shapes of the head's variables in the order of their names, the gradient of a loss
+    /// whose gradient by the values is `slopes` (`[S, 3]`). Returns its gradient by the states, `[S, input]`.
+    pub fn back(self, slopes: &Tensor, gradient: &[Tensor]) -> Tensor {
+        let parts = self.parts.into_iter().zip(split(slopes)).enumerate().map(|(index, (part, slopes))| {
+            let first = index == 0;
+            let own = gradient.iter().map(|sum| if first { sum.shallow_clone() } else { sum.empty_like() });
+            (part, slopes, own.collect::<Vec<_>>())
+        });
+        let found = on_all_cores(parts.collect(), |(part, slopes, own)| (part.back(slopes, &own), own));
+        for (_, own) in &found[1..] {
+            for (sum, own) in gradient.iter().zip(own) {
+                let _ = tch::no_grad(|| sum.shallow_clone().g_add_(own));
+            }
+        }
+        let by_states: Vec<&Tensor> = found.iter().map(|(by_states, _)| by_states).collect();
+        Tensor::cat(&by_states, 0)
+    }
+}
+
+impl Part {
+    fn through(layers: [Linear; 3], states: Tensor) -> Self {
         tch::no_grad(|| {
-            let [first, second, third] = &head.layers;
+            let [first, second, third] = &layers;
             let hidden = first.forward(&states).relu_();
             let later = second.forward(&hidden).relu_();
             let values = third.forward(&later);
-            Self { inputs: [states, hidden, later], values }
+            Self { inputs: [states, hidden, later], values, layers }
         })
     }
 
-    /// Writes to `gradient`, which has the shapes of the variables of `head` in the order of their names, the gradient of a
-    /// loss whose gradient by the values is `slopes` (`[S, 3]`). Returns its gradient by the first layer's output before its
-    /// `ReLU`.
-    pub fn back(&self, head: &ValueHead, slopes: Tensor, gradient: &[Tensor]) -> Tensor {
+    fn back(&self, mut slopes: Tensor, gradient: &[Tensor]) -> Tensor {
         tch::no_grad(|| {
-            let mut slopes = slopes;
-            for (index, (layer, input)) in head.layers.iter().zip(&self.inputs).enumerate().rev() {
+            for (index, (layer, input)) in self.layers.iter().zip(&self.inputs).enumerate().rev() {
                 let _ = slopes.sum_intlist_out(&gradient[2 * index], 0, false, None);
                 let _ = slopes.tr().mm_out(&gradient[2 * index + 1], input);
+                slopes = slopes.mm(&layer.ws);
                 if index > 0 {
                     // What a ReLU let through is above zero.
-                    slopes = input.threshold_backward(&slopes.mm(&layer.ws), 0);
+                    slopes = input.threshold_backward(&slopes, 0);
                 }
             }
             slopes
@@ -45,32 +85,60 @@ impl Pass {
     }
 }
 
+/// Rows for one core each, as even as can be; all together on a GPU.
+fn split(rows: &Tensor) -> Vec<Tensor> {
+    let count = rows.size()[0];
+    let parts = if rows.device() == Device::Cpu { (count - 1) / STATES_AT_ONCE + 1 } else { 1 };
+    rows.chunk(parts.max(1), 0)
+}
+
+/// A layer with the same weights: a tensor's handle may go to another thread, but not be shared with one.
+fn shared(layer: &Linear) -> Linear {
+    Linear { ws: layer.ws.shallow_clone(), bs: layer.bs.as_ref().map(Tensor::shallow_clone) }
+}
+
+fn on_all_cores<T: Send, R: Send>(mut parts: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
+    if parts.len() == 1 {
+        return parts.drain(..).map(work).collect();
+    }
+    let alone = |part| {
+        compute_on_this_thread();
+        work(part)
+    };
+    parts.into_par_iter().map(alone).collect()
+}
+
 #[cfg(test)]
 mod tests {
-    use tch::{Device, Kind, nn};
+    use tch::{Kind, nn};
 
     use super::*;
 
     #[test]
     fn values_and_gradients_are_libtorchs() {
-        tch::set_num_threads(1);
+        compute_on_this_thread();
         tch::manual_seed(7);
+        // For one core alone, and for several, unevenly.
+        [34, 700].into_iter().for_each(compare);
+    }
+
+    fn compare(count: i64) {
         let store = nn::VarStore::new(Device::Cpu);
         let reference = ValueHead::new(&(store.root() / "head"), 16);
         // Fresh biases are zero, which would hide that they are used.
         for mut variable in store.trainable_variables() {
             let _ = tch::no_grad(|| variable.g_add_(&(variable.randn_like() * 0.1)));
         }
-        let states = Tensor::randn([34, 16], (Kind::Float, Device::Cpu)).set_requires_grad(true);
-        let slopes = Tensor::randn([34, 3], (Kind::Float, Device::Cpu));
+        let states = Tensor::randn([count, 16], (Kind::Float, Device::Cpu)).set_requires_grad(true);
+        let slopes = Tensor::randn([count, 3], (Kind::Float, Device::Cpu));
         let expected = reference.forward(&states);
-        let pass = Pass::through(&reference, states.detach());
+        let pass = Pass::through(&reference, &states.detach());
         assert!(pass.values.allclose(&expected, 1e-5, 1e-6, false));
 
         let mut variables: Vec<(String, Tensor)> = store.variables().into_iter().collect();
         variables.sort_by(|a, b| a.0.cmp(&b.0));
         let gradient: Vec<Tensor> = variables.iter().map(|(_, variable)| variable.detach().zeros_like()).collect();
-        let by_states = pass.back(&reference, slopes.shallow_clone(), &gradient).mm(&reference.layers[0].ws);
+        let by_states = pass.back(&slopes, &gradient);
         let mut by: Vec<&Tensor> = variables.iter().map(|(_, variable)| variable).collect();
         by.push(&states);
         let loss = (expected * slopes).sum(Kind::Float);

@@ -14,7 +14,7 @@ use crate::autofocus::shipped::Design;
 use crate::autofocus::weights::{self, WeightsError};
 
 /// One that learns. What it does depends on its recipe, its seed, its clips and the seeds of its legs alone.
-pub trait Trainer {
+pub trait Trainer: Send {
     /// The variables of the network that is trained.
     fn store(&self) -> &nn::VarStore;
 

@@ -53,21 +53,20 @@ impl Values {
             let histories = encodings.index_select(0, &batch.history).view([batch.states.len() as i64, -1]);
             Tensor::cat(&[&histories, &batch.focal_powers], 1)
         });
-        Pass::through(&self.network.head, states)
+        Pass::through(&self.network.head, &states)
     }
 
     /// The gradient by all variables, which are `flat`, of a loss whose gradient by the values of `pass` is `slopes`
     /// (`[S, 3]`).
-    pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: &Pass, slopes: Tensor) -> Tensor {
+    pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: Pass, slopes: &Tensor) -> Tensor {
         let gradient = flat.values.empty_like();
         let parts = parts(&gradient, &flat.variables);
         // By name, the encoder's variables come before the head's, a bias and a weight a layer.
         let (encoder, head) = parts.split_at(parts.len() - 2 * self.network.head.layers.len());
-        let by_hidden = pass.back(&self.network.head, slopes, head);
+        let by_states = pass.back(slopes, head);
         if encoder.is_empty() {
             return gradient;
         }
-        let by_states = by_hidden.mm(&self.network.head.layers[0].ws);
         let width = self.network.sight.width() as i64;
         let by_histories = by_states.narrow(1, 0, HISTORY as i64 * width).reshape([-1, width]);
         let by_encodings = encodings.zeros_like().index_add_(0, &batch.history, &by_histories);
@@ -92,15 +91,18 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
+    use crate::autofocus::networks::compute_on_this_thread;
     use crate::training::replay::Step;
 
-    /// Two windows of twelve frames of noise, each with states whose history begins in it and states further on.
-    fn batch(rng: &mut ChaCha8Rng) -> Batch {
+    /// Windows of twelve frames of noise, of which every other begins a scan; in the others the first states' histories begin
+    /// before it.
+    fn batch(windows: u16, rng: &mut ChaCha8Rng) -> Batch {
         const WINDOW: u16 = 12;
         let mut frames = Frames::default();
-        frames.patches.extend((0..2 * usize::from(WINDOW) * PIXELS).map(|_| rng.random_range(20..220u8)));
+        frames.patches.extend((0..usize::from(windows * WINDOW) * PIXELS).map(|_| rng.random_range(20..220u8)));
         let step = |age| Step { focal_power: f32::from(age) / 50.0, next_optimum: 0.5, action: 1, age };
-        let steps = [0, 30].into_iter().flat_map(|begin| (begin..begin + WINDOW).map(step)).collect();
+        let begins = (0..windows).map(|window| 30 * (window % 2));
+        let steps = begins.flat_map(|begin| (begin..begin + WINDOW).map(step)).collect();
         Batch::new(frames, steps, usize::from(WINDOW), Device::Cpu)
     }
 
@@ -108,7 +110,7 @@ mod tests {
     fn gradients_by_hand_are_those_that_libtorch_records() {
         tch::set_num_threads(1);
         tch::manual_seed(3);
-        let batch = batch(&mut ChaCha8Rng::seed_from_u64(3));
+        let batch = batch(2, &mut ChaCha8Rng::seed_from_u64(3));
         assert!(batch.states.len() > 12, "the first window's states reach back as far as the scan goes");
         let mut values = Values::new(Sight::Patch, Device::Cpu);
         let flat = Flat::of(&values.store);
@@ -124,11 +126,32 @@ mod tests {
             }
             let encodings = values.encode(&batch.frames);
             let pass = values.pass(&batch, &encodings);
-            let gradient = values.gradient(&flat, &batch, &encodings, &pass, slopes.shallow_clone());
+            let gradient = values.gradient(&flat, &batch, &encodings, pass, &slopes);
             let difference = (&gradient - &expected).abs().max().double_value(&[]);
             let scale = expected.abs().max().double_value(&[]);
             assert!(difference < 1e-4 * scale, "encoder by hand {by_hand}: {difference} of {scale}");
         }
+    }
+
+    #[test]
+    fn gradients_do_not_depend_on_how_many_cores_share_them() {
+        let gradient = |threads| {
+            let work = || {
+                compute_on_this_thread();
+                let batch = batch(80, &mut ChaCha8Rng::seed_from_u64(3));
+                tch::manual_seed(3);
+                let values = Values::new(Sight::Patch, Device::Cpu);
+                let flat = Flat::of(&values.store);
+                let encodings = values.encode(&batch.frames);
+                let pass = values.pass(&batch, &encodings);
+                let slopes = pass.values.shallow_clone();
+                floats(&values.gradient(&flat, &batch, &encodings, pass, &slopes))
+            };
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+        };
+        let alone = gradient(1);
+        assert!(alone.iter().any(|&slope| slope.abs() > 1e-3));
+        assert!([2, 5].into_iter().all(|threads| gradient(threads) == alone));
     }
 
     fn as_floats(batch: &Batch) -> Tensor {

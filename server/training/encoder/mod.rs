@@ -5,12 +5,17 @@ mod kernels;
 #[cfg(test)]
 mod tests;
 
+use rayon::prelude::*;
 use tch::{Device, Tensor, nn};
 
 use kernels::{FILTERS, Lanes, TAPS, Weights};
 
 /// Layers of the encoder, by their names in a store.
 const LAYERS: [&str; 4] = ["0", "2", "4", "6"];
+/// Patches that are encoded in one go, cores sharing the rest.
+const ENCODED_AT_ONCE: usize = 16;
+/// Patches whose gradients are summed in one go. The sums are added in a fixed order: how many cores share them changes no digit.
+const SUMMED_AT_ONCE: usize = 64;
 
 /// An encoder that computes with the variables that a store holds at the time.
 #[derive(Debug)]
@@ -36,9 +41,10 @@ impl Encoder {
     /// Encodings `[N, 8]` of patches `[N, 1024]`, row after row.
     #[must_use]
     pub fn encode(&self, patches: &[u8]) -> Vec<f32> {
-        let patches = patches.as_chunks().0;
+        let (weights, patches) = (self.weights(), patches.as_chunks().0);
         let mut encodings = vec![Lanes::default(); patches.len()];
-        kernels::encode(&self.weights(), patches, &mut encodings);
+        let parts = patches.par_chunks(ENCODED_AT_ONCE).zip(encodings.par_chunks_mut(ENCODED_AT_ONCE));
+        parts.for_each(|(patches, encodings)| kernels::encode(&weights, patches, encodings));
         encodings.into_flattened()
     }
 
@@ -46,9 +52,15 @@ impl Encoder {
     /// the encodings `[N, 8]` of patches `[N, 1024]` is `slopes`.
     #[must_use]
     pub fn gradient(&self, patches: &[u8], slopes: &[f32]) -> Vec<f32> {
-        let mut gradient = Weights::default();
-        kernels::add_gradients(&self.weights(), patches.as_chunks().0, slopes.as_chunks().0, &mut gradient);
-        flat(&gradient)
+        let (weights, patches, slopes) = (self.weights(), patches.as_chunks().0, slopes.as_chunks().0);
+        let parts = patches.par_chunks(SUMMED_AT_ONCE).zip(slopes.par_chunks(SUMMED_AT_ONCE));
+        let sum = |(patches, slopes): (&[_], &[_])| {
+            let mut gradient = Weights::default();
+            kernels::add_gradients(&weights, patches, slopes, &mut gradient);
+            flat(&gradient)
+        };
+        let sums: Vec<Vec<f32>> = parts.map(sum).collect();
+        sums.into_iter().reduce(added).unwrap_or_else(|| flat(&Weights::default()))
     }
 
     fn weights(&self) -> Weights {
@@ -65,6 +77,11 @@ impl Encoder {
         }
         weights
     }
+}
+
+fn added(mut sum: Vec<f32>, more: Vec<f32>) -> Vec<f32> {
+    sum.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+    sum
 }
 
 /// In the order of the variables' names, each as `PyTorch` lays it out.
