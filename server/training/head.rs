@@ -1,7 +1,5 @@
 //! The value head's gradient by hand: a third of the operations that libtorch records and replays, which it is tested against.
 
-#![allow(clippy::cast_possible_wrap, reason = "small counts as tensor sizes")]
-
 use rayon::prelude::*;
 use tch::nn::{Linear, Module};
 use tch::{Device, Tensor};
@@ -48,7 +46,7 @@ impl Pass {
             (part, slopes, own.collect::<Vec<_>>())
         });
         let found = on_all_cores(parts.collect(), |(part, slopes, own)| (part.back(slopes, &own), own));
-        for (_, own) in &found[1..] {
+        for (_, own) in found.iter().skip(1) {
             for (sum, own) in gradient.iter().zip(own) {
                 let _ = tch::no_grad(|| sum.shallow_clone().g_add_(own));
             }
