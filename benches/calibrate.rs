@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use parfocal::autofocus::networks::compute_on_this_thread;
 use parfocal::autofocus::{PolicyName, Registry};
 use parfocal::imaging::GrayImage;
 use parfocal::training::clip::Clip;
@@ -46,7 +47,7 @@ fn candidates() -> Vec<Candidate> {
 }
 
 fn main() {
-    tch::set_num_threads(1);
+    compute_on_this_thread();
     let pictures: Vec<GrayImage> = (0..COUNT as u64).map(|index| sharp_phantom(Split::Validation, index)).collect();
     let registry = Registry::standard();
     let policies = PAPER.map(|(name, _)| PolicyName::new(name));

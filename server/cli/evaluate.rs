@@ -8,6 +8,7 @@ use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Failure, print, scan};
+use crate::autofocus::networks::compute_on_this_thread;
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::ScanFolder;
@@ -59,7 +60,7 @@ const MOST_PHANTOM: usize = 100;
 /// # Errors
 /// When scans, footage or policies cannot be had, or results cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    tch::set_num_threads(1);
+    compute_on_this_thread();
     let mut registry = Registry::standard();
     if let Some(folder) = &arguments.weights {
         registry = shipped::with_folder(registry, folder)?;

@@ -95,9 +95,9 @@ fn shared(layer: &Linear) -> Linear {
     Linear { ws: layer.ws.shallow_clone(), bs: layer.bs.as_ref().map(Tensor::shallow_clone) }
 }
 
-fn on_all_cores<T: Send, R: Send>(mut parts: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
+fn on_all_cores<T: Send, R: Send>(parts: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
     if parts.len() == 1 {
-        return parts.drain(..).map(work).collect();
+        return parts.into_iter().map(work).collect();
     }
     let alone = |part| {
         compute_on_this_thread();

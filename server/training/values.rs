@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn gradients_by_hand_are_those_that_libtorch_records() {
-        tch::set_num_threads(1);
+        compute_on_this_thread();
         tch::manual_seed(3);
         let batch = batch(2, &mut ChaCha8Rng::seed_from_u64(3));
         assert!(batch.states.len() > 12, "the first window's states reach back as far as the scan goes");

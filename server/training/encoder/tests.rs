@@ -29,7 +29,7 @@ struct Both {
 }
 
 fn both(seed: i64) -> Both {
-    tch::set_num_threads(1);
+    networks::compute_on_this_thread();
     tch::manual_seed(seed);
     let store = nn::VarStore::new(Device::Cpu);
     let torch = networks::Encoder::new(&(store.root() / "encoder"));
