@@ -22,7 +22,7 @@ use crate::imaging::Patch;
 /// Most focal power a frame: a lens can jump, but a surgeon should not see it.
 pub const MAX_MOVE: f64 = 0.1;
 /// Moves below this are not worth the eye's attention.
-pub const LEAST_MOVE: f64 = 0.012;
+pub const LEAST_MOVE: f64 = 0.02;
 /// A tracker that believes itself in focus with less than this looks for the optimum: who stands still learns little.
 const ASSURANCE: f64 = 0.85;
 /// Focal power a frame that looking takes at least: enough for a change of blur to show, and not out of focus by itself.
@@ -99,7 +99,7 @@ const PLACES: usize = (BINS - 1) * FINENESS + 1;
 /// What it is worth to stand `distance` from the optimum: 1 in focus, 0 out of it, with a soft edge, and less the farther, so
 /// that who does not know where the optimum is goes to the middle of where it may be.
 fn worth(distance: f64) -> f64 {
-    const SOFTNESS: f64 = 0.02;
+    const SOFTNESS: f64 = 0.04;
     const SLOPE: f64 = 0.3;
     1.0 / (1.0 + ((distance - IN_FOCUS) / SOFTNESS).exp()) - SLOPE * distance
 }

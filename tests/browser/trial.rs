@@ -150,6 +150,9 @@ async fn fourth_setting_too_long_a_comment(theatre: &Theatre<'_>) {
     surgeon.sees("#comment-trouble", "it is back in the box: That is too long").await;
     assert_eq!(theatre.comment_box().await.len(), 1_000_000);
     assert_eq!(theatre.picture_height().await, height, "neither a long comment nor a message moves the picture");
+    let apart = "const edges = (css) => document.querySelector(css).getBoundingClientRect();
+                 return edges('.viewer-colour').bottom <= edges('.dock .trouble').top";
+    assert_eq!(surgeon.run(apart, json!([])).await, true, "a message covers what is said about the colours");
     shoot(surgeon, "surgeon-15-long-comment").await;
     surgeon.reload().await;
     surgeon.sees("#setting", "Setting 4 of 6").await;
