@@ -161,7 +161,8 @@ pub struct ControlStatus {
     pub focal_power: FocalPower,
     /// Why the lens is being held, if it is.
     pub held: Option<Hold>,
-    /// For how long it has been held without a break, for whatever reasons.
+    /// For how long it has been held without a break, for the policy's sake or for other reasons: where one follows the other, a
+    /// policy's slow start after a long pause, it counts from there.
     pub held_for: Duration,
     /// The hold in words, and what to do.
     pub message: Option<Arc<str>>,

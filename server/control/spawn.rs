@@ -117,8 +117,8 @@ struct Worker {
     last_frame_at: Moment,
     /// Why frames lead to nothing: none come, or they hold no patch.
     camera_fault: Option<HoldReason>,
-    /// Since when the lens has been held without a break.
-    held_since: Option<Moment>,
+    /// Since when the lens has been held without a break, and whether for the policy's sake.
+    held_since: Option<(bool, Moment)>,
     window: LatencyWindow,
     steps: u64,
     telemetry_dropped: u64,
@@ -221,7 +221,10 @@ impl Worker {
     fn publish(&mut self) {
         let now = self.clock.now();
         let reason = self.camera_fault.as_ref().or(self.stepper.hold_reason());
-        self.held_since = reason.and(self.held_since.or(Some(now)));
+        self.held_since = reason.map(|reason| {
+            let policys = reason.hold.is_the_policys();
+            self.held_since.filter(|held| held.0 == policys).unwrap_or((policys, now))
+        });
         let (held, message) = (reason.map(|reason| reason.hold), reason.map(|reason| reason.message.clone()));
         let changed = {
             let last = self.status.borrow();
@@ -241,7 +244,7 @@ impl Worker {
             policy: self.stepper.policy().cloned(),
             focal_power: self.stepper.focal_power(),
             held,
-            held_for: self.held_since.map_or(Duration::ZERO, |since| now.since(since)),
+            held_for: self.held_since.map_or(Duration::ZERO, |(_, since)| now.since(since)),
             message,
             #[allow(clippy::cast_precision_loss, reason = "a few hundred at most")]
             steps_per_second: figures.steps as f64,

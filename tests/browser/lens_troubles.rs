@@ -27,7 +27,7 @@ async fn the_operator_reads_what_is_wrong_with_the_lens() {
         (Fault::WrongChecksum, "checksum"),
         (Fault::Garbage, "unreadable"),
         (Fault::Errors, "does not know this command"),
-        (Fault::DropsCommands, "but stays at"),
+        (Fault::DropsCommands, "does not go where it is sent"),
     ] {
         emulator.set_fault(fault);
         operator.sees("#warnings .bad", words).await;

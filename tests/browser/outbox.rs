@@ -16,7 +16,7 @@ const OUTBOX: &str = r#"
     window.fetch = (path, { body }) => {
         posted.push(JSON.parse(body).value);
         arrivals.shift()?.();
-        return answers.shift() ?? Promise.resolve(new Response("", { status: 200 }));
+        return answers.shift() ?? Promise.resolve(new Response(null, { status: 204 }));
     };
     const ours = (status) => new Response('{"error": "so it is"}', { status, headers: { "content-type": "application/json" } });
     const saved = (outbox) => new Promise((done) => outbox.addEventListener("change", () => outbox.waiting.length === 0 && done()));

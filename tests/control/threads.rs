@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use parfocal::clock::SystemClock;
+use parfocal::clock::{Clock, SystemClock};
 use parfocal::control::{
     Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, Hold, Rig, Settings, StepRecord,
 };
@@ -97,6 +97,28 @@ fn a_hanging_policy_does_not_stop_the_view() {
     for _ in 0..50 {
         assert_eq!(stage.shoot().record.held, Some(Hold::PolicySlow));
     }
+    stage.script.set(Deed::GoTo(0.7));
+    stage.shoot_until(|record| record.held.is_none());
+    stage.control.stop();
+}
+
+#[test]
+fn a_slow_start_after_a_long_pause_is_not_a_long_hold() {
+    let mut stage = Stage::new(16);
+    let clock = SystemClock;
+    stage.handle.send(drive("scripted", None));
+    stage.shoot_until(|record| record.asked == power(0.6));
+    stage.handle.send(Command::Drive { drive: Drive::Hold, segment: None });
+    while stage.handle.status.borrow().held_for < Duration::from_millis(300) {
+        stage.shoot();
+    }
+    assert_eq!(stage.handle.status.borrow().held, Some(Hold::Paused));
+    let resumed = clock.now();
+    stage.script.set(Deed::Hang);
+    stage.handle.send(drive("scripted", None));
+    stage.shoot_until(|record| record.held == Some(Hold::PolicySlow));
+    let status = stage.status_until(|status| status.held == Some(Hold::PolicySlow));
+    assert!(status.held_for <= clock.now().since(resumed), "{:?}", status.held_for);
     stage.script.set(Deed::GoTo(0.7));
     stage.shoot_until(|record| record.held.is_none());
     stage.control.stop();

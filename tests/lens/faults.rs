@@ -76,7 +76,7 @@ fn commands_that_get_lost_are_sent_again_and_then_called_refused() {
     emulator.set_fault(Fault::DropsCommands);
     lens.set(FocalPower::MAX).unwrap();
     until("the loss is noticed", || !lens.health().working);
-    assert!(lens.health().message.contains("sent to 10.00 dpt but stays at"), "{}", lens.health().message);
+    assert!(lens.health().message.contains("does not go where it is sent"), "{}", lens.health().message);
     assert!(matches!(lens.set(FocalPower::MAX), Err(LensError::Refused(_))));
     emulator.set_fault(Fault::None);
     until("the command arrives after all", || last_command(&emulator) == Some(3000));

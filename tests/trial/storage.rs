@@ -127,6 +127,28 @@ async fn what_was_recorded_cannot_be_changed_or_removed() {
             assert!(refused.is_err_and(|error| error.to_string().contains("append-only")), "{sql}");
         }
     }
+    // REPLACE removes what it puts itself in the place of, by any of the columns that must be unique.
+    let mut connection = pool.acquire().await.unwrap();
+    for (table, forged) in [
+        ("sessions", "seed"),
+        ("segments", "policy"),
+        ("events", "kind"),
+        ("comments", "text"),
+        ("answers", "question"),
+        ("comments", "key"),
+        ("answers", "key"),
+    ] {
+        let script = format!(
+            "CREATE TEMP TABLE forged AS SELECT * FROM {table}; UPDATE forged SET {forged} = 'forged'; \
+             INSERT OR REPLACE INTO {table} SELECT * FROM forged LIMIT 1"
+        );
+        let _refused = sqlx::raw_sql(sqlx::AssertSqlSafe(script)).execute(&mut *connection).await;
+        sqlx::raw_sql("DROP TABLE temp.forged").execute(&mut *connection).await.unwrap();
+        let count = format!("SELECT count(*), total(coalesce({forged}, '') = 'forged') FROM {table}");
+        let (rows, changed): (i64, f64) =
+            sqlx::query_as(sqlx::AssertSqlSafe(count)).fetch_one(&mut *connection).await.unwrap();
+        assert!(rows > 0 && changed == 0.0, "{table}.{forged}: {changed} of {rows}");
+    }
 }
 
 #[tokio::test]

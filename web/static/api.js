@@ -32,7 +32,7 @@ async function request(method, path, body) {
   });
   const text = await response.text();
   if (!response.ok) throw refusal(text, response.status);
-  return text ? JSON.parse(text) : null;
+  return { status: response.status, body: text ? JSON.parse(text) : null };
 }
 
 function refusal(text, status) {
@@ -48,11 +48,18 @@ function refusal(text, status) {
 function explanation(status) {
   if (status === 401 || status === 403) return "This link is no longer valid here. Open it again, or ask for a new one.";
   if (status === 413) return "That is too long to be saved in one piece.";
+  if (status < 300) return "What answered is not the server. Check the network that this device is on.";
   return `The server answered with an error (${status}).`;
 }
 
-export const get = (path) => request("GET", path);
-export const post = (path, body) => request("POST", path, body);
+export const get = async (path) => (await request("GET", path)).body;
+export const post = async (path, body) => (await request("POST", path, body)).body;
+
+/** Sends what must not be lost: done only once the server itself says, with its 204, that it is on its disk. */
+export async function keep(path, body) {
+  const { status } = await request("POST", path, body);
+  if (status !== 204) throw new Refused(status, explanation(status), false);
+}
 
 /** An error in words, whoever made it; `unheard` is for nobody having answered. */
 export function inWords(error, unheard = "No connection to the server. Try again in a moment.") {

@@ -19,6 +19,8 @@ export function composer(outbox, now) {
   const quick = byId("quick");
   const mark = byId("mark");
   const send = byId("send");
+  /** The number of each setting that was on screen. */
+  const numbers = new Map();
   let draft = null;
   let begun = null;
   let kept = 0;
@@ -33,9 +35,10 @@ export function composer(outbox, now) {
       draft = session && new Draft(`comment.${session}`);
       const left = draft?.read();
       begun = left?.begun ?? null;
-      box.value = left?.text ?? "";
+      write(left?.text ?? "");
       setText(trouble, "");
     }
+    if (state?.segment != null) numbers.set(state.segment, state.setting);
     const over = !state || state.phase === "completed" || state.phase === "aborted";
     box.disabled = over && box.value === "";
     byId("compose").hidden = box.disabled && state !== null;
@@ -130,6 +133,7 @@ export function composer(outbox, now) {
     if (body.session !== shown) return;
     if (body.kind === "text") {
       outbox.forget(entry);
+      begun ??= { segment: body.segment, setting: numbers.get(body.segment) ?? 0, frame: body.frame, run: body.run };
       write(box.value === "" ? body.text : `${body.text}\n${box.value}`);
     }
     const what = body.kind === "text" ? "The comment was not saved, it is back in the box" : body.kind === "mark" ? "The mark was not saved" : `“${body.text}” was not saved`;

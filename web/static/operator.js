@@ -21,6 +21,8 @@ let endsAt = null;
 
 let status = null;
 let dragging = false;
+let ordered = null;
+let ordering = false;
 
 function followStatus(next) {
   status = next;
@@ -40,7 +42,7 @@ function drawFocus() {
   if (untold) return drawUntold();
   const power = status.focal_power.toFixed(3);
   setText(byId("focus-now"), `focal power ${power}`);
-  if (dragging) return;
+  if (dragging || ordering) return;
   byId("policy").value = status.policy ?? BY_HAND;
   if (status.policy === null && !wasUntold) return;
   byId("focal-power").value = status.focal_power;
@@ -55,13 +57,22 @@ function drawUntold() {
   setText(byId("focal-power-value"), "");
 }
 
+/** One order at a time, so that the last one given is the last to arrive; those overtaken meanwhile are left out. */
 async function focus(order) {
-  try {
-    await post("/api/operator/focus", order);
-    setText(byId("focus-trouble"), "");
-  } catch (error) {
-    tellTrouble(byId("focus-trouble"), error);
+  ordered = order;
+  if (ordering) return;
+  ordering = true;
+  while (ordered) {
+    const next = ordered;
+    ordered = null;
+    try {
+      await post("/api/operator/focus", next);
+      setText(byId("focus-trouble"), "");
+    } catch (error) {
+      tellTrouble(byId("focus-trouble"), error);
+    }
   }
+  ordering = false;
 }
 
 const slider = byId("focal-power");

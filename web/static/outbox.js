@@ -2,7 +2,7 @@
 // its own, so that a reload, a Wi-Fi gap or a second tab loses nothing; the entry's idempotency key makes sending it
 // twice harmless. What the server refuses stays on this device too, and is tried again when the page is next opened.
 
-import { post, Refused, inWords } from "./api.js";
+import { keep, Refused, inWords } from "./api.js";
 import { uuid } from "./dom.js";
 
 const PREFIX = "parfocal.outbox.";
@@ -17,13 +17,16 @@ export class Outbox extends EventTarget {
   #flushing = false;
   #wait = FIRST_WAIT_MS;
   #timer = null;
-  #count = 0;
+  #latest = 0;
   /** Why the last attempt failed, if it did. */
   trouble = null;
 
   constructor() {
     super();
-    for (const entry of stored()) this.#entries.set(entry.id, entry);
+    for (const entry of stored()) {
+      this.#entries.set(entry.id, entry);
+      this.#latest = Math.max(this.#latest, Number.parseInt(entry.id, 10) || 0);
+    }
     addEventListener("storage", ({ key, newValue }) => key && newValue === null && this.#doneElsewhere(key));
     addEventListener("online", () => this.nudge());
     document.addEventListener("visibilitychange", () => document.hidden || this.nudge());
@@ -53,8 +56,9 @@ export class Outbox extends EventTarget {
    * `body.key` is made here.
    */
   add(path, body, slot = null) {
-    const order = `${String(Date.now()).padStart(15, "0")}-${String(this.#count++).padStart(5, "0")}`;
-    const entry = { id: `${order}-${uuid()}`, path, slot, body: { key: uuid(), ...body } };
+    // A clock that is set back must not put what is said later before what was said.
+    this.#latest = Math.max(Date.now(), this.#latest + 1);
+    const entry = { id: `${String(this.#latest).padStart(15, "0")}-${uuid()}`, path, slot, body: { key: uuid(), ...body } };
     if (slot) {
       for (const other of [...this.waiting, ...this.#refused.values()]) if (other.slot === slot && !other.sending) this.forget(other);
     }
@@ -107,7 +111,7 @@ export class Outbox extends EventTarget {
   async #send(entry) {
     entry.sending = true;
     try {
-      await post(entry.path, withWait(entry.body));
+      await keep(entry.path, withWait(entry.body));
       this.trouble = null;
       this.forget(entry);
       this.#tell(entry, "saved");

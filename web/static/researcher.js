@@ -17,7 +17,7 @@ let chosen = null;
 async function load() {
   try {
     timeline = await get(`${API}/timeline`);
-    if (withPath) policies = (await get(API)).unblinding.policies;
+    if (unblinded === "true") policies = (await get(API)).unblinding.policies;
     listComments();
     new ResizeObserver(draw).observe(byId("timeline"));
   } catch (error) {
@@ -71,7 +71,7 @@ function unblind() {
 byId("show-path").onclick = () => {
   withPath = true;
   byId("show-path").hidden = true;
-  draw();
+  if (timeline) draw();
 };
 if (byId("unblind")) byId("unblind").onclick = unblind;
 load();

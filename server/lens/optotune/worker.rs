@@ -212,14 +212,9 @@ impl Session<'_> {
     }
 
     fn publish(&self) {
-        let refusal = (self.unmet > RESENDS).then(|| {
-            let sent = self.link.sent().map_or(0, |sent| sent.raw);
-            Arc::from(format!(
-                "it was sent to {:.2} dpt but stays at {:.2} dpt: restart the driver or check the lens",
-                self.device.range.dioptre(sent),
-                self.device.range.dioptre(self.device.read_back)
-            ))
-        });
+        // Without the dioptres: they would tell the operator of a blinded session how the policy moves.
+        let refusal = (self.unmet > RESENDS)
+            .then(|| Arc::from("it does not go where it is sent: restart the driver or check the lens"));
         let mut state = self.shared.state();
         state.device = Ok(self.device.clone());
         state.message = words(&self.device, self.settings);
