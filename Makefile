@@ -5,7 +5,7 @@
 BIND ?= 127.0.0.1:8080
 ARGS ?=
 
-# GigE Vision and USB3 Vision are checked wherever their library is. Everything is built once, with it or without.
+# GigE Vision and USB3 Vision are checked wherever their library is. Every check is built once, with it or without; `make run` needs neither.
 FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
 
 .PHONY: run test check lint unit readme bench fuzz

@@ -64,9 +64,7 @@ fn what_begins_with_weights_begins_with_what_they_know() {
     let recipe = small("mgm-learned", 1);
     let start = |file: &str| Run::begin(recipe.clone(), 7, &[], folder.path(), Some(Path::new(file)), tch::Device::Cpu);
     // Another policy's weights are refused, and leave nothing behind.
-    assert!(
-        start("policies/parfocal.safetensors").err().unwrap().to_string().contains("cannot begin with the weights")
-    );
+    assert!(start("policies/parfocal.safetensors").err().unwrap().to_string().contains("cannot use the weights"));
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
     let mut run = start("policies/mgm-learned.safetensors").unwrap();
     assert!(run.go(&SystemClock, &|| false, &mut |_| ()).unwrap());
@@ -84,8 +82,9 @@ fn what_begins_with_weights_begins_with_what_they_know() {
 
 #[test]
 fn training_resumed_is_training_never_stopped() {
-    for policy in ["mgm-learned", "cnn-learned", "parfocal"] {
-        let recipe = small(policy, 2 * LEG);
+    for recipe in ["mgm-learned", "mgm-learned-paper", "cnn-learned", "parfocal"] {
+        let recipe = small(recipe, 2 * LEG);
+        let policy = &recipe.policy;
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         assert!(train(begin(&recipe, whole.path()), u64::MAX));
         assert!(!train(begin(&recipe, parts.path()), 1));

@@ -1,4 +1,4 @@
-//! Policies from elsewhere, as `TorchScript` files: `file:PATH` in the place of a policy's name.
+//! Policies from elsewhere, as TorchScript files: `file:PATH` in the place of a policy's name.
 //!
 //! The module's `forward` takes the latest eight frames, oldest first, as two float tensors: gray patches `[8, 32, 32]` (0..=255)
 //! and the focal powers that they were exposed at, `[8]` (0..=1). It returns the values of the three actions, `[3]`: a step

@@ -16,7 +16,6 @@ use crate::training::evaluate::{Benchmark, COUNT, Conditions, FRAMES, Outcome, S
 use crate::training::footage;
 use crate::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
 use crate::training::report::Report;
-use crate::training::scan::ScanSettings;
 
 /// What to evaluate, and on what.
 #[derive(Debug, clap::Args)]
@@ -31,7 +30,7 @@ pub struct Arguments {
     /// A video (its first 1500 frames), an image or a folder of images to scan in place of the reference pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
-    /// Policies by name, separated by commas, `all` for all that can run; `file:PATH` for one from a `TorchScript` file, whose
+    /// Policies by name, separated by commas, `all` for all that can run; `file:PATH` for one from a TorchScript file, whose
     /// path goes on to the end of the argument, commas included. May be given more than once.
     #[arg(long, value_name = "NAMES", default_value = "all")]
     policies: Vec<String>,
@@ -172,7 +171,7 @@ fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
     let set = if clips.is_empty() {
         Benchmark { seed, ..Benchmark::reference(count)? }
     } else {
-        Benchmark { clips, conditions: Conditions::Same(ScanSettings::default()), seed, count, frames: FRAMES }
+        Benchmark { clips, conditions: Conditions::Fitting, seed, count, frames: FRAMES }
     };
     Ok(Scans { set: Box::new(set), seed, between: None })
 }

@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Folder for the database, the keys and what is recorded.
     #[arg(long, value_name = "DIR", default_value = "data")]
     data_dir: PathBuf,
-    /// Camera: phantom, footage:PATH, scan:DIR or gige:ID.
+    /// Camera: phantom, footage:PATH, scan:DIR or gige:ID (gige:list names them), options as in docs/scripting.md.
     #[arg(long, value_name = "SPEC", default_value = "phantom")]
     camera: String,
     /// Lens: simulated, emulated (an Optotune driver that is not there), optotune:auto or optotune:DEVICE.
@@ -52,10 +52,10 @@ pub struct Arguments {
     /// Seed of everything random, so that a trial can be replayed; without it, a fresh one.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Folder of trial protocols beside those that ship.
+    /// Folder of trial protocols beside those that ship; `trial-protocols`, if it is there, unless another is named.
     #[arg(long, value_name = "DIR")]
     protocols: Option<PathBuf>,
-    /// A policy from a `TorchScript` file, `file:PATH`: to be chosen, also in protocols, by that name. May be repeated.
+    /// A policy from a TorchScript file, `file:PATH`: to be chosen, also in protocols, by that name. May be repeated.
     #[arg(long = "policy", value_name = "file:PATH")]
     policies: Vec<String>,
     /// Folder with weights (`NAME.safetensors`) of your own training to take in the place of those that ship.

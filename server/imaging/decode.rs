@@ -6,6 +6,7 @@ use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::frame::{FrameError, GrayImage, MosaicFrame, RgbImage};
 use super::luma::luma;
+use super::{Calibration, Reconstructor};
 
 /// Width and height in samples of the full sensor (IMEC CMV2K), which a raw mosaic has.
 pub const SENSOR_SIZE: (usize, usize) = (2048, 1088);
@@ -25,6 +26,26 @@ pub enum Picture {
     Gray(GrayImage),
     /// A sensor's mosaic, in counts.
     Mosaic(MosaicFrame),
+}
+
+impl Picture {
+    /// The picture in colour and in gray, whatever it was: a mosaic by the calibration of a typical unit.
+    #[must_use]
+    pub fn developed(self) -> (RgbImage, GrayImage) {
+        match self {
+            Self::Rgb(rgb, gray) => (rgb, gray),
+            Self::Gray(gray) => {
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels, 0..=255")]
+                let data = gray.data.iter().flat_map(|&value| [value.round() as u8; 3]).collect();
+                (RgbImage { width: gray.width, height: gray.height, data }, gray)
+            }
+            Self::Mosaic(mosaic) => {
+                let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+                Reconstructor::new(&Calibration::default()).reconstruct(&mosaic, &mut rgb, &mut gray);
+                (rgb, gray)
+            }
+        }
+    }
 }
 
 /// Why bytes are no picture. Reads on after "FILE: ".

@@ -205,6 +205,55 @@ mod tests {
         assert_eq!(far(&[0.0])[0], 0, "the lens cannot go there");
     }
 
+    fn rounded(value: f64) -> f64 {
+        (1e4 * value).round() / 1e4
+    }
+
+    #[test]
+    fn returns_by_hand() {
+        let mut steps = steps(&[0.5, 0.55, 0.6], 0.6);
+        (steps[0].next_optimum, steps[1].next_optimum) = (0.62, 0.5);
+        let plain = Returns { discount: 0.5, steps: 2, regret: false };
+        // -(0.62 - 0.55) - 0.5 * (0.6 - 0.5), and a quarter of what the last state is worth.
+        assert_eq!(rounded(plain.of(&steps, 0, 4.0)), rounded(-0.12 + 1.0));
+        // An oracle at 0.5 is 0.07, then 0.02 away from 0.62; at the end, 0. In steps, over the horizon of two frames.
+        let regret = Returns { regret: true, ..plain };
+        assert_eq!(rounded(regret.of(&steps, 0, 4.0)), rounded((-0.12 + 0.08) * 10.0 + 1.0));
+    }
+
+    #[test]
+    fn returns_stay_within_a_window_and_a_scan() {
+        // Two windows of four frames, a scan's end in the middle of the first.
+        let ages = [0, 1, 0, 1, 0, 1, 2, 3];
+        let step = |(at, age): (usize, u16)| Step {
+            focal_power: 0.5,
+            next_optimum: 0.5 + at as f32 / 10.0,
+            action: 1 + (at % 2) as u8,
+            age,
+        };
+        let steps: Vec<Step> = ages.into_iter().enumerate().map(step).collect();
+        let batch = Batch::new(Frames::default(), steps, 4, Device::Cpu);
+        assert_eq!(batch.states, [0, 1, 2, 3, 4, 5, 6, 7]);
+        let values = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
+        let wanted = bellman(&batch, &values, Returns { discount: 0.5, steps: 1, regret: false }, 4);
+        let told: Vec<_> = wanted
+            .iter()
+            .map(|row| row.iter().enumerate().find_map(|(action, value)| value.map(|v| (action, rounded(v.into())))))
+            .collect();
+        let by_hand = [
+            Some((1, 10.0)), // 0 + 20 / 2
+            None,            // the scan ends
+            Some((1, 19.8)), // -0.2 + 40 / 2
+            None,            // the window ends
+            Some((1, 29.6)), // -0.4 + 60 / 2
+            Some((2, 34.5)), // -0.5 + 70 / 2
+            Some((1, 39.4)), // -0.6 + 80 / 2
+            None,
+        ];
+        assert_eq!(told, by_hand);
+        assert!(wanted.iter().all(|row| row.iter().flatten().count() <= 1), "of the action taken alone");
+    }
+
     #[test]
     fn smooth_l1_by_hand() {
         let (loss, slopes) = smooth_l1(&[0.5, 9.0, -2.0], &vec![[Some(0.1), None, Some(1.0)]]);

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::checkpoint::CheckpointError;
 use super::footage::FootageError;
+use super::run_folder::CHECKPOINT;
 
 /// Why a training could not start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -31,12 +32,15 @@ pub enum TrainError {
     },
     /// There is no room in the run folder.
     #[error(
-        "the disk is too full to write {}; make room, then go on from the last checkpoint with --resume",
-        path.display()
+        "the disk is too full to write {}; make room, then {}",
+        path.display(),
+        if *checkpoint { "go on from the last checkpoint with --resume" } else { "begin anew in a new folder" }
     )]
     Full {
         /// The file.
         path: PathBuf,
+        /// Whether a checkpoint lies beside it.
+        checkpoint: bool,
     },
     /// A file of the run folder cannot be read.
     #[error("cannot read {}: {source}; it belongs to the training and must stay where it is", path.display())]
@@ -58,8 +62,8 @@ pub enum TrainError {
     /// There is no checkpoint in the folder.
     #[error("{} holds no checkpoint to go on from; check the folder, or start anew without --resume", .0.display())]
     NothingToResume(PathBuf),
-    /// The weights to begin with cannot be used.
-    #[error("cannot begin with the weights {}: {reason}", path.display())]
+    /// Weights to begin with, or to run, cannot be used.
+    #[error("cannot use the weights {}: {reason}", path.display())]
     Weights {
         /// The file.
         path: PathBuf,
@@ -76,7 +80,10 @@ impl TrainError {
     pub(super) fn writing(path: &Path, source: io::Error) -> Self {
         let path = path.to_owned();
         match source.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full { path },
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                let checkpoint = path.join(CHECKPOINT).exists() || path.with_file_name(CHECKPOINT).exists();
+                Self::Full { path, checkpoint }
+            }
             _ => Self::Folder { path, source },
         }
     }

@@ -45,6 +45,8 @@ pub trait ScanSet: Sync {
 pub enum Conditions {
     /// All by these settings.
     Same(ScanSettings),
+    /// As fits each clip: [`ScanSettings::over`].
+    Fitting,
     /// The first half as the reference's, the second half as varied as training's scans can be: what holds on both is likely
     /// to hold elsewhere.
     HalfVaried,
@@ -72,7 +74,7 @@ impl Benchmark {
     /// None in practice: its pictures are large enough.
     pub fn reference(count: usize) -> Result<Self, ClipError> {
         let clips = reference(Split::Test, count.min(COUNT) as u64)?;
-        let conditions = Conditions::Same(ScanSettings::reference());
+        let conditions = Conditions::Fitting;
         Ok(Self { clips, conditions, seed: SEED, count, frames: FRAMES })
     }
 
@@ -84,8 +86,9 @@ impl Benchmark {
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64);
         let settings = match self.conditions {
             Conditions::Same(settings) => settings,
-            Conditions::HalfVaried if index < self.count / 2 => ScanSettings::reference(),
-            Conditions::HalfVaried => Variety { share: 1.0 }.draw(&mut ChaCha8Rng::seed_from_u64(!seed)),
+            Conditions::Fitting => ScanSettings::over(&clip),
+            Conditions::HalfVaried if index < self.count / 2 => ScanSettings::over(&clip),
+            Conditions::HalfVaried => Variety { share: 1.0 }.draw(&clip, &mut ChaCha8Rng::seed_from_u64(!seed)),
         };
         Scan::new(clip, settings, seed)
     }

@@ -1,32 +1,25 @@
 //! Footage to scan: a video (decoded by ffmpeg), an image, or a folder of images, as gray pictures 480 lines high at
 //! most.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::clip::{Area, Clip, ClipError};
-use crate::camera::footage::ffmpeg;
-use crate::imaging::{ContentArea, GrayImage, content_area, decode_any};
+use crate::camera::footage::{self, ffmpeg, is_picture};
+use crate::imaging::{ContentArea, GrayImage, content_area, decode};
 use crate::notices::tell;
 
 /// Most lines of a picture: the height the paper's walks are meant for.
 const LINES: u32 = 480;
 /// Most frames taken of one video: a minute at 25 a second.
 const FRAMES: usize = 1500;
-const IMAGES: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
 /// Why footage cannot be scanned.
 #[derive(Debug, thiserror::Error)]
 pub enum FootageError {
     /// It cannot be read.
-    #[error("cannot read {}: {reason}", path.display())]
-    Unreadable {
-        /// The file or folder.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
+    #[error(transparent)]
+    Source(#[from] footage::FootageError),
     /// Its pictures are of no use.
     #[error("cannot scan {}: {source}", path.display())]
     Unusable {
@@ -48,53 +41,33 @@ pub fn clips(path: &Path) -> Result<Vec<Arc<Clip>>, FootageError> {
         move |source| FootageError::Unusable { path, source }
     };
     if path.is_dir() {
-        let files = images_in(path)?;
-        if files.is_empty() {
-            return Err(unusable(path)(ClipError::Empty));
-        }
-        return files
+        return footage::pictures_in(path)?
             .iter()
             .map(|file| clip(vec![Arc::new(image(file)?)]).map(Arc::new).map_err(unusable(file)))
             .collect();
     }
-    let frames = if is_image(path) { vec![Arc::new(image(path)?)] } else { video(path)? };
+    let frames = if is_picture(path) { vec![Arc::new(image(path)?)] } else { video(path)? };
     Ok(vec![Arc::new(clip(frames).map_err(unusable(path))?)])
 }
 
-fn is_image(path: &Path) -> bool {
-    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
-    IMAGES.contains(&extension.as_str())
-}
-
-fn images_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
-    let unreadable = |error: std::io::Error| unreadable(folder, &error.to_string());
-    let entries = std::fs::read_dir(folder).map_err(unreadable)?;
-    let mut files = Vec::new();
-    for entry in entries {
-        let file = entry.map_err(|error| self::unreadable(folder, &error.to_string()))?.path();
-        if is_image(&file) {
-            files.push(file);
-        }
-    }
-    files.sort();
-    Ok(files)
-}
-
 fn unreadable(path: &Path, reason: &str) -> FootageError {
-    FootageError::Unreadable { path: path.to_owned(), reason: reason.to_owned() }
+    footage::FootageError::unreadable(path, reason).into()
 }
 
 fn image(path: &Path) -> Result<GrayImage, FootageError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
-    let picture = decode_any(&bytes).map_err(|error| unreadable(path, &error.to_string()))?;
-    let picture = if picture.height() > LINES {
-        picture.resize(u32::MAX, LINES, image::imageops::FilterType::Triangle)
-    } else {
-        picture
-    };
-    let gray = picture.to_luma8();
-    let (width, height) = (gray.width() as usize, gray.height() as usize);
-    Ok(GrayImage { width, height, data: gray.into_raw().into_iter().map(f32::from).collect() })
+    let picture = decode(&bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
+    let (_, gray) = picture.developed();
+    if gray.height <= LINES as usize {
+        return Ok(gray);
+    }
+    #[allow(clippy::cast_possible_truncation, reason = "decoded pictures have 16384 pixels a side at most")]
+    let (width, height) = (gray.width as u32, gray.height as u32);
+    let scaled = (width * LINES / height).max(1);
+    let whole = image::ImageBuffer::<image::Luma<f32>, _>::from_raw(width, height, gray.data)
+        .ok_or_else(|| unreadable(path, "its pixels do not fit its size"))?;
+    let small = image::imageops::resize(&whole, scaled, LINES, image::imageops::FilterType::Triangle);
+    Ok(GrayImage { width: scaled as usize, height: LINES as usize, data: small.into_raw() })
 }
 
 fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
@@ -106,7 +79,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
         .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
         .output()
-        .map_err(|error| unreadable(path, &format!("ffmpeg, which decodes videos, cannot be started: {error}")))?;
+        .map_err(footage::FootageError::NoDecoder)?;
     let told = String::from_utf8_lossy(&output.stderr);
     let told = told.lines().last();
     if !output.status.success() {
@@ -194,10 +167,24 @@ mod tests {
     fn missing_and_empty_footage_is_told() {
         let folder = tempfile::tempdir().unwrap();
         assert!(clips(&folder.path().join("no.mp4")).unwrap_err().to_string().contains("there is no such file"));
-        assert!(clips(folder.path()).unwrap_err().to_string().contains("there are no pictures"));
+        assert!(clips(folder.path()).unwrap_err().to_string().contains("there is no picture"));
         let small = folder.path().join("small.png");
         image::GrayImage::new(40, 40).save(&small).unwrap();
         assert!(clips(&small).unwrap_err().to_string().contains("at least 64x64"));
+    }
+
+    #[test]
+    fn a_mosaic_is_developed_not_taken_for_a_gray_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("mosaic.png");
+        // An even surface, of which each band sees another share.
+        let sample = |x: u32, y: u32| image::Luma([100 + 40 * (4 * (y % 4) + x % 4) as u16]);
+        image::ImageBuffer::from_fn(2048, 1088, sample).save(&file).unwrap();
+        let clips = clips(&file).unwrap();
+        let picture = clips[0].at(0);
+        assert_eq!((picture.width, picture.height), (512, 272), "a pixel for each 4x4 samples");
+        let (least, most) = picture.data.iter().fold((f32::MAX, f32::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+        assert!(least > 0.0 && most - least < 0.5, "{least} to {most}");
     }
 
     #[test]

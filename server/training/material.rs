@@ -54,8 +54,9 @@ impl Material {
         let known: Vec<PathBuf> = known.lines().map(PathBuf::from).collect();
         let names = known.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         let from = if asked.is_empty() { &known } else { asked };
+        let gone = asked.is_empty() && known.iter().any(|path| !path.exists());
         let material = Self::open(from, pictures).map_err(|error| match error {
-            TrainError::Footage(error) if asked.is_empty() => {
+            TrainError::Footage(error) if gone => {
                 let advice = "give --footage with the place where it lies now";
                 TrainError::Differs(format!("the footage that this training was begun on is gone: {error}; {advice}"))
             }

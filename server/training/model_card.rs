@@ -32,12 +32,15 @@ pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
     )
 }
 
-/// `card` with the figures `row` on `count` scans of the reference benchmark, unless it has such figures.
+const BENCHMARK: &str = "of the reference benchmark";
+
+/// Whether `card` has figures on the reference benchmark.
+pub(super) fn is_benchmarked(card: &str) -> bool {
+    card.contains(BENCHMARK)
+}
+
+/// `card` with the figures `row` on `count` scans of the reference benchmark.
 pub(super) fn benchmarked(card: &str, row: &Row, count: usize) -> String {
-    const BENCHMARK: &str = "of the reference benchmark";
-    if card.contains(BENCHMARK) {
-        return card.to_owned();
-    }
     format!("{card}\nOn {count} scans {BENCHMARK} (seed {SEED}): {}.\n", figures(row))
 }
 

@@ -181,3 +181,52 @@ fn apply(
 fn inverse_root(squared: &Tensor, least: f64) -> Tensor {
     (squared + least * least).rsqrt_()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a variable that begins at 0 stands after a step down each of `gradients`.
+    fn descended(rule: Rule, clip: f64, scale: f64, gradients: &[f64]) -> f64 {
+        let store = nn::VarStore::new(tch::Device::Cpu);
+        let variable = store.root().zeros("variable", &[1]);
+        let mut optimiser = Optimiser::new(rule, &store);
+        for gradient in gradients {
+            optimiser.minimise(&(&variable * *gradient).sum(tch::Kind::Float), clip, scale);
+        }
+        variable.double_value(&[0])
+    }
+
+    #[test]
+    fn rms_prop_by_hand() {
+        let rule = Rule::RmsProp { learning_rate: 0.1, momentum: 0.9 };
+        // Mean square 0.01, so 1 / 0.1 goes into the momentum; then 0.0199, so 0.9 * 10 + 1 / sqrt(0.0199).
+        for (gradients, expected) in [(&[1.0][..], -1.0), (&[1.0, 1.0], -1.0 - 1.608_881_2), (&[1.0, 0.0], -1.9)] {
+            let stands = descended(rule, 10.0, 1.0, gradients);
+            assert!((stands - expected).abs() < 1e-5, "{gradients:?}: {stands}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn adam_by_hand() {
+        let rule = Rule::Adam { learning_rate: 0.1 };
+        // Down one and the same slope each step is the learning rate, however steep it is. After it turned round the mean
+        // gradient is -0.01 / 0.19, and the mean square still 1.
+        let turned = -0.1 + 0.1 * 0.01 / 0.19;
+        for (gradients, expected) in
+            [(&[1.0; 3][..], -0.3), (&[50.0; 3], -0.3), (&[0.02; 3], -0.3), (&[1.0, -1.0], turned)]
+        {
+            let stands = descended(rule, 100.0, 1.0, gradients);
+            assert!((stands - expected).abs() < 1e-5, "{gradients:?}: {stands}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn steps_are_scaled_and_gradients_clipped() {
+        let rule = Rule::Adam { learning_rate: 0.1 };
+        assert!((descended(rule, 100.0, 0.5, &[1.0]) + 0.05).abs() < 1e-6);
+        // 3 cut to 1 is 1: what follows is as down two equal slopes.
+        assert!((descended(rule, 1.0, 1.0, &[3.0, 1.0]) + 0.2).abs() < 1e-5);
+        assert!((descended(rule, 100.0, 1.0, &[3.0, 1.0]) + 0.2).abs() > 1e-3);
+    }
+}

@@ -16,7 +16,7 @@ use crate::autofocus::shipped::{Design, design};
 pub struct Recipe {
     /// The policy it makes.
     pub policy: String,
-    /// Pictures drawn to train on, where no footage is given.
+    /// Pictures drawn to train on, where no footage is given; validation draws as many others, 60 at most.
     pub pictures: u64,
     /// Updates from one validation to the next; a checkpoint is written with each.
     pub validate_every: u64,

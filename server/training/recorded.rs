@@ -127,12 +127,6 @@ impl RecordedScan {
         Self { powers, poses }
     }
 
-    /// The focal powers, rising.
-    #[must_use]
-    pub fn powers(&self) -> &[FocalPower] {
-        &self.powers
-    }
-
     /// The poses.
     #[must_use]
     pub fn poses(&self) -> &[Stack] {
@@ -199,13 +193,13 @@ fn mixed(low: &[u8; PIXELS], high: &[u8; PIXELS], part: f64) -> Patch {
 
 /// A recorded scan being replayed, a pose a frame; at the last one it stays.
 #[derive(Debug, Clone)]
-pub struct Replay {
+pub struct Playing {
     scan: Arc<RecordedScan>,
     between: Between,
     pose: usize,
 }
 
-impl FocalTimeScan for Replay {
+impl FocalTimeScan for Playing {
     fn observe(&mut self, focal_power: FocalPower) -> Patch {
         self.scan.see(self.pose, focal_power, self.between)
     }
@@ -236,7 +230,7 @@ impl ScanSet for Recorded {
     fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize) {
         let scan = Arc::clone(&self.scans[index]);
         let frames = scan.poses.len();
-        (Box::new(Replay { scan, between: self.between, pose: 0 }), frames)
+        (Box::new(Playing { scan, between: self.between, pose: 0 }), frames)
     }
 
     fn parts(&self) -> usize {

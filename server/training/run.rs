@@ -166,6 +166,7 @@ impl Run {
         let file = |source| TrainError::writing(&folder, source);
         let mut events = EventFile::create(&folder, clock, self.updates()).map_err(file)?;
         let end = self.recipe.updates();
+        let mut saved = None;
         while self.updates() < end && !stop() {
             let loss = self.leg(end);
             let updates = self.updates();
@@ -178,10 +179,14 @@ impl Run {
             self.curve.push((updates, loss, validation));
             if due {
                 self.save()?;
+                saved = Some(updates);
             }
             tell(&Progress { updates, loss, epsilon: self.trainer.epsilon(), validation });
         }
-        self.save()?;
+        // A checkpoint with its replay memory may hold gigabytes.
+        if saved != Some(self.updates()) {
+            self.save()?;
+        }
         Ok(self.updates() >= end)
     }
 
@@ -234,10 +239,14 @@ impl Run {
         if count == 0 || !self.best.is_finite() {
             return Ok(());
         }
+        let card = String::from_utf8_lossy(&self.folder.read(CARD)?).into_owned();
+        if model_card::is_benchmarked(&card) {
+            return Ok(());
+        }
+        let weights = beginning(self.design, &self.folder.path().join(self.weights_file()))?;
         let benchmark = Benchmark::reference(count).map_err(|error| TrainError::Recipe(error.to_string()))?;
-        let row = self.figures(self.folder.read(&self.weights_file())?, &benchmark)?;
-        let card = model_card::benchmarked(&String::from_utf8_lossy(&self.folder.read(CARD)?), &row, count);
-        self.folder.write(CARD, card.as_bytes())
+        let row = self.figures(weights, &benchmark)?;
+        self.folder.write(CARD, model_card::benchmarked(&card, &row, count).as_bytes())
     }
 
     /// The figures of the weights in `bytes` on `scans`.

@@ -8,7 +8,8 @@ use super::checkpoint::Checkpoint;
 use super::error::TrainError;
 use crate::files;
 
-const CHECKPOINT: &str = "checkpoint.safetensors";
+/// The checkpoint's name.
+pub(super) const CHECKPOINT: &str = "checkpoint.safetensors";
 const LOCK: &str = ".lock";
 
 /// A training's folder.
@@ -134,7 +135,14 @@ mod tests {
 
     #[test]
     fn a_full_disk_is_told_with_what_to_do() {
-        let error = TrainError::writing(Path::new("runs/a/b"), io::ErrorKind::StorageFull.into()).to_string();
-        assert!(error.contains("runs/a/b") && error.contains("make room") && error.contains("--resume"), "{error}");
+        let folder = tempfile::tempdir().unwrap();
+        let told = |path: &Path| TrainError::writing(path, io::ErrorKind::StorageFull.into()).to_string();
+        let file = folder.path().join("curves.csv");
+        let error = told(&file);
+        assert!(error.contains("curves.csv") && error.contains("make room, then begin anew"), "{error}");
+        fs::write(folder.path().join(CHECKPOINT), "").unwrap();
+        for path in [&file, folder.path()] {
+            assert!(told(path).contains("make room, then go on from the last checkpoint with --resume"));
+        }
     }
 }

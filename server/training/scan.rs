@@ -57,6 +57,12 @@ impl ScanSettings {
     pub fn reference() -> Self {
         Self { crop: Motion { speed: 5.0, memory: 30.0 }, ..Self::default() }
     }
+
+    /// What fits `clip`: the reference's over a still picture, the default over a video.
+    #[must_use]
+    pub fn over(clip: &Clip) -> Self {
+        if clip.len() > 1 { Self::default() } else { Self::reference() }
+    }
 }
 
 impl Default for ScanSettings {
@@ -150,12 +156,6 @@ impl Scan {
     #[must_use]
     pub fn optimum(&self) -> FocalPower {
         FocalPower::nearest(self.focus.position())
-    }
-
-    /// Pixels of blur (standard deviation) a unit of focal power.
-    #[must_use]
-    pub const fn blur(&self) -> f64 {
-        self.sigma0
     }
 
     /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.

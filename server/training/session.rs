@@ -35,7 +35,7 @@ impl Session {
     /// A session on a scan drawn by `rng` from `clips`, which must not be empty.
     pub fn draw(clips: &[Arc<Clip>], variety: Variety, wandering: f64, rng: &mut ChaCha8Rng) -> Self {
         let clip = Arc::clone(&clips[rng.random_range(0..clips.len())]);
-        let settings = variety.draw(rng);
+        let settings = variety.draw(&clip, rng);
         let scan = Scan::new(clip, settings, rng.random());
         let slow = rng.random_bool(0.4 * variety.share);
         let response = if slow { rng.random_range(0.4..1.0) } else { 1.0 };

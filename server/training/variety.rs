@@ -2,6 +2,7 @@
 
 use rand::{Rng, RngExt};
 
+use super::clip::Clip;
 use super::defocus::Spot;
 use super::scan::ScanSettings;
 use super::unrest::Restlessness;
@@ -10,14 +11,14 @@ use crate::camera::walk::{Motion, standard_normal};
 /// How far training leaves the reference's scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variety {
-    /// How much of the variety to apply: 0 gives reference scans, 1 all of it.
+    /// How much of the variety to apply: 0 gives plain scans, over still pictures the reference's, 1 all of it.
     pub share: f64,
 }
 
 impl Variety {
-    /// Settings for one scan: with probability `share` varied in speed, spot, noise, exposure and what else is in view.
-    pub fn draw(&self, rng: &mut impl Rng) -> ScanSettings {
-        let mut settings = ScanSettings::reference();
+    /// Settings for one scan over `clip`: with probability `share` varied in speed, spot, noise, exposure and what else is in view.
+    pub fn draw(&self, clip: &Clip, rng: &mut impl Rng) -> ScanSettings {
+        let mut settings = ScanSettings::over(clip);
         if !rng.random_bool(self.share) {
             return settings;
         }

@@ -135,7 +135,7 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
 #[tokio::test]
 async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart() {
     let server = Server::start();
-    let session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
+    let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
     let mut page = Page::open(&server, "operator").await;
     session.operator("/api/operator/focus", json!({"policy": "parfocal"})).await;
     page.until_belief().await;
@@ -148,6 +148,21 @@ async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart
     page.until(|told| told["type"] == "status" && told["policy"].is_null()).await;
     page.heard.clear();
     page.watch(5).await;
+    let id = session.view().await["session"].clone();
+    let act = |action: &str| json!({"session": id, "action": action, "reason": "a question"});
+    session.operator("/api/operator/actions", act("start")).await;
+    for _ in 0..2 {
+        let view = session.view().await;
+        let tap = |action: &str| json!({"session": id, "action": action, "segment": view["segment"]});
+        session.surgeon("/api/surgeon/actions", tap("acknowledge")).await;
+        page.watch(10).await;
+        session.operator("/api/operator/actions", act("pause")).await;
+        page.watch(5).await;
+        session.operator("/api/operator/actions", act("resume")).await;
+        page.watch(10).await;
+        session.surgeon("/api/surgeon/actions", tap("finish-segment")).await;
+        session.answer().await;
+    }
     page.until(|told| told["type"] == "status").await;
     assert!(!metrics(&session).await.contains("latency"), "how long a step takes tells a network from a hill-climber");
     let told: Vec<_> = page.heard.iter().map(|message| format!("{message:?}")).collect();

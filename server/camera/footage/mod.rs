@@ -8,6 +8,7 @@ mod reel;
 mod video;
 
 pub use reel::picture_reader;
+pub(crate) use reel::{is_picture, pictures_in};
 pub use video::{FootageError, Video, ffmpeg};
 
 use std::time::Duration;

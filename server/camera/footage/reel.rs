@@ -9,7 +9,7 @@ use image::ImageReader;
 
 use super::clip::Clip;
 use super::video::FootageError;
-use crate::imaging::{RgbImage, decode_any};
+use crate::imaging::{RgbImage, decode};
 
 /// Most pixels across and down: what the blur can follow in real time.
 pub(super) const WIDTH: usize = 1024;
@@ -91,15 +91,18 @@ pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
-    let picture = decode_any(&bytes).map_err(|error| FootageError::unreadable(file, error))?;
-    let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
-    let scaled = if fits {
-        picture
-    } else {
-        #[allow(clippy::cast_possible_truncation, reason = "small constants")]
-        picture.resize(WIDTH as u32, HEIGHT as u32, image::imageops::FilterType::Triangle)
-    };
-    let rgb = scaled.to_rgb8();
+    let (picture, _) = decode(&bytes, false).map_err(|error| FootageError::unreadable(file, error))?.developed();
+    if picture.width <= WIDTH && picture.height <= HEIGHT {
+        large_enough(file, picture.width, picture.height)?;
+        return Ok(picture);
+    }
+    #[allow(clippy::cast_possible_truncation, reason = "decoded pictures have 16384 pixels a side at most")]
+    let whole = image::RgbImage::from_raw(picture.width as u32, picture.height as u32, picture.data)
+        .ok_or_else(|| FootageError::unreadable(file, "its pixels do not fit its size"))?;
+    #[allow(clippy::cast_possible_truncation, reason = "small constants")]
+    let scaled =
+        image::DynamicImage::from(whole).resize(WIDTH as u32, HEIGHT as u32, image::imageops::FilterType::Triangle);
+    let rgb = scaled.into_rgb8();
     let (width, height) = (rgb.width() as usize, rgb.height() as usize);
     large_enough(file, width, height)?;
     RgbImage::new(width, height, rgb.into_raw()).map_err(|error| FootageError::unreadable(file, error))
@@ -112,13 +115,14 @@ pub(super) fn large_enough(path: &Path, width: usize, height: usize) -> Result<(
     Err(FootageError::TooSmall { path: path.to_owned(), width, height, least: LEAST })
 }
 
-fn is_picture(path: &Path) -> bool {
+/// Whether its name says that `path` is a picture.
+pub(crate) fn is_picture(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
 /// The pictures in a folder, by name.
-fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
+pub(crate) fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     let unreadable = |error: std::io::Error| FootageError::unreadable(folder, error);
     let entries = std::fs::read_dir(folder).map_err(unreadable)?;
     let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>();

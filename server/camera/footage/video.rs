@@ -42,7 +42,7 @@ pub enum FootageError {
 }
 
 impl FootageError {
-    pub(super) fn unreadable(path: &Path, reason: impl std::fmt::Display) -> Self {
+    pub(crate) fn unreadable(path: &Path, reason: impl std::fmt::Display) -> Self {
         Self::Unreadable { path: path.to_owned(), reason: reason.to_string() }
     }
 }

@@ -113,7 +113,9 @@ impl Recording {
         let (width, height) = shot.images.first().map_or((0, 0), |(_, picture)| (picture.width, picture.height));
         let Shot { pose, patch, optimum, truth, .. } = *shot;
         let pose = Pose { pose, width, height, patch: (patch.x, patch.y), optimum, truth, images };
-        self.note(&pose)?;
+        self.note(&pose).inspect_err(|_| {
+            let _ = fs::remove_dir_all(&whole);
+        })?;
         Ok(pose)
     }
 

@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Print one JSON object a line instead of a table
     #[arg(long)]
     json: bool,
-    /// Write each picture with its content area, patch and metrics drawn in to this folder, as PNG
+    /// Write each picture, with its content area, patch and metrics drawn in, into this folder as PNG
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take 16-bit gray pictures of any size as mosaics

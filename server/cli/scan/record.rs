@@ -77,7 +77,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (done, out) = (recording.folder().poses().len(), arguments.out.display());
     match outcome {
         Ok(()) => print(&format!("{done} poses in {out}; look at them with `parfocal scan info {out}`\n")),
-        Err(_) if interrupt.asked() => print(&format!(
+        // The stepper's command is interrupted by the same key.
+        Err(RecordError::Stopped | RecordError::Stepper(_)) if interrupt.asked() => print(&format!(
             "stopped: {done} of {} poses are kept in {out}; run the same command again to go on\n",
             arguments.poses
         )),

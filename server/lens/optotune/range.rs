@@ -77,12 +77,6 @@ impl Range {
         FocalPower::nearest((f64::from(raw) - min) / (max - min))
     }
 
-    /// Dioptres of `raw`.
-    #[must_use]
-    pub fn dioptre(self, raw: i16) -> f64 {
-        self.scale.dioptre(raw)
-    }
-
     /// Dioptres at focal power 0.
     #[must_use]
     pub fn min_dioptre(self) -> f64 {
