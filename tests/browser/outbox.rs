@@ -54,6 +54,36 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         "what was replaced is not sent once more, after its successor"
     );
 
+    // The same, when the tablet's clock was set back between the two.
+    let script = r#"
+        const outbox = new Outbox();
+        const clock = Date.now;
+        let fail;
+        answers.push(new Promise((done) => (fail = () => done(ours(507)))));
+        const arrived = new Promise((done) => arrivals.push(done));
+        outbox.add("/answers", { value: 3 }, "sharpness");
+        await arrived;
+        Date.now = () => clock() - 60000;
+        outbox.add("/answers", { value: 5 }, "sharpness");
+        const done = saved(outbox);
+        fail();
+        await done;
+        Date.now = clock;
+        return [posted, kept()];
+    "#;
+    assert_eq!(run(&page, script).await, json!([[3, 5], 0]), "what was said last counts");
+
+    // Only the server's own word that it is kept takes it off the device.
+    let script = r#"
+        const outbox = new Outbox();
+        answers.push(Promise.resolve(new Response("", { status: 200 })), Promise.resolve(new Response("{}", { status: 200 })));
+        const done = saved(outbox);
+        outbox.add("/comments", { value: "d" });
+        await done;
+        return [posted, kept()];
+    "#;
+    assert_eq!(run(&page, script).await, json!([["d", "d", "d"], 0]));
+
     // A page of a proxy's is no answer of the server's.
     let script = r#"
         const outbox = new Outbox();

@@ -21,6 +21,15 @@ impl Theatre<'_> {
         self.operator.sees("#new-session", "Participant").await;
     }
 
+    /// The questions after a setting are answered on another device.
+    async fn answer_elsewhere(&self, driver: &Driver) {
+        let other = driver.browser().await;
+        other.open(&self.server.url(&format!("/enter?key={}", self.server.key("surgeon")))).await;
+        other.click("input[name=sharpness][value='3']").await;
+        other.sees("[data-question=sharpness] > .state", "Saved").await;
+        other.click(".questions .done button").await;
+    }
+
     /// Waits until what `sql` gives, in the database, is `expected`.
     async fn keeps(&self, sql: &'static str, expected: &[&str]) {
         let pool = crate::theatre::database(self.server.data.path()).await;
@@ -97,13 +106,8 @@ async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish()
     for letter in first.chars() {
         press(surgeon, &letter.to_string(), &letter.to_string(), false).await;
     }
-    // The questions answered on another device bring the notice of the next setting.
-    let page = theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")));
-    let other = driver.browser().await;
-    other.open(&page).await;
-    other.click("input[name=sharpness][value='3']").await;
-    other.sees("[data-question=sharpness] > .state", "Saved").await;
-    other.click(".questions .done button").await;
+    // That brings the notice of the next setting.
+    theatre.answer_elsewhere(&driver).await;
     surgeon.sees("#change-title", "Setting 2 of ").await;
     for letter in rest.chars() {
         press(surgeon, &letter.to_string(), &letter.to_string(), false).await;
@@ -122,4 +126,65 @@ async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish()
     assert!(surgeon.text("#finish").await.contains("Tap again"), "a key held down is one press");
     press(surgeon, "Enter", "\r", false).await;
     surgeon.sees("#panel h2", "a few questions").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_box_takes_nothing_before_the_page_knows_what_it_would_be_about() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let surgeon = &theatre.surgeon;
+    // A network that swallows everything, from the page's first moment.
+    let silence =
+        "window.fetch = () => new Promise(() => {}); window.WebSocket = class extends EventTarget { close() {} };";
+    surgeon.tools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": silence })).await;
+    surgeon.reload().await;
+    let disabled = surgeon.run("return document.getElementById('comment').disabled", json!([])).await;
+    assert_eq!(disabled, true, "what is typed there could not be kept");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_long_comment_left_behind_leaves_the_next_participant_a_box_as_ever() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    theatre.begin("S-10", "short").await;
+    theatre.tap_notice(1).await;
+    theatre.write(&"so much to say of this ".repeat(6)).await;
+    theatre.put_away().await;
+    theatre.begin("S-11", "short").await;
+    theatre.tap_notice(1).await;
+    let state = "const box = document.getElementById('comment'); return [box.value, box.className,
+                 getComputedStyle(document.getElementById('quick')).visibility]";
+    assert_eq!(theatre.surgeon.run(state, json!([])).await, json!(["", "", "visible"]));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_comment_that_comes_back_refused_is_still_about_its_setting() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let surgeon = &theatre.surgeon;
+    theatre.begin("S-12", "short").await;
+    theatre.tap_notice(1).await;
+    // Longer than the server takes, and its refusal on the way until the next setting has begun.
+    let send = "const sent = window.fetch;
+                const held = new Promise((done) => (window.release = done));
+                window.fetch = async (path, request) => {
+                    if (path.endsWith('/comments')) await held;
+                    return sent(path, request);
+                };
+                const box = document.getElementById('comment');
+                box.value = 'long '.repeat(4000);
+                box.dispatchEvent(new Event('input'));
+                document.getElementById('send').click();";
+    surgeon.run(send, json!([])).await;
+    theatre.finish().await;
+    theatre.answer_elsewhere(&driver).await;
+    theatre.tap_notice(2).await;
+    surgeon.run("window.release()", json!([])).await;
+    surgeon.sees("#comment-trouble", "it is back in the box").await;
+    surgeon.sees("#about", "This comment is about setting 1.").await;
+    let shorten = "const box = document.getElementById('comment'); box.value = 'short';
+                   box.dispatchEvent(new Event('input')); document.getElementById('send').click();";
+    surgeon.run(shorten, json!([])).await;
+    let sql = "SELECT text || ' ' || setting FROM comments JOIN segments USING (segment)";
+    theatre.keeps(sql, &["short 1"]).await;
 }
