@@ -34,6 +34,7 @@ static ASSETS: &[Asset] = &assets![
     "devices.js",
     "dialogs.js",
     "dom.js",
+    "focus.js",
     "icon.svg",
     "live.js",
     "operator.css",

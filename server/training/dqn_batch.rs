@@ -205,8 +205,10 @@ mod tests {
         assert_eq!(far(&[0.0])[0], 0, "the lens cannot go there");
     }
 
-    fn rounded(value: f64) -> f64 {
-        (1e4 * value).round() / 1e4
+    /// In ten thousandths.
+    #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
+    fn rounded(value: f64) -> i32 {
+        (1e4 * value).round() as i32
     }
 
     #[test]
@@ -215,10 +217,10 @@ mod tests {
         (steps[0].next_optimum, steps[1].next_optimum) = (0.62, 0.5);
         let plain = Returns { discount: 0.5, steps: 2, regret: false };
         // -(0.62 - 0.55) - 0.5 * (0.6 - 0.5), and a quarter of what the last state is worth.
-        assert_eq!(rounded(plain.of(&steps, 0, 4.0)), rounded(-0.12 + 1.0));
+        assert_eq!(rounded(plain.of(&steps, 0, 4.0)), 8800);
         // An oracle at 0.5 is 0.07, then 0.02 away from 0.62; at the end, 0. In steps, over the horizon of two frames.
         let regret = Returns { regret: true, ..plain };
-        assert_eq!(rounded(regret.of(&steps, 0, 4.0)), rounded((-0.12 + 0.08) * 10.0 + 1.0));
+        assert_eq!(rounded(regret.of(&steps, 0, 4.0)), 6000);
     }
 
     #[test]
@@ -241,13 +243,13 @@ mod tests {
             .map(|row| row.iter().enumerate().find_map(|(action, value)| value.map(|v| (action, rounded(v.into())))))
             .collect();
         let by_hand = [
-            Some((1, 10.0)), // 0 + 20 / 2
-            None,            // the scan ends
-            Some((1, 19.8)), // -0.2 + 40 / 2
-            None,            // the window ends
-            Some((1, 29.6)), // -0.4 + 60 / 2
-            Some((2, 34.5)), // -0.5 + 70 / 2
-            Some((1, 39.4)), // -0.6 + 80 / 2
+            Some((1, 100_000)), // 0 + 20 / 2
+            None,               // the scan ends
+            Some((1, 198_000)), // -0.2 + 40 / 2
+            None,               // the window ends
+            Some((1, 296_000)), // -0.4 + 60 / 2
+            Some((2, 345_000)), // -0.5 + 70 / 2
+            Some((1, 394_000)), // -0.6 + 80 / 2
             None,
         ];
         assert_eq!(told, by_hand);

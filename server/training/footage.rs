@@ -178,7 +178,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("mosaic.png");
         // An even surface, of which each band sees another share.
-        let sample = |x: u32, y: u32| image::Luma([100 + 40 * (4 * (y % 4) + x % 4) as u16]);
+        let bands: Vec<u16> = (0..16).map(|band| 100 + 40 * band).collect();
+        let sample = |x: u32, y: u32| image::Luma([bands[(4 * (y % 4) + x % 4) as usize]]);
         image::ImageBuffer::from_fn(2048, 1088, sample).save(&file).unwrap();
         let clips = clips(&file).unwrap();
         let picture = clips[0].at(0);

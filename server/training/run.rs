@@ -166,7 +166,6 @@ impl Run {
         let file = |source| TrainError::writing(&folder, source);
         let mut events = EventFile::create(&folder, clock, self.updates()).map_err(file)?;
         let end = self.recipe.updates();
-        let mut saved = None;
         while self.updates() < end && !stop() {
             let loss = self.leg(end);
             let updates = self.updates();
@@ -179,15 +178,14 @@ impl Run {
             self.curve.push((updates, loss, validation));
             if due {
                 self.save()?;
-                saved = Some(updates);
             }
             tell(&Progress { updates, loss, epsilon: self.trainer.epsilon(), validation });
         }
-        // A checkpoint with its replay memory may hold gigabytes.
-        if saved != Some(self.updates()) {
+        let complete = self.updates() >= end;
+        if !complete {
             self.save()?;
         }
-        Ok(self.updates() >= end)
+        Ok(complete)
     }
 
     /// One leg: as many updates as lie before the next multiple of [`LEG`], on scans that begin anew.

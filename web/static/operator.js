@@ -1,28 +1,23 @@
-// The operator's page: the devices, who focuses, and the session from preparing it to its end.
+// The operator's page: the devices and the session from preparing it to its end.
 
 import { get, heardAgain, post, Refused, tellTrouble } from "./api.js";
 import { drawCamera } from "./camera.js";
 import { askIn, askReason, askWhetherMeant } from "./dialogs.js";
 import { byId, clockText, make, redraw, setText } from "./dom.js";
 import { drawDevices, drawDeviceWords, drawWarnings } from "./devices.js";
+import { BY_HAND, drawFocus, UNTOLD } from "./focus.js";
 import { unlessOvertaken } from "./live.js";
 import { mountViewer } from "./viewer.js";
 
-const BY_HAND = "by-hand";
-/** What the list of policies shows while nobody is told which one runs. */
-const UNTOLD = "";
 const viewer = mountViewer(byId("view"), { role: "operator", traces: byId("traces") });
 const followAnswer = unlessOvertaken(viewer.live, followSession);
 let session = null;
 let choices = null;
 let endsAt = null;
 
-/* Devices and focus */
+/* Devices */
 
 let status = null;
-let dragging = false;
-let ordered = null;
-let ordering = false;
 
 function followStatus(next) {
   status = next;
@@ -30,63 +25,8 @@ function followStatus(next) {
   drawDeviceWords(byId("device-words"), status);
   drawWarnings(byId("warnings"), status);
   drawCamera(status.camera_offer);
-  drawFocus();
+  drawFocus(status, session !== null);
 }
-
-function drawFocus() {
-  // The status that tells again comes after the word that the session is closed.
-  const untold = session !== null || status.focal_power === null;
-  const wasUntold = byId("policy").value === UNTOLD;
-  byId("focus-controls").disabled = untold;
-  byId("traces-hidden").hidden = !untold;
-  if (untold) return drawUntold();
-  const power = status.focal_power.toFixed(3);
-  setText(byId("focus-now"), `focal power ${power}`);
-  if (dragging || ordering) return;
-  byId("policy").value = status.policy ?? BY_HAND;
-  if (status.policy === null && !wasUntold) return;
-  byId("focal-power").value = status.focal_power;
-  setText(byId("focal-power-value"), power);
-}
-
-/** Nothing of before the session stays, which would look as if it held now. */
-function drawUntold() {
-  setText(byId("focus-now"), "The session decides until it is closed.");
-  byId("policy").value = UNTOLD;
-  byId("focal-power").value = 0.5;
-  setText(byId("focal-power-value"), "");
-}
-
-/** One order at a time, so that the last one given is the last to arrive; those overtaken meanwhile are left out. */
-async function focus(order) {
-  ordered = order;
-  if (ordering) return;
-  ordering = true;
-  while (ordered) {
-    const next = ordered;
-    ordered = null;
-    try {
-      await post("/api/operator/focus", next);
-      setText(byId("focus-trouble"), "");
-    } catch (error) {
-      tellTrouble(byId("focus-trouble"), error);
-    }
-  }
-  ordering = false;
-}
-
-const slider = byId("focal-power");
-slider.addEventListener("input", () => {
-  dragging = true;
-  setText(byId("focal-power-value"), Number(slider.value).toFixed(3));
-  byId("policy").value = BY_HAND;
-  focus({ focal_power: Number(slider.value) });
-});
-slider.addEventListener("change", () => (dragging = false));
-byId("policy").addEventListener("change", () => {
-  const policy = byId("policy").value;
-  focus(policy === BY_HAND ? { focal_power: status?.focal_power ?? 0.5 } : { policy });
-});
 
 /* The session */
 
@@ -109,7 +49,7 @@ function followSession(next) {
   byId("new-session").hidden = session !== null;
   byId("running").hidden = session === null;
   byId("follow").hidden = session === null;
-  if (status) drawFocus();
+  if (status) drawFocus(status, session !== null);
   drawBadges();
   if (!session) return;
   setText(byId("phase"), PHASES[session.phase](session));
@@ -227,7 +167,7 @@ function drawChoices(participant = byId("participant").value) {
   fill(byId("protocol"), choices.protocols.map(({ name, researcher_title: label }) => ({ value: name, label })), byId("protocol").value);
   const policies = choices.policies.map(({ name, available }) => ({ value: name, label: available ? name : `${name} (no weights)`, disabled: !available }));
   fill(byId("policy"), [{ value: UNTOLD, label: "Not told during a session", hidden: true }, { value: BY_HAND, label: "By hand" }, ...policies], byId("policy").value);
-  if (status) drawFocus();
+  if (status) drawFocus(status, session !== null);
   drawSummary();
 }
 
