@@ -8,6 +8,8 @@ mod support;
 mod aftermath;
 #[path = "browser/blinding.rs"]
 mod blinding;
+#[path = "browser/by_hand.rs"]
+mod by_hand;
 #[cfg(feature = "aravis")]
 #[path = "browser/camera_card.rs"]
 mod camera_card;

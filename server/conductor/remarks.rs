@@ -2,7 +2,7 @@
 
 use super::course::Course;
 use super::{ConductError, Live, Shared};
-use crate::ids::SessionId;
+use crate::ids::{SegmentId, SessionId};
 use crate::store::{Answer, Comment, Kept, Stamp};
 use crate::trial::answers;
 use crate::trial::view::{NewAnswer, NewComment, Said};
@@ -11,10 +11,14 @@ impl Shared {
     pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {
         check_said(&new.said)?;
         let mut live = self.live.lock().await;
-        let earlier = self.earlier(&live, new.session).await?;
-        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(ConductError::no_session()) };
+        let current = live.course.as_ref().filter(|course| course.session() == new.session);
+        let segments = match current {
+            Some(course) => course.state.plan().segments.clone(),
+            None => self.segments(new.session).await?,
+        };
+        let current = current.is_some();
         // A segment that is not this session's can only come from a broken page: what was said is kept all the same.
-        let segment = new.segment.filter(|&segment| course.state.plan().position(segment).is_some());
+        let segment = new.segment.filter(|segment| segments.contains(segment));
         let comment = Comment {
             key: new.key,
             session: new.session,
@@ -28,7 +32,7 @@ impl Shared {
         };
         let kept = self.store.keep_comment(&comment).await?;
         if kept == Kept::New
-            && earlier.is_none()
+            && current
             && let Some(course) = live.course.as_mut()
         {
             course.heard(comment);
@@ -59,6 +63,12 @@ impl Shared {
             self.publish(&live);
         }
         unless_taken(kept)
+    }
+
+    /// The segments of an earlier session: known whether or not its protocol can still be read, so that a late comment on it is kept.
+    async fn segments(&self, session: SessionId) -> Result<Vec<SegmentId>, ConductError> {
+        let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
+        Ok(stored.made.segments.into_iter().map(|(segment, _)| segment).collect())
     }
 
     /// Session `session` from the database, unless it is the one in memory.

@@ -96,6 +96,23 @@ async fn what_is_said_is_kept_whatever_the_state() {
 }
 
 #[tokio::test]
+async fn a_late_comment_is_kept_though_the_sessions_protocol_can_no_longer_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let first = bench.begin("paper").await;
+    let late = bench.comment("after the upgrade");
+    bench.conductor.act(Role::Operator, first, Action::Abort { reason: "upgrade".to_owned() }).await.unwrap();
+    bench.begin("paper").await;
+    let pool = crate::storage::raw(folder.path()).await;
+    let change = "DROP TRIGGER sessions_no_update; UPDATE sessions SET protocol_toml = 'of another version'";
+    sqlx::raw_sql(change).execute(&pool).await.unwrap();
+    let segment = late.segment;
+    bench.conductor.comment(late).await.unwrap();
+    let kept = bench.store.reader().comments(first).await.unwrap();
+    assert_eq!(kept.iter().map(|(_, comment)| comment.segment).collect::<Vec<_>>(), [segment]);
+}
+
+#[tokio::test]
 async fn emoji_are_kept_whole_and_a_megabyte_is_refused_with_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let mut bench = Bench::start(folder.path()).await;

@@ -16,7 +16,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::bench::{Bench, a_clock, a_run};
 
-async fn raw(folder: &std::path::Path) -> SqlitePool {
+pub async fn raw(folder: &std::path::Path) -> SqlitePool {
     let options = SqliteConnectOptions::new().filename(folder.join("parfocal.db")).create_if_missing(true);
     SqlitePool::connect_with(options).await.unwrap()
 }
