@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::{Fixed, HillClimber, Policy, mgm, mlr, shipped};
 
-/// A policy's name, as in the contract; valid once a [`Registry`] has taken it. Cheap to clone.
+/// A policy's name, as in docs/scripting.md; valid once a [`Registry`] has taken it. Cheap to clone.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct PolicyName(Arc<str>);
@@ -92,7 +92,7 @@ enum Source {
 }
 
 impl Registry {
-    /// The contract's policies in the contract's order.
+    /// The shipped policies in the order of docs/scripting.md.
     #[must_use]
     pub fn standard() -> Self {
         let classical = Self::default()
@@ -147,7 +147,7 @@ impl Registry {
         self.policies.iter().filter_map(|policy| Some((policy.name.clone(), policy.weights.clone()?))).collect()
     }
 
-    /// Every policy, in the contract's order.
+    /// Every policy, in the order in which they were added.
     #[must_use]
     pub fn entries(&self) -> Vec<PolicyEntry> {
         let entry = |policy: &Registered| {
@@ -197,9 +197,9 @@ mod tests {
     }
 
     #[test]
-    fn the_standard_registry_has_the_contracts_names_in_the_contracts_order() {
-        let contract = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-learned", "mlr-learned", "cnn-learned"];
-        assert_eq!(names(&Registry::standard())[..contract.len()], contract);
+    fn the_standard_registry_has_the_promised_names_in_the_promised_order() {
+        let promised = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-learned", "mlr-learned", "cnn-learned"];
+        assert_eq!(names(&Registry::standard())[..promised.len()], promised);
     }
 
     #[test]

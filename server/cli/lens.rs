@@ -61,7 +61,7 @@ impl Which {
     }
 }
 
-/// Where a lens stands (part of the contract).
+/// Where a lens stands (see docs/scripting.md).
 #[derive(Debug, Serialize)]
 struct Position {
     focal_power: f64,

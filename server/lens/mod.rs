@@ -92,7 +92,7 @@ pub struct LensHealth {
     pub message: Arc<str>,
 }
 
-/// What a lens says of itself (`parfocal lens info --json`; part of the contract).
+/// What a lens says of itself (`parfocal lens info --json`; see docs/scripting.md).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LensInfo {
     /// Driver's name, for example `Optotune Lens Driver 4` or `simulated`.

@@ -1,4 +1,4 @@
-//! An evaluation for people and programs: JSON as in the contract, Markdown, CSV, and the paper's figure as SVG.
+//! An evaluation for people and programs: JSON as in docs/scripting.md, Markdown, CSV, and the paper's figure as SVG.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use super::rollout::Path;
 use crate::autofocus::{IN_FOCUS, PolicyName};
 use crate::files::replace;
 
-/// What `evaluate` gives. The contract fixes the fields' names.
+/// What `evaluate` gives. docs/scripting.md promises the names of its fields.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// Which scans.

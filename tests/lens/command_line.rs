@@ -16,7 +16,7 @@ fn command_line(arguments: &[&str]) -> (bool, String, String) {
 }
 
 #[test]
-fn the_command_line_speaks_the_contracted_json() {
+fn the_command_line_speaks_the_promised_json() {
     let emulator = emulator(quick());
     let spec = format!("optotune:{}", emulator.path().display());
     let json = |arguments: &[&str]| -> serde_json::Value {
