@@ -26,7 +26,9 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 pub fn replace_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let beside = path.with_file_name(format!(".{name}.partial"));
-    let written = write_through_with(&beside, fill).and_then(|()| fs::rename(&beside, path));
+    let written = write_through_with(&beside, fill)
+        .and_then(|()| fs::rename(&beside, path))
+        .and_then(|()| sync_folder(path.parent().unwrap_or(Path::new(""))));
     if written.is_err() {
         let _ = fs::remove_file(&beside);
     }
@@ -46,6 +48,15 @@ fn write_through_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io
     fill(&mut writer)?;
     // A file renamed before the disk has it may be empty after a power cut.
     writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()
+}
+
+/// Waits until the disk has the names in `folder`: a file that was renamed may otherwise have its old name after a power cut.
+///
+/// # Errors
+/// When the folder cannot be opened, or the disk fails.
+pub fn sync_folder(folder: &Path) -> io::Result<()> {
+    let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    File::open(here)?.sync_all()
 }
 
 /// Whether `name` is that of a file that a process killed in [`replace`] left behind.

@@ -23,7 +23,7 @@ use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Library, Parts};
-use crate::control::{ControlLoop, Rig, Settings};
+use crate::control::{self, ControlLoop, Rig, Settings};
 use crate::http::keys::Keys;
 use crate::http::{self, App};
 use crate::imaging::{Calibration, Reconstructor};
@@ -91,6 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(writer)
         .init();
+    control::keep_policies_quiet();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let outcome = runtime.block_on(serve(arguments));
     // A thread that hangs must not keep the process from ending.

@@ -13,6 +13,7 @@ mod window;
 
 pub use eye::Eye;
 pub use pilot::HoldReason;
+pub use runner::keep_policies_quiet;
 pub use slot::LatestSlot;
 pub use spawn::{ControlLoop, Rig, Settings};
 pub use stepper::Stepper;

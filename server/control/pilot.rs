@@ -165,19 +165,20 @@ impl Pilot {
     }
 }
 
-/// The one place where a policy's answer becomes something to act on.
+/// The one place where a policy's answer becomes something to act on. What went wrong is logged for those who debug alone: the operator
+/// of a blinded session sits before the log, and only some policies fail so. The status tells it outside sessions.
 fn check(answer: Answer) -> Result<Advice, HoldReason> {
     match answer {
         Answer::Decided { decision, took } => checked(decision, took),
         Answer::Panicked(message) => {
-            tracing::error!(message, "the policy panicked");
+            tracing::debug!(message, "the policy panicked");
             Err(HoldReason::new(
                 Hold::PolicyPanicked,
                 "the policy failed and is being started afresh; the lens is held",
             ))
         }
         Answer::Unavailable(error) => {
-            tracing::error!(%error, "the policy cannot be had");
+            tracing::debug!(%error, "the policy cannot be had");
             Err(HoldReason::new(
                 Hold::PolicyUnavailable,
                 "the policy cannot run here; the lens is held: `parfocal policies` tells why",
@@ -188,7 +189,7 @@ fn check(answer: Answer) -> Result<Advice, HoldReason> {
 
 fn checked(decision: Decision, took: Duration) -> Result<Advice, HoldReason> {
     let Ok(target) = FocalPower::new(decision.target) else {
-        tracing::error!(target = decision.target, "the policy asked for what is no focal power");
+        tracing::debug!(target = decision.target, "the policy asked for what is no focal power");
         return Err(HoldReason::new(
             Hold::PolicyNonsense,
             "the policy asked for what is no focal power and is being started afresh; the lens is held",

@@ -48,6 +48,9 @@ pub struct Runner {
     pub proven: bool,
 }
 
+/// Name of the threads that policies run on.
+const THREAD: &str = "policy";
+
 impl Runner {
     /// Starts a fresh instance of policy `name`; it is made on its own thread.
     ///
@@ -56,7 +59,7 @@ impl Runner {
     pub fn start(registry: Arc<Registry>, name: PolicyName, clock: Arc<dyn Clock>) -> io::Result<Self> {
         let (questions, questions_in) = sync_channel(1);
         let (answers_out, answers) = sync_channel(1);
-        let thread = std::thread::Builder::new().name("policy".into()).spawn(move || {
+        let thread = std::thread::Builder::new().name(THREAD.into()).spawn(move || {
             crate::priority::raise();
             networks::compute_on_this_thread();
             serve(&registry, &name, &*clock, &questions_in, &answers_out);
@@ -122,6 +125,17 @@ fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answ
         Ok(decision) => Answer::Decided { decision, took: clock.now().since(began) },
         Err(message) => Answer::Panicked(message),
     }
+}
+
+/// Keeps what a panicking policy says, and where in the code it stood, off the standard error from now on: the operator of a blinded
+/// session may sit before it.
+pub fn keep_policies_quiet() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if std::thread::current().name() != Some(THREAD) {
+            usual(panic);
+        }
+    }));
 }
 
 /// Runs `risky`; a panic becomes its message.

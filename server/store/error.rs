@@ -56,6 +56,15 @@ pub enum StoreError {
     /// The file is no database, or damaged.
     #[error("the database is damaged ({0}); keep a copy of the data folder before anything else")]
     Damaged(String),
+    /// The file cannot be opened.
+    #[error(
+        "the database cannot be opened; you must be able to write to it and to its folder: change their permissions, or copy the data \
+         folder to where you may write and name that with --data-dir"
+    )]
+    Shut,
+    /// Another program holds it.
+    #[error("another program has locked the database; close it and try again")]
+    Locked,
     /// Anything else that the database says.
     #[error("the database failed: {0}")]
     Database(sqlx::Error),
@@ -96,6 +105,8 @@ impl From<sqlx::Error> for StoreError {
             Some(13) => Self::Full,
             Some(10) => Self::Disk(error.to_string()),
             Some(8) => Self::ReadOnly,
+            Some(14) => Self::Shut,
+            Some(5 | 6) => Self::Locked,
             Some(11 | 26) => Self::Damaged(error.to_string()),
             _ => Self::Database(error),
         }

@@ -41,8 +41,9 @@ impl Reader {
         session: SessionId,
         take: impl FnMut(Vec<Value>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let sql =
-            "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured, t.held IS NOT NULL AS held, t.optimal
+        // A hold for the policy's sake is left out: only learned ones take time to start and to think.
+        let sql = "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured,
+                    coalesce(t.held IN ('paused', 'lens-failed', 'camera-failed'), FALSE) AS held, t.optimal
              FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
              WHERE g.session = ? ORDER BY g.setting, t.number";
         self.hand_out(session, sql, telemetry_row, take).await

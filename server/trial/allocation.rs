@@ -46,6 +46,15 @@ pub enum Algorithm {
 }
 
 impl Algorithm {
+    /// The kind of order that it draws.
+    #[must_use]
+    pub const fn order(self) -> Order {
+        match self {
+            Self::Shuffle1 => Order::Shuffled,
+            Self::Balanced1 => Order::Balanced,
+        }
+    }
+
     /// Its name.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -6,3 +6,4 @@ mod exports;
 mod remarks;
 mod sessions;
 mod storage;
+mod verification;

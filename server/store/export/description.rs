@@ -181,7 +181,7 @@ pub const DEVICES: Table = Table {
 /// Telemetry, blinded.
 pub const TELEMETRY: Table = Table {
     name: "telemetry",
-    description: "Every step of the control loop during the settings. Metric and timing are left to policy_steps.csv, as they tell the policy; the focal path itself may suggest one to an expert",
+    description: "Every step of the control loop during the settings. Metric and timing are left to policy_steps.csv, as they tell the policy; the focal path itself, and frames left out where the loop waited, may suggest one to an expert",
     columns: &[
         SETTING,
         RUN,
@@ -194,7 +194,12 @@ pub const TELEMETRY: Table = Table {
             "focal power, 0..1",
             "Focal power at the middle of the frame's exposure, by the lens's dynamics; empty while the lens was away",
         ),
-        column("held", Boolean, "", "Whether the lens was held, by a pause or the watchdog"),
+        column(
+            "held",
+            Boolean,
+            "",
+            "Whether the lens was held by a pause or because lens or camera failed; holds for the policy's sake are in policy_steps.csv, as they tell the policy",
+        ),
         column("optimal", Number, "focal power, 0..1", "The optimum, where camera and lens are simulated"),
     ],
     key: &["run", "frame"],

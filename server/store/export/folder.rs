@@ -10,6 +10,7 @@ use tempfile::TempDir;
 
 use super::ExportError;
 use super::table::{Row, Table, csv_cell};
+use crate::files::{sync_folder, write_through};
 
 /// Name of the file of checksums, in the form of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
@@ -44,8 +45,8 @@ impl Folder {
     }
 
     /// Ends the CSV file of `table`.
-    pub fn end(&mut self, table: &Table, mut file: CsvFile) -> Result<(), ExportError> {
-        file.writer.flush().map_err(|error| ExportError::Unwritable { path: file.path.clone(), error })?;
+    pub fn end(&mut self, table: &Table, file: CsvFile) -> Result<(), ExportError> {
+        file.end()?;
         self.files.push(table.file());
         let (hash, bytes) = self.hash(&table.file())?;
         self.resources.push(json!({
@@ -75,7 +76,7 @@ impl Folder {
     /// Writes `content` as file `name`.
     pub fn file(&mut self, name: &str, content: &[u8]) -> Result<(), ExportError> {
         let path = self.path(name);
-        std::fs::write(&path, content).map_err(|error| ExportError::Unwritable { path, error })?;
+        write_through(&path, content).map_err(|error| ExportError::Unwritable { path, error })?;
         self.files.push(name.to_owned());
         Ok(())
     }
@@ -98,12 +99,15 @@ impl Folder {
         let line = |file: &String| Ok(format!("{}  {file}\n", self.hash(file)?.0));
         let sums = self.files.iter().map(line).collect::<Result<String, ExportError>>()?;
         self.file(SUMS, sums.as_bytes())?;
+        let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
+        sync_folder(self.temporary.path()).map_err(unwritable)?;
         let whole = self.temporary.keep();
         std::fs::rename(&whole, out).map_err(|error| {
             // It is all that is left to do for it.
             let _ = std::fs::remove_dir_all(&whole);
-            ExportError::Unwritable { path: out.to_owned(), error }
+            unwritable(error)
         })?;
+        sync_folder(out.parent().unwrap_or(Path::new(""))).map_err(unwritable)?;
         Ok(self.files)
     }
 
@@ -128,6 +132,15 @@ impl CsvFile {
     /// Writes a row.
     pub fn row(&mut self, row: &Row) -> Result<(), ExportError> {
         self.record(row.iter().map(csv_cell))
+    }
+
+    /// Waits until the disk has it.
+    fn end(self) -> Result<(), ExportError> {
+        let Self { path, writer } = self;
+        let flushed =
+            writer.into_inner().map_err(|error| std::io::Error::new(error.error().kind(), error.error().to_string()));
+        let file = flushed.and_then(|writer| writer.into_inner().map_err(std::io::IntoInnerError::into_error));
+        file.and_then(|file| file.sync_data()).map_err(|error| ExportError::Unwritable { path, error })
     }
 
     fn record(&mut self, cells: impl Iterator<Item = String>) -> Result<(), ExportError> {

@@ -7,6 +7,7 @@ mod folder;
 mod table;
 mod unblinded;
 pub mod verify;
+mod verify_allocation;
 
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};

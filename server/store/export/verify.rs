@@ -3,16 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::description::ALL;
+use super::description::{ALL, ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS};
 use super::folder::SUMS;
-use crate::autofocus::PolicyName;
-use crate::ids::SessionId;
-use crate::trial::allocation::{Algorithm, Seed};
-use crate::trial::commitment::Allocation;
-use crate::trial::protocol::Protocol;
+use super::table::csv_cell;
+use super::verify_allocation::{commitment, schedule};
 
 /// One thing checked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -45,6 +43,8 @@ pub fn verify(folder: &Path) -> Vec<Check> {
         check("checksums", checksums(folder)),
         check("columns", columns(folder)),
         check("events", events(folder)),
+        check("said", said(folder)),
+        check("copies", copies(folder)),
         check("references", references(folder)),
         check("protocol", protocol(folder)),
         check("commitment", commitment(folder)),
@@ -52,7 +52,7 @@ pub fn verify(folder: &Path) -> Vec<Check> {
     ]
 }
 
-type Outcome = Result<Verdict, String>;
+pub(super) type Outcome = Result<Verdict, String>;
 
 fn checksums(folder: &Path) -> Outcome {
     let mut listed = BTreeSet::from([SUMS.to_owned()]);
@@ -80,7 +80,7 @@ fn columns(folder: &Path) -> Outcome {
     let mut rows = 0;
     for table in ALL {
         let file = table.file();
-        if !folder.join(&file).exists() && matches!(table.name, "allocation" | "weights" | "policy_steps") {
+        if !folder.join(&file).exists() && UNBLINDED.contains(&file.as_str()) {
             continue;
         }
         let mut reader = csv(folder, &file)?;
@@ -100,15 +100,58 @@ fn columns(folder: &Path) -> Outcome {
 }
 
 fn events(folder: &Path) -> Outcome {
-    let numbers: Vec<u64> = cells(folder, "events.csv", "number")?.iter().filter_map(|n| n.parse().ok()).collect();
-    if let Some((found, expected)) = numbers.iter().zip(1..).find(|(found, expected)| *found != expected) {
-        return Err(format!("events.csv: event {expected} is missing; {found} stands in its place"));
-    }
+    let count = numbered(folder, "events.csv")?;
     let kinds = cells(folder, "events.csv", "kind")?;
     if kinds.first().map(String::as_str) != Some("created") {
         return Err("events.csv: the first event is not 'created'".to_owned());
     }
-    Ok(Verdict::Passed(format!("{} events without a gap", numbers.len())))
+    Ok(Verdict::Passed(format!("{count} events without a gap")))
+}
+
+fn said(folder: &Path) -> Outcome {
+    let (comments, answers) = (numbered(folder, "comments.csv")?, numbered(folder, "answers.csv")?);
+    let told = session_cell(folder, "comments")?;
+    if told != comments.to_string() {
+        return Err(format!("comments.csv holds {comments} comments, and sessions.csv tells of {told}"));
+    }
+    Ok(Verdict::Passed(format!("{comments} comments and {answers} answers without a gap")))
+}
+
+/// The number of rows of `file`, whose column `number` must count them from 1.
+fn numbered(folder: &Path, file: &str) -> Result<usize, String> {
+    let numbers = cells(folder, file, "number")?;
+    match numbers.iter().zip(1..).find(|(found, expected)| **found != format!("{expected}")) {
+        Some((found, expected)) => Err(format!("{file}: number {expected} is missing; '{found}' stands in its place")),
+        None => Ok(numbers.len()),
+    }
+}
+
+/// Files that an unblinded export has, and a blinded one must not have.
+pub(super) const UNBLINDED: [&str; 4] = ["allocation.csv", "allocation.json", "weights.csv", "policy_steps.csv"];
+
+fn copies(folder: &Path) -> Outcome {
+    let package = json(folder, "datapackage.json")?;
+    let blinded =
+        package["parfocal"]["blinded"].as_bool().ok_or("datapackage.json does not say whether it is blinded")?;
+    if let Some(file) = UNBLINDED.into_iter().find(|file| folder.join(file).exists() == blinded) {
+        let (is, has) = if blinded { ("", "there") } else { ("un", "missing") };
+        return Err(format!("datapackage.json says that the export is {is}blinded, and {file} is {has}"));
+    }
+    let session = json(folder, "session.json")?;
+    for table in [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES] {
+        let file = table.file();
+        let differs = || format!("session.json and {file} tell different things");
+        let objects = session[table.name].as_array().ok_or_else(differs)?;
+        let mut reader = csv(folder, &file)?;
+        let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(|error| format!("{file}: {error}"))?;
+        let same = |object: &Value, row: &csv::StringRecord| {
+            table.header().map(|name| csv_cell(&object[name])).eq(row.iter().map(str::to_owned))
+        };
+        if rows.len() != objects.len() || !objects.iter().zip(&rows).all(|(object, row)| same(object, row)) {
+            return Err(differs());
+        }
+    }
+    Ok(Verdict::Passed("session.json tells the same as the tables".to_owned()))
 }
 
 fn references(folder: &Path) -> Outcome {
@@ -120,11 +163,13 @@ fn references(folder: &Path) -> Outcome {
             return Err(format!("{file}: segment {segment} is not in segments.csv"));
         }
     }
-    let unknown = cells(folder, "telemetry.csv", "setting")?.into_iter().find(|setting| !settings.contains(setting));
-    unknown.map_or_else(
-        || Ok(Verdict::Passed(format!("everything belongs to one of {} settings", settings.len()))),
-        |setting| Err(format!("telemetry.csv: setting {setting} is not in segments.csv")),
-    )
+    for file in ["telemetry.csv", "policy_steps.csv"].into_iter().filter(|file| folder.join(file).exists()) {
+        let unknown = cells(folder, file, "setting")?.into_iter().find(|setting| !settings.contains(setting));
+        if let Some(setting) = unknown {
+            return Err(format!("{file}: setting {setting} is not in segments.csv"));
+        }
+    }
+    Ok(Verdict::Passed(format!("everything belongs to one of {} settings", settings.len())))
 }
 
 fn protocol(folder: &Path) -> Outcome {
@@ -137,71 +182,12 @@ fn protocol(folder: &Path) -> Outcome {
     }
 }
 
-/// `allocation.json` of an unblinded export.
-#[derive(Deserialize)]
-struct Told {
-    session: SessionId,
-    algorithm: Algorithm,
-    seed: Option<String>,
-    index: usize,
-    schedule: Vec<PolicyName>,
-}
-
-/// The allocation that an export tells, or why it does not.
-fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
-    if !folder.join("allocation.json").exists() {
-        return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
-    }
-    let told: Told =
-        serde_json::from_str(&text(folder, "allocation.json")?).map_err(|error| format!("allocation.json: {error}"))?;
-    let Some(seed) = told.seed else {
-        let why = "the seed is withheld while other sessions of its balanced set are blinded";
-        return Ok(Err(Verdict::NotChecked(why.to_owned())));
-    };
-    let seed = Seed::from_hex(&seed).ok_or("allocation.json: the seed is not 64 hexadecimal digits")?;
-    let listed = cells(folder, "allocation.csv", "policy")?;
-    if !listed.iter().map(String::as_str).eq(told.schedule.iter().map(PolicyName::as_str)) {
-        return Err("allocation.csv and allocation.json tell different orders".to_owned());
-    }
-    Ok(Ok(Allocation {
-        session: told.session,
-        algorithm: told.algorithm,
-        seed,
-        index: told.index,
-        protocol_sha256: Sha256::digest(text(folder, "protocol.toml")?).into(),
-        schedule: told.schedule,
-    }))
-}
-
-fn commitment(folder: &Path) -> Outcome {
-    let allocation = match allocation(folder)? {
-        Ok(allocation) => allocation,
-        Err(verdict) => return Ok(verdict),
-    };
-    if allocation.commitment() == session_cell(folder, "commitment")? {
-        Ok(Verdict::Passed("seed, order and protocol are those committed to when the session was made".to_owned()))
-    } else {
-        Err("seed, order or protocol are not those committed to when the session was made".to_owned())
-    }
-}
-
-fn schedule(folder: &Path) -> Outcome {
-    let allocation = match allocation(folder)? {
-        Ok(allocation) => allocation,
-        Err(verdict) => return Ok(verdict),
-    };
-    let protocol = Protocol::parse(&text(folder, "protocol.toml")?, "protocol.toml", &allocation.schedule)
-        .map_err(|error| error.to_string())?;
-    let order = allocation.algorithm.draw(allocation.seed, protocol.policies.len(), protocol.repeats, allocation.index);
-    if order.iter().map(|&policy| &protocol.policies[policy]).eq(&allocation.schedule) {
-        Ok(Verdict::Passed(format!("{} draws this order from the seed", allocation.algorithm)))
-    } else {
-        Err(format!("{} draws another order from the seed", allocation.algorithm))
-    }
-}
-
-fn text(folder: &Path, file: &str) -> Result<String, String> {
+pub(super) fn text(folder: &Path, file: &str) -> Result<String, String> {
     std::fs::read_to_string(folder.join(file)).map_err(|error| format!("{file}: {error}"))
+}
+
+pub(super) fn json(folder: &Path, file: &str) -> Result<Value, String> {
+    serde_json::from_str(&text(folder, file)?).map_err(|error| format!("{file}: {error}"))
 }
 
 fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, String> {
@@ -209,7 +195,7 @@ fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, String> 
 }
 
 /// The cells of a column.
-fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
+pub(super) fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
     let mut reader = csv(folder, file)?;
     let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?;
     let place =
@@ -220,6 +206,6 @@ fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String>
         .collect()
 }
 
-fn session_cell(folder: &Path, column: &str) -> Result<String, String> {
+pub(super) fn session_cell(folder: &Path, column: &str) -> Result<String, String> {
     cells(folder, "sessions.csv", column)?.into_iter().next().ok_or_else(|| "sessions.csv has no session".to_owned())
 }

@@ -1,0 +1,95 @@
+//! Verification of the allocation that an unblinded export tells: against its other files, the commitment and the draw.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+
+use super::verify::{Outcome, Verdict, cells, json, session_cell, text};
+use crate::autofocus::PolicyName;
+use crate::ids::SessionId;
+use crate::trial::allocation::{Algorithm, Order, Seed};
+use crate::trial::commitment::Allocation;
+use crate::trial::protocol::Protocol;
+
+/// `allocation.json` of an unblinded export.
+#[derive(Deserialize)]
+struct Told {
+    session: SessionId,
+    algorithm: Algorithm,
+    seed: Option<String>,
+    index: usize,
+    schedule: Vec<PolicyName>,
+}
+
+/// The allocation that an export tells, or why it does not.
+fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
+    if !folder.join("allocation.json").exists() {
+        return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
+    }
+    let told: Told = serde_json::from_value(json(folder, "allocation.json")?)
+        .map_err(|error| format!("allocation.json: {error}"))?;
+    for column in ["session", "setting", "segment"] {
+        if cells(folder, "allocation.csv", column)? != cells(folder, "segments.csv", column)? {
+            return Err(format!("allocation.csv and segments.csv tell different {column}s"));
+        }
+    }
+    let listed = cells(folder, "allocation.csv", "policy")?;
+    if !listed.iter().map(String::as_str).eq(told.schedule.iter().map(PolicyName::as_str)) {
+        return Err("allocation.csv and allocation.json tell different orders".to_owned());
+    }
+    for (column, told) in [("session", told.session.to_string()), ("algorithm", told.algorithm.to_string())] {
+        if session_cell(folder, column)? != told {
+            return Err(format!("allocation.json and sessions.csv tell different {column}s"));
+        }
+    }
+    let Some(seed) = told.seed else {
+        if told.algorithm.order() != Order::Balanced {
+            return Err("allocation.json withholds the seed, which is done within a balanced set alone".to_owned());
+        }
+        let why = "the seed is withheld while other sessions of its balanced set are blinded";
+        return Ok(Err(Verdict::NotChecked(why.to_owned())));
+    };
+    let seed = Seed::from_hex(&seed).ok_or("allocation.json: the seed is not 64 hexadecimal digits")?;
+    Ok(Ok(Allocation {
+        session: told.session,
+        algorithm: told.algorithm,
+        seed,
+        index: told.index,
+        protocol_sha256: Sha256::digest(text(folder, "protocol.toml")?).into(),
+        schedule: told.schedule,
+    }))
+}
+
+/// Whether seed, order and protocol are those committed to.
+pub(super) fn commitment(folder: &Path) -> Outcome {
+    let allocation = match allocation(folder)? {
+        Ok(allocation) => allocation,
+        Err(verdict) => return Ok(verdict),
+    };
+    if allocation.commitment() == session_cell(folder, "commitment")? {
+        Ok(Verdict::Passed("seed, order and protocol are those committed to when the session was made".to_owned()))
+    } else {
+        Err("seed, order or protocol are not those committed to when the session was made".to_owned())
+    }
+}
+
+/// Whether the seed leads to the order.
+pub(super) fn schedule(folder: &Path) -> Outcome {
+    let allocation = match allocation(folder)? {
+        Ok(allocation) => allocation,
+        Err(verdict) => return Ok(verdict),
+    };
+    let protocol = Protocol::parse(&text(folder, "protocol.toml")?, "protocol.toml", &allocation.schedule)
+        .map_err(|error| error.to_string())?;
+    // Also keeps a forged export from having all permutations of many policies drawn.
+    if allocation.algorithm.order() != protocol.order {
+        return Err(format!("{} does not draw the order that protocol.toml asks for", allocation.algorithm));
+    }
+    let order = allocation.algorithm.draw(allocation.seed, protocol.policies.len(), protocol.repeats, allocation.index);
+    if order.iter().map(|&policy| &protocol.policies[policy]).eq(&allocation.schedule) {
+        Ok(Verdict::Passed(format!("{} draws this order from the seed", allocation.algorithm)))
+    } else {
+        Err(format!("{} draws another order from the seed", allocation.algorithm))
+    }
+}
