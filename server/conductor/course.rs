@@ -73,7 +73,7 @@ impl Course {
         // Its own policies are known, whatever the registry has now.
         let known: Vec<PolicyName> = stored.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
         let protocol = Protocol::parse(&stored.made.protocol_toml, &stored.made.protocol, &known)
-            .map_err(|error| ConductError::Storage(format!("the session's protocol is damaged: {error}")))?;
+            .map_err(|error| ConductError::Unreadable { session, reason: error.to_string() })?;
         let segments = stored.made.segments.iter().map(|(segment, _)| *segment).collect();
         let state = SessionState::new(Plan::new(&protocol, segments));
         let mut course =

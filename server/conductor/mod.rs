@@ -94,6 +94,17 @@ pub enum ConductError {
     /// The disk or database failed; nothing was acknowledged.
     #[error("could not be saved: {0}")]
     Storage(String),
+    /// The session's protocol is of another version, or damaged.
+    #[error(
+        "session {session} was made with a protocol that this version cannot read ({reason}); go on with the version that made it, or \
+         with another folder by --data-dir"
+    )]
+    Unreadable {
+        /// The session.
+        session: SessionId,
+        /// Why.
+        reason: String,
+    },
 }
 
 impl ConductError {

@@ -5,7 +5,7 @@ use super::{ConductError, Live, Shared};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::{Answer, Comment, Kept, Stamp};
 use crate::trial::answers;
-use crate::trial::view::{NewAnswer, NewComment, Said};
+use crate::trial::view::{AnswerValue, NewAnswer, NewComment, Said};
 
 impl Shared {
     pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {
@@ -43,17 +43,14 @@ impl Shared {
 
     pub(super) async fn answer(&self, new: NewAnswer) -> Result<(), ConductError> {
         let mut live = self.live.lock().await;
-        let earlier = self.earlier(&live, new.session).await?;
+        let earlier = match self.earlier(&live, new.session).await {
+            // What was asked cannot be known any more; what was answered is kept all the same.
+            Err(ConductError::Unreadable { .. }) => return self.keep_unasked(new).await,
+            earlier => earlier?,
+        };
         let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(ConductError::no_session()) };
         check_answer(course, &new)?;
-        let answer = Answer {
-            key: new.key,
-            session: new.session,
-            segment: new.segment,
-            question: new.question,
-            value: new.value,
-            stamp: self.stamp(),
-        };
+        let answer = self.stamped(new);
         let kept = self.store.keep_answer(&answer).await?;
         if kept == Kept::New
             && earlier.is_none()
@@ -63,6 +60,24 @@ impl Shared {
             self.publish(&live);
         }
         unless_taken(kept)
+    }
+
+    /// Keeps an answer to a session whose questions are not known.
+    async fn keep_unasked(&self, new: NewAnswer) -> Result<(), ConductError> {
+        if let AnswerValue::Text(text) = &new.value {
+            answers::check_length(text).map_err(|misfit| ConductError::Invalid(misfit.to_string()))?;
+        }
+        if let Some(segment) = new.segment
+            && !self.segments(new.session).await?.contains(&segment)
+        {
+            return Err(ConductError::NotFound("this session has no such setting; reload the page".to_owned()));
+        }
+        unless_taken(self.store.keep_answer(&self.stamped(new)).await?)
+    }
+
+    fn stamped(&self, new: NewAnswer) -> Answer {
+        let NewAnswer { key, session, segment, question, value } = new;
+        Answer { key, session, segment, question, value, stamp: self.stamp() }
     }
 
     /// The segments of an earlier session: known whether or not its protocol can still be read, so that a late comment on it is kept.

@@ -48,6 +48,9 @@ pub enum Error {
     /// Disk or database failed; nothing was acknowledged.
     #[error("Could not be saved: {0}")]
     Storage(String),
+    /// Something in the database is of another version.
+    #[error("{0}")]
+    Unreadable(String),
     /// The server's own fault.
     #[error("The server failed at this request; what was saved before is safe. The server's log says more.")]
     Internal,
@@ -71,7 +74,7 @@ impl Error {
             Self::NeedsRole(_) | Self::Forbidden(_) | Self::WrongKey | Self::CrossSite => StatusCode::FORBIDDEN,
             Self::WrongHost => StatusCode::MISDIRECTED_REQUEST,
             Self::Storage(_) => StatusCode::INSUFFICIENT_STORAGE,
-            Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+            Self::Unreadable(_) | Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
         }
     }
 }
@@ -84,6 +87,7 @@ impl From<ConductError> for Error {
             ConductError::Conflict(text) => Self::Conflict(text),
             ConductError::Invalid(text) => Self::Invalid(text),
             ConductError::Storage(text) => Self::Storage(text),
+            unreadable @ ConductError::Unreadable { .. } => Self::Unreadable(unreadable.to_string()),
         }
     }
 }

@@ -96,7 +96,7 @@ async fn what_is_said_is_kept_whatever_the_state() {
 }
 
 #[tokio::test]
-async fn a_late_comment_is_kept_though_the_sessions_protocol_can_no_longer_be_read() {
+async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_read() {
     let folder = tempfile::tempdir().unwrap();
     let mut bench = Bench::start(folder.path()).await;
     let first = bench.begin("paper").await;
@@ -110,6 +110,21 @@ async fn a_late_comment_is_kept_though_the_sessions_protocol_can_no_longer_be_re
     bench.conductor.comment(late).await.unwrap();
     let kept = bench.store.reader().comments(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, comment)| comment.segment).collect::<Vec<_>>(), [segment]);
+    let answer = |key, segment| NewAnswer {
+        key,
+        session: first,
+        segment,
+        question: "sharpness".to_owned(),
+        value: AnswerValue::Point(4),
+    };
+    let (key, other) = (bench.key(), bench.key());
+    bench.conductor.answer(answer(key, segment)).await.unwrap();
+    let elsewhere = bench.view().segment;
+    assert!(matches!(bench.conductor.answer(answer(other, elsewhere)).await, Err(ConductError::NotFound(_))));
+    let kept = bench.store.reader().answers(first).await.unwrap();
+    assert_eq!(kept.iter().map(|(_, answer)| answer.value.clone()).collect::<Vec<_>>(), [AnswerValue::Point(4)]);
+    let told = bench.conductor.session_detail(first).await.unwrap_err().to_string();
+    assert!(told.contains(&first.to_string()) && told.contains("go on with the version that made it"), "{told}");
 }
 
 #[tokio::test]
