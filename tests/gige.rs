@@ -91,8 +91,18 @@ fn delivers_whole_mosaics_with_rising_numbers_and_times() {
 #[test]
 fn killed_in_mid_stream_it_is_found_again() {
     let Some(mut fake) = Fake::start(&[]) else { return };
-    let mut camera = open("?format=Mono8&width=512&height=512", 25.0).unwrap();
+    let mut camera = open("?format=Mono8&width=512&height=512&exposure=5000", 25.0).unwrap();
     let before = camera.next_frame(5 * SECOND).unwrap();
+    let controls = camera.controls().unwrap();
+    let exposed = |to: f64| {
+        let offered = controls.offered().settings.into_iter().find(|one| one.setting == Setting::Exposure);
+        offered.is_some_and(|exposure| (exposure.value - to).abs() < 0.5)
+    };
+    controls.ask(Setting::Exposure, 12_000.0).unwrap();
+    until("the exposure is changed", || {
+        let _ = camera.next_frame(Duration::from_millis(200));
+        exposed(12_000.0)
+    });
     fake.kill();
     until("the loss is noticed", || {
         let _ = camera.next_frame(Duration::from_millis(50));
@@ -109,6 +119,7 @@ fn killed_in_mid_stream_it_is_found_again() {
     println!("found again after {found:?}");
     assert!(after.unwrap().number > before.number);
     assert!(camera.health().working);
+    assert!(exposed(12_000.0), "what was changed before is changed again");
 }
 
 #[test]
@@ -122,6 +133,14 @@ fn frames_with_lost_packets_are_counted_and_skipped() {
     assert!(frames.len() > 5 && health.working, "{health:?}");
     assert!(health.lost > 0, "of 187 packets a frame, each lost with probability 0.002");
     assert!(span <= frames.len() as u64 + health.lost, "every gap is counted");
+}
+
+#[test]
+fn frames_that_never_come_whole_are_told_with_what_to_do() {
+    let Some(_fake) = Fake::start(&["-r", "500"]) else { return };
+    let camera = open("?format=Mono8&width=512&height=512&packet=1400", 25.0).unwrap();
+    until("it is told", || camera.health().message.contains("parts missing: larger packets"));
+    assert!(camera.health().working, "it is there, and not looked for anew");
 }
 
 #[test]

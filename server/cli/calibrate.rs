@@ -119,6 +119,7 @@ fn refused(which: &str, error: &dyn std::fmt::Display) -> Failure {
 
 /// Adds up frames of the camera.
 fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure> {
+    calibration::check_scale(calibration)?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let optics = SimulatedLens::new(Arc::clone(&clock)).optics();
     let mut camera = camera::open(&capture.camera, CameraSettings { fps: capture.fps.into(), seed: 0, optics, clock })?;

@@ -13,6 +13,9 @@ use crate::imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
 /// Name of the current calibration in its folder. Earlier ones stay beside it, by their version.
 const CURRENT: &str = "calibration.toml";
 
+/// Bits of a camera's samples, whatever its pixel format.
+const CAMERA_BITS: u8 = 10;
+
 /// Reads the calibration in the file `path`, or the current one of the folder `path`.
 pub fn read(path: &Path) -> Result<Calibration, Failure> {
     let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
@@ -43,6 +46,26 @@ pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usiz
         .into()),
         _ => Ok(()),
     }
+}
+
+/// Refuses a calibration that does not fit a camera whose mosaics are of `size`, if it delivers any: in size, or in scale.
+pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> Result<(), Failure> {
+    check_size(calibration, "the camera's picture", size)?;
+    if size.is_some() { check_scale(calibration) } else { Ok(()) }
+}
+
+/// Refuses a calibration for other samples than cameras give.
+pub fn check_scale(calibration: &Calibration) -> Result<(), Failure> {
+    if calibration.bit_depth != CAMERA_BITS {
+        return Err(format!(
+            "the calibration {} is for samples of {} bit, but all cameras' are brought to {CAMERA_BITS} bit here: give dark and white on \
+             that scale, and `bit_depth = {CAMERA_BITS}`",
+            calibration.title(),
+            calibration.bit_depth
+        )
+        .into());
+    }
+    Ok(())
 }
 
 fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {

@@ -114,7 +114,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let library = protocols(arguments, &registry)?;
     let reconstructor = Reconstructor::new(&calibration);
     let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), random.random())?;
-    calibration::check_size(&calibration, "the camera's picture", rig.camera.mosaic_size())?;
+    calibration::check_camera(&calibration, rig.camera.mosaic_size())?;
     let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
     let (control_loop, control, records) =

@@ -90,6 +90,12 @@ fn references_of_another_size_are_refused_when_the_camera_opens() {
     let serve = ["serve", "--bind", "127.0.0.1:0", "--data-dir", data.to_str().unwrap(), "--calibration", file];
     let said = refused(&serve);
     assert!(said.contains("small, version default was taken at 8x8, but the camera's picture is 2048x1088"), "{said}");
+    fs::write(file, "name = 'wide'\nbit_depth = 12").unwrap();
+    assert!(refused(&serve).contains("is for samples of 12 bit"), "a picture four times too dark");
+    let out = folder.path().join("unit");
+    fs::create_dir(&out).unwrap();
+    fs::copy(file, out.join("calibration.toml")).unwrap();
+    assert!(refused(&capture("dark", "phantom:dark", &out)).contains("`bit_depth = 10`"));
     fs::write(file, "dark = 'missing.tiff'").unwrap();
     assert!(refused(&serve).contains("key 'dark': cannot read the picture"), "the file and the key are named");
     fs::write(file, "white = 'dark.tiff'\ndark = 90").unwrap();

@@ -70,6 +70,22 @@ fn every_fault_of_the_line_is_noticed_in_words_and_heals() {
 }
 
 #[test]
+fn a_focal_power_that_can_never_be_read_is_noticed_and_nothing_old_is_told_for_it() {
+    let emulator = emulator(quick());
+    let mut lens = open(&emulator, "").unwrap();
+    lens.set(power(0.25)).unwrap();
+    until("the command arrives", || last_command(&emulator) == Some(2250));
+    emulator.set_fault(Fault::WrongReadBack);
+    lens.set(power(0.75)).unwrap();
+    assert!(lens.read_back().is_err(), "status and temperature are read as ever");
+    until("the fault is noticed", || !lens.health().working);
+    assert!(lens.health().message.contains("checksum"), "{}", lens.health().message);
+    emulator.set_fault(Fault::None);
+    until("it works again", || lens.health().working);
+    assert_eq!(lens.read_back().unwrap(), power(0.75));
+}
+
+#[test]
 fn commands_that_get_lost_are_sent_again_and_then_called_refused() {
     let emulator = emulator(quick());
     let mut lens = open(&emulator, "").unwrap();

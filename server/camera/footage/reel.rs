@@ -9,7 +9,7 @@ use image::ImageReader;
 
 use super::clip::Clip;
 use super::video::FootageError;
-use crate::imaging::{RgbImage, decode};
+use crate::imaging::{Picture, RgbImage, decode};
 
 /// Most pixels across and down: what the blur can follow in real time.
 pub(super) const WIDTH: usize = 1024;
@@ -91,7 +91,14 @@ pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
-    let (picture, _) = decode(&bytes, false).map_err(|error| FootageError::unreadable(file, error))?.developed();
+    let picture = match decode(&bytes, false).map_err(|error| FootageError::unreadable(file, error))? {
+        // Its colours would have to be told as estimated, which footage's are not.
+        Picture::Mosaic(_) => {
+            let reason = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import a scan of such";
+            return Err(FootageError::unreadable(file, reason));
+        }
+        picture => picture.developed().0,
+    };
     if picture.width <= WIDTH && picture.height <= HEIGHT {
         large_enough(file, picture.width, picture.height)?;
         return Ok(picture);

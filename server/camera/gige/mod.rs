@@ -6,6 +6,7 @@
 mod device;
 mod numbers;
 mod pixels;
+mod session;
 mod timestamps;
 mod worker;
 

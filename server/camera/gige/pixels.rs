@@ -47,7 +47,8 @@ impl PixelFormat {
         match self {
             Self::Mono8 => {
                 for (sample, &byte) in samples.iter_mut().zip(bytes) {
-                    *sample = u16::from(byte) << 2;
+                    // So that full scale stays full scale, as saturation is told by.
+                    *sample = u16::from(byte) << 2 | u16::from(byte) >> 6;
                 }
             }
             Self::Mono10 => unpack_words(bytes, samples, 0),
@@ -97,7 +98,7 @@ mod tests {
 
     #[test]
     fn every_format_comes_out_as_ten_bits() {
-        assert_eq!(unpacked(PixelFormat::Mono8, &[0, 1, 255]), [0, 4, 1020]);
+        assert_eq!(unpacked(PixelFormat::Mono8, &[0, 1, 255]), [0, 4, 1023]);
         assert_eq!(unpacked(PixelFormat::Mono10, &[0xFF, 0x03, 0x01, 0x00]), [1023, 1]);
         assert_eq!(unpacked(PixelFormat::Mono12, &[0xFF, 0x0F, 0x04, 0x00]), [1023, 1]);
         assert_eq!(unpacked(PixelFormat::Mono16, &[0xFF, 0xFF, 0x40, 0x00]), [1023, 1]);

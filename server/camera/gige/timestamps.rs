@@ -31,6 +31,12 @@ impl Timestamps {
         rising
     }
 
+    /// Compares arrivals afresh: the exposure was changed, and with it, for cameras that stamp its beginning, the time from stamp to
+    /// arrival.
+    pub fn forget(&mut self) {
+        self.differences.clear();
+    }
+
     fn undelayed(&mut self, stamp: u64, arrived: Moment) -> Moment {
         if stamp == 0 {
             return arrived;
@@ -92,6 +98,15 @@ mod tests {
         let just_after = Moment::from_nanos(at(1_000_000).as_nanos() + 1);
         assert_eq!(map.moment(1000 * MILLI, at(1_020_000)), just_after, "at first the old difference rules");
         assert_eq!(map.moment(5000 * MILLI, at(5_020_000)), at(5_020_000));
+    }
+
+    #[test]
+    fn a_longer_exposure_is_followed_at_once() {
+        let mut map = Timestamps::default();
+        // Stamped when the exposure begins, 5 ms long, then 15.
+        assert_eq!(map.moment(1000 * MILLI, at(1_005_000)), at(1_005_000));
+        map.forget();
+        assert_eq!(map.moment(1020 * MILLI, at(1_035_000)), at(1_035_000));
     }
 
     #[test]

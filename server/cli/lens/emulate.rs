@@ -18,7 +18,7 @@ const HELP: &str = "type what shall befall it, then Enter:
   lens out | lens in               the lens's own cable
   temperature CELSIUS              of the lens
   latency MS                       until it answers a request
-  fault NAME                       none, garbage, wrong-checksum, silent, errors, drops-commands, stranger
+  fault NAME                       none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands, stranger
   glass                            tells the focal power of the glass now, which no driver can read
 Ctrl-C ends it";
 
@@ -46,7 +46,7 @@ pub struct Arguments {
     /// Temperature of the lens in °C.
     #[arg(long, value_name = "CELSIUS", default_value = "25.5", value_parser = parse_temperature, allow_negative_numbers = true)]
     temperature: f64,
-    /// What is wrong with it from the start: none, garbage, wrong-checksum, silent, errors, drops-commands or stranger.
+    /// What is wrong with it from the start: none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands or stranger.
     #[arg(long, value_name = "NAME", default_value = "none")]
     fault: Fault,
 }

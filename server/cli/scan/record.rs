@@ -113,7 +113,7 @@ fn devices(
     };
     let camera = camera::open(&arguments.camera, settings)?;
     if let Some(calibration) = &calibration {
-        calibration::check_size(calibration, "the camera's picture", camera.mosaic_size())?;
+        calibration::check_camera(calibration, camera.mosaic_size())?;
     }
     let stepper = match &arguments.stepper {
         Some(command) => Stepper::Command(command.clone()),

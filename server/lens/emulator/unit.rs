@@ -25,6 +25,8 @@ pub enum Fault {
     Silent,
     /// Every request is answered with an error, and not carried out.
     Errors,
+    /// Every reply that tells the focal power has a wrong checksum.
+    WrongReadBack,
     /// Focal power commands are ignored.
     DropsCommands,
     /// Some other device that says what it likes.
@@ -33,10 +35,11 @@ pub enum Fault {
 
 impl Fault {
     /// Every state.
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::None,
         Self::Garbage,
         Self::WrongChecksum,
+        Self::WrongReadBack,
         Self::Silent,
         Self::Errors,
         Self::DropsCommands,
@@ -49,6 +52,7 @@ impl Fault {
             Self::None => "none",
             Self::Garbage => "garbage",
             Self::WrongChecksum => "wrong-checksum",
+            Self::WrongReadBack => "wrong-read-back",
             Self::Silent => "silent",
             Self::Errors => "errors",
             Self::DropsCommands => "drops-commands",

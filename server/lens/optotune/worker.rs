@@ -20,12 +20,14 @@ const BACKOFF_MOST: Duration = Duration::from_millis(400);
 const READING_EVERY: Duration = Duration::from_millis(200);
 /// What is read, in turn.
 const READINGS: [Request; 3] = [Request::Status, Request::FocalPower, Request::Temperature];
+/// All that is read, in the order in which it is asked for at once.
+const KINDS: [Request; 4] = [Request::Status, Request::Mode, Request::Temperature, Request::FocalPower];
 /// How long a reading that is due waits for a command, so as to be made right behind one: then the reply is in before
 /// the next command comes.
 const GAP_PATIENCE: Duration = Duration::from_millis(60);
 /// A reading made this soon after a command is in its gap.
 const GAP: Duration = Duration::from_millis(5);
-/// Failed readings in a row before the connection is given up.
+/// Failed readings of a kind in a row before the connection is given up.
 const FAILURES: u32 = 3;
 /// Times that a command is sent again before it is called refused.
 const RESENDS: u32 = 2;
@@ -96,7 +98,12 @@ fn connect<'a>(shared: &'a Shared, path: &Path, settings: &'a Settings) -> Resul
     link.follow_commands(device.range);
     shared.connected(device.clone(), words(&device, settings));
     let next_reading = shared.clock.now() + READING_EVERY;
-    Ok(Session { shared, settings, link, device, next_reading, turn: 0, failures: 0, unmet: 0 })
+    Ok(Session { shared, settings, link, device, next_reading, turn: 0, failures: [0; KINDS.len()], unmet: 0 })
+}
+
+/// The place of `request` in [`KINDS`].
+fn kind(request: Request) -> usize {
+    KINDS.iter().position(|&kind| kind == request).unwrap_or(0)
 }
 
 /// A connection that works.
@@ -107,8 +114,8 @@ struct Session<'a> {
     device: Device,
     next_reading: Moment,
     turn: usize,
-    /// Failed readings in a row.
-    failures: u32,
+    /// Failed readings in a row, by kind: one that never works must not hide among those that do.
+    failures: [u32; KINDS.len()],
     /// Times in a row that the read-back was not what was sent.
     unmet: u32,
 }
@@ -140,24 +147,30 @@ impl Session<'_> {
         if now >= self.next_reading + GAP_PATIENCE || (now >= self.next_reading && behind_command) {
             self.next_reading = now + READING_EVERY;
             self.turn = (self.turn + 1) % READINGS.len();
-            let outcome = self.read(READINGS[self.turn]);
-            self.forgive(outcome)?;
+            let request = READINGS[self.turn];
+            let outcome = self.read(request);
+            self.forgive(request, outcome)?;
             self.publish();
         }
         Ok(())
     }
 
     fn read_everything(&mut self) -> Result<(), Trouble> {
-        for request in [Request::Status, Request::Mode, Request::Temperature, Request::FocalPower] {
+        let mut complete = true;
+        for request in KINDS {
             // Asked for by someone who waits: worth a second attempt at once.
             let outcome = match self.read(request) {
                 Err(LinkError::Wire(_) | LinkError::Silent) => self.read(request),
                 outcome => outcome,
             };
-            self.forgive(outcome)?;
+            complete &= outcome.is_ok();
+            self.forgive(request, outcome)?;
         }
         self.publish();
-        self.shared.refreshed();
+        // Else it is tried again: nothing old is handed out as new.
+        if complete {
+            self.shared.refreshed();
+        }
         Ok(())
     }
 
@@ -176,7 +189,7 @@ impl Session<'_> {
             }
             _ => {}
         }
-        self.failures = 0;
+        self.failures[kind(request)] = 0;
         Ok(())
     }
 
@@ -196,10 +209,11 @@ impl Session<'_> {
 
     /// Lets a few failures in a row pass: one damaged reply is no reason to drop a lens that follows. A lens that is
     /// gone, or a driver that forgot how it was set up, is.
-    fn forgive(&mut self, outcome: Result<(), LinkError>) -> Result<(), Trouble> {
+    fn forgive(&mut self, request: Request, outcome: Result<(), LinkError>) -> Result<(), Trouble> {
+        let failures = &mut self.failures[kind(request)];
         match outcome {
-            Err(LinkError::Wire(_) | LinkError::Silent) if self.failures + 1 < FAILURES => {
-                self.failures += 1;
+            Err(LinkError::Wire(_) | LinkError::Silent) if *failures + 1 < FAILURES => {
+                *failures += 1;
                 self.next_reading = self.shared.clock.now();
             }
             other => other?,
