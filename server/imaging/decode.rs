@@ -106,6 +106,7 @@ pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
         DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) if mosaic => {
             Err(DecodeError::NotAMosaic("an 8-bit one"))
         }
+        DynamicImage::ImageLumaA16(_) if mosaic => Err(DecodeError::NotAMosaic("one with transparency")),
         _ if mosaic => Err(DecodeError::NotAMosaic("a colour one")),
         DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
             let data = picture.into_luma8().into_raw().into_iter().map(f32::from).collect();

@@ -32,7 +32,8 @@ pub trait Lens: Send {
     /// Asks the lens to go to `target`; returns without waiting for it to get there.
     ///
     /// # Errors
-    /// When the command was not taken: the lens is gone, refuses, or its queue stalls. The lens stays where it was.
+    /// When the lens is gone, did not follow the commands before, or takes them too slowly. It stays where it was until it is well again; it
+    /// may go to the latest target then.
     fn set(&mut self, target: FocalPower) -> Result<(), LensError>;
 
     /// The focal power last known to be real (read back, or modelled from what was asked), if any is known.

@@ -35,12 +35,13 @@ const fn whole_benchmark() -> usize {
     COUNT
 }
 
-/// The recipes that ship: ours by the policy's name, what comes after the belief tracker's with `-refined` behind it, the paper's
+/// The recipes that ship: ours by the policy's name, what comes after it with `-refined` behind it, the paper's
 /// with `-paper`.
-const SHIPPED: [(&str, &str); 8] = [
+const SHIPPED: [(&str, &str); 9] = [
     ("mgm-learned", include_str!("recipes/mgm-learned.toml")),
     ("mlr-learned", include_str!("recipes/mlr-learned.toml")),
     ("cnn-learned", include_str!("recipes/cnn-learned.toml")),
+    ("cnn-learned-refined", include_str!("recipes/cnn-learned-refined.toml")),
     ("mgm-learned-paper", include_str!("recipes/mgm-learned-paper.toml")),
     ("mlr-learned-paper", include_str!("recipes/mlr-learned-paper.toml")),
     ("cnn-learned-paper", include_str!("recipes/cnn-learned-paper.toml")),
