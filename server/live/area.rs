@@ -1,11 +1,15 @@
 //! When the content area found in a picture is worth telling the loop: the patch should not tremble with the detection,
-//! nor jump to the middle because one picture was too dark to see the circle in.
+//! nor jump because in one picture the circle was not seen, or seen where it is not.
 
 use crate::imaging::ContentArea;
 
 /// Pixels that centre or radius must have moved by. The detection's own error is about 6 px at 1080x1920, so about a
 /// quarter of that at the size of one band.
 const MOVED: f64 = 2.0;
+
+/// Pixels beyond which a circle is believed only once the next one agrees: up to one detection in ten may be wrong by more than 15 px at
+/// 1080x1920 (what the method's authors allow it), about 4 at the size of one band.
+const JUMP: f64 = 4.0;
 
 /// Detections in a row without a circle before there is none.
 const MISSES: u32 = 10;
@@ -14,6 +18,8 @@ const MISSES: u32 = 10;
 #[derive(Debug, Default)]
 pub struct AreaWatch {
     told: Option<ContentArea>,
+    /// A circle far from the one told, which the next may confirm.
+    doubted: Option<ContentArea>,
     misses: u32,
 }
 
@@ -22,11 +28,17 @@ impl AreaWatch {
     #[allow(clippy::option_option, reason = "that there is no area is news too")]
     pub fn see(&mut self, found: Option<ContentArea>) -> Option<Option<ContentArea>> {
         self.misses = if found.is_some() { 0 } else { self.misses + 1 };
+        let doubted = self.doubted.take();
         let news = match (self.told, found) {
             (None, None) => false,
             (None, Some(_)) => true,
             (Some(_), None) => self.misses >= MISSES,
-            (Some(told), Some(found)) => distance(&told, &found) > MOVED,
+            (Some(told), Some(found)) if distance(&told, &found) <= JUMP => distance(&told, &found) > MOVED,
+            (Some(_), Some(found)) => {
+                let confirmed = doubted.is_some_and(|doubted| distance(&doubted, &found) <= JUMP);
+                self.doubted = (!confirmed).then_some(found);
+                confirmed
+            }
         };
         news.then(|| {
             self.told = found;
@@ -56,6 +68,17 @@ mod tests {
         assert_eq!(watch.see(area(254.5, 121.5)), None);
         assert_eq!(watch.see(area(260.0, 120.0)), Some(area(260.0, 120.0)));
         assert_eq!(watch.see(area(260.0, 123.0)), Some(area(260.0, 123.0)));
+    }
+
+    #[test]
+    fn one_wrong_circle_is_no_news_but_two_that_agree_are() {
+        let mut watch = AreaWatch::default();
+        watch.see(area(256.0, 120.0));
+        assert_eq!(watch.see(area(290.0, 120.0)), None);
+        assert_eq!(watch.see(area(256.0, 120.0)), None);
+        assert_eq!(watch.see(area(290.0, 120.0)), None);
+        assert_eq!(watch.see(area(200.0, 90.0)), None, "they do not agree");
+        assert_eq!(watch.see(area(201.0, 90.0)), Some(area(201.0, 90.0)));
     }
 
     #[test]
