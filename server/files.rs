@@ -26,11 +26,10 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 pub fn replace_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let beside = path.with_file_name(format!(".{name}.partial"));
-    let written = write_through_with(&beside, fill)
-        .and_then(|()| fs::rename(&beside, path))
-        .and_then(|()| sync_folder(path.parent().unwrap_or(Path::new(""))));
-    if written.is_err() {
-        let _ = fs::remove_file(&beside);
+    let written = write_through_with(&beside, fill).and_then(|()| fs::rename(&beside, path));
+    match &written {
+        Ok(()) => sync_folder_of(path),
+        Err(_) => drop(fs::remove_file(&beside)),
     }
     written
 }
@@ -50,13 +49,11 @@ fn write_through_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io
     writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()
 }
 
-/// Waits until the disk has the names in `folder`: a file that was renamed may otherwise have its old name after a power cut.
-///
-/// # Errors
-/// When the folder cannot be opened, or the disk fails.
-pub fn sync_folder(folder: &Path) -> io::Result<()> {
-    let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    File::open(here)?.sync_all()
+/// Waits until the disk has the name of `path`: what was renamed may otherwise have its old name after a power cut. What is there is whole
+/// under either name, so a folder that cannot be read, or a file system that cannot do this, is no failure.
+pub fn sync_folder_of(path: &Path) {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
 /// Whether `name` is that of a file that a process killed in [`replace`] left behind.

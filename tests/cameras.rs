@@ -204,6 +204,14 @@ fn refusal(spec: &str) -> String {
 }
 
 #[test]
+fn a_mosaic_is_no_footage() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("mosaic.png");
+    image::ImageBuffer::from_pixel(2048, 1088, image::Luma([400_u16])).save(&file).unwrap();
+    assert!(refusal(&format!("footage:{}", file.display())).contains("it is a sensor's mosaic"));
+}
+
+#[test]
 fn bad_sources_are_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let inside = |name: &str| -> PathBuf { folder.path().join(name) };

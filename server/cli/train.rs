@@ -27,8 +27,7 @@ enum Compute {
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`; with `-paper` behind one of the first three, by the
-    /// paper's recipe; `cnn-learned-refined` and
-    /// `parfocal-refined`: what follows these, with `--from` their weights.
+    /// paper's recipe; `cnn-learned-refined` and `parfocal-refined`: what follows these, with `--from` their weights.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]

@@ -6,7 +6,7 @@ use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::frame::{FrameError, GrayImage, MosaicFrame, RgbImage};
 use super::luma::luma;
-use super::{Calibration, Reconstructor};
+use super::reconstruct::Reconstructor;
 
 /// Width and height in samples of the full sensor (IMEC CMV2K), which a raw mosaic has.
 pub const SENSOR_SIZE: (usize, usize) = (2048, 1088);
@@ -29,20 +29,15 @@ pub enum Picture {
 }
 
 impl Picture {
-    /// The picture in colour and in gray, whatever it was: a mosaic by the calibration of a typical unit.
+    /// The picture in gray, whatever it was: a mosaic by `reconstructor`.
     #[must_use]
-    pub fn developed(self) -> (RgbImage, GrayImage) {
+    pub fn into_gray(self, reconstructor: &mut Reconstructor) -> GrayImage {
         match self {
-            Self::Rgb(rgb, gray) => (rgb, gray),
-            Self::Gray(gray) => {
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels, 0..=255")]
-                let data = gray.data.iter().flat_map(|&value| [value.round() as u8; 3]).collect();
-                (RgbImage { width: gray.width, height: gray.height, data }, gray)
-            }
+            Self::Rgb(_, gray) | Self::Gray(gray) => gray,
             Self::Mosaic(mosaic) => {
-                let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
-                Reconstructor::new(&Calibration::default()).reconstruct(&mosaic, &mut rgb, &mut gray);
-                (rgb, gray)
+                let mut gray = GrayImage::default();
+                reconstructor.reconstruct(&mosaic, &mut RgbImage::default(), &mut gray);
+                gray
             }
         }
     }
@@ -99,8 +94,9 @@ pub enum DecodeError {
 pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
     let picture = decode_any(bytes)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let mosaic_by_size = is_mosaic(&picture);
     match picture {
-        DynamicImage::ImageLuma16(samples) if mosaic || (width, height) == SENSOR_SIZE => {
+        DynamicImage::ImageLuma16(samples) if mosaic || mosaic_by_size => {
             Ok(Picture::Mosaic(MosaicFrame::new(width, height, samples.into_raw())?))
         }
         DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) if mosaic => {
@@ -129,6 +125,13 @@ pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
         }
         other => Err(DecodeError::OtherPixels(format!("{:?}", other.color()))),
     }
+}
+
+/// Whether `picture` is a sensor's mosaic: 16-bit gray of the sensor's full size.
+#[must_use]
+pub fn is_mosaic(picture: &DynamicImage) -> bool {
+    matches!(picture, DynamicImage::ImageLuma16(_))
+        && (picture.width() as usize, picture.height() as usize) == SENSOR_SIZE
 }
 
 /// Reads a raw mosaic: 2048x1088 samples, row by row, each two bytes with the low one first.

@@ -18,7 +18,7 @@ mod references;
 pub use blur::gaussian_blur;
 pub use calibration::{BANDS, Band, Calibration, Reference};
 pub use calibration_toml::CalibrationError;
-pub use decode::{DecodeError, Picture, SENSOR_SIZE, decode, decode_any, decode_raw};
+pub use decode::{DecodeError, Picture, SENSOR_SIZE, decode, decode_any, decode_raw, is_mosaic};
 pub use frame::{CELL, FrameError, GrayImage, MosaicFrame, RgbImage};
 pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
 pub use jpeg::{JpegEncoder, JpegError};

@@ -9,7 +9,7 @@ use image::ImageReader;
 
 use super::clip::Clip;
 use super::video::FootageError;
-use crate::imaging::{Picture, RgbImage, decode};
+use crate::imaging::{RgbImage, decode_any, is_mosaic};
 
 /// Most pixels across and down: what the blur can follow in real time.
 pub(super) const WIDTH: usize = 1024;
@@ -91,25 +91,20 @@ pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
 /// Reads a picture, scaled down to at most [`WIDTH`] x [`HEIGHT`].
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
-    let picture = match decode(&bytes, false).map_err(|error| FootageError::unreadable(file, error))? {
+    let picture = decode_any(&bytes).map_err(|error| FootageError::unreadable(file, error))?;
+    if is_mosaic(&picture) {
         // Its colours would have to be told as estimated, which footage's are not.
-        Picture::Mosaic(_) => {
-            let reason = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import a scan of such";
-            return Err(FootageError::unreadable(file, reason));
-        }
-        picture => picture.developed().0,
-    };
-    if picture.width <= WIDTH && picture.height <= HEIGHT {
-        large_enough(file, picture.width, picture.height)?;
-        return Ok(picture);
+        let reason = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import a scan of such";
+        return Err(FootageError::unreadable(file, reason));
     }
-    #[allow(clippy::cast_possible_truncation, reason = "decoded pictures have 16384 pixels a side at most")]
-    let whole = image::RgbImage::from_raw(picture.width as u32, picture.height as u32, picture.data)
-        .ok_or_else(|| FootageError::unreadable(file, "its pixels do not fit its size"))?;
-    #[allow(clippy::cast_possible_truncation, reason = "small constants")]
-    let scaled =
-        image::DynamicImage::from(whole).resize(WIDTH as u32, HEIGHT as u32, image::imageops::FilterType::Triangle);
-    let rgb = scaled.into_rgb8();
+    let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
+    let scaled = if fits {
+        picture
+    } else {
+        #[allow(clippy::cast_possible_truncation, reason = "small constants")]
+        picture.resize(WIDTH as u32, HEIGHT as u32, image::imageops::FilterType::Triangle)
+    };
+    let rgb = scaled.to_rgb8();
     let (width, height) = (rgb.width() as usize, rgb.height() as usize);
     large_enough(file, width, height)?;
     RgbImage::new(width, height, rgb.into_raw()).map_err(|error| FootageError::unreadable(file, error))

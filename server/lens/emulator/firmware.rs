@@ -237,19 +237,20 @@ impl Firmware {
     }
 
     fn damaged(&self, mut answer: Vec<u8>) -> Vec<u8> {
-        let length = answer.len();
         match self.fault {
             Fault::Garbage => answer.iter_mut().for_each(|byte| *byte = byte.wrapping_mul(31) ^ 0x5A),
-            Fault::WrongReadBack if !answer.starts_with(b"PD") => {}
             // The greeting has none.
-            Fault::WrongChecksum | Fault::WrongReadBack if answer != b"Ready\r\n" => {
-                if let Some(byte) = length.checked_sub(3).and_then(|at| answer.get_mut(at)) {
-                    *byte ^= 0x40;
-                }
-            }
+            Fault::WrongChecksum if answer != b"Ready\r\n" => spoil_checksum(&mut answer),
+            Fault::WrongReadBack if answer.starts_with(b"PD") => spoil_checksum(&mut answer),
             _ => {}
         }
         answer
+    }
+}
+
+fn spoil_checksum(answer: &mut [u8]) {
+    if let Some(byte) = answer.len().checked_sub(3).and_then(|at| answer.get_mut(at)) {
+        *byte ^= 0x40;
     }
 }
 

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use super::ExportError;
 use super::table::{Row, Table, csv_cell};
-use crate::files::{sync_folder, write_through};
+use crate::files::{sync_folder_of, write_through};
 
 /// Name of the file of checksums, in the form of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
@@ -99,15 +99,14 @@ impl Folder {
         let line = |file: &String| Ok(format!("{}  {file}\n", self.hash(file)?.0));
         let sums = self.files.iter().map(line).collect::<Result<String, ExportError>>()?;
         self.file(SUMS, sums.as_bytes())?;
-        let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
-        sync_folder(self.temporary.path()).map_err(unwritable)?;
+        sync_folder_of(&self.path(SUMS));
         let whole = self.temporary.keep();
         std::fs::rename(&whole, out).map_err(|error| {
             // It is all that is left to do for it.
             let _ = std::fs::remove_dir_all(&whole);
-            unwritable(error)
+            ExportError::Unwritable { path: out.to_owned(), error }
         })?;
-        sync_folder(out.parent().unwrap_or(Path::new(""))).map_err(unwritable)?;
+        sync_folder_of(out);
         Ok(self.files)
     }
 
@@ -135,12 +134,9 @@ impl CsvFile {
     }
 
     /// Waits until the disk has it.
-    fn end(self) -> Result<(), ExportError> {
-        let Self { path, writer } = self;
-        let flushed =
-            writer.into_inner().map_err(|error| std::io::Error::new(error.error().kind(), error.error().to_string()));
-        let file = flushed.and_then(|writer| writer.into_inner().map_err(std::io::IntoInnerError::into_error));
-        file.and_then(|file| file.sync_data()).map_err(|error| ExportError::Unwritable { path, error })
+    fn end(mut self) -> Result<(), ExportError> {
+        let kept = self.writer.flush().and_then(|()| File::open(&self.path)).and_then(|file| file.sync_data());
+        kept.map_err(|error| ExportError::Unwritable { path: self.path, error })
     }
 
     fn record(&mut self, cells: impl Iterator<Item = String>) -> Result<(), ExportError> {

@@ -127,7 +127,7 @@ fn numbered(folder: &Path, file: &str) -> Result<usize, String> {
 }
 
 /// Files that an unblinded export has, and a blinded one must not have.
-pub(super) const UNBLINDED: [&str; 4] = ["allocation.csv", "allocation.json", "weights.csv", "policy_steps.csv"];
+const UNBLINDED: [&str; 4] = ["allocation.csv", "allocation.json", "weights.csv", "policy_steps.csv"];
 
 fn copies(folder: &Path) -> Outcome {
     let package = json(folder, "datapackage.json")?;

@@ -9,9 +9,7 @@ use crate::camera::footage::picture_reader;
 use crate::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
 };
-use crate::imaging::{
-    Calibration, DecodeError, GrayImage, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode,
-};
+use crate::imaging::{Calibration, DecodeError, GrayImage, PatchArea, Reconstructor, content_area, decode};
 use crate::lens::FocalPower;
 
 /// What a folder holds: for each pose its number there, and a file for each focal power, rising.
@@ -190,15 +188,8 @@ impl Reader {
     fn read(&mut self, path: &Path) -> Result<GrayImage, ImportError> {
         let unreadable = |error| ImportError::Unreadable { path: path.to_owned(), error };
         let bytes = std::fs::read(path).map_err(unreadable)?;
-        match decode(&bytes, false) {
-            Ok(Picture::Gray(gray) | Picture::Rgb(_, gray)) => Ok(gray),
-            Ok(Picture::Mosaic(mosaic)) => {
-                let mut gray = GrayImage::default();
-                self.reconstructor.reconstruct(&mosaic, &mut RgbImage::default(), &mut gray);
-                Ok(gray)
-            }
-            Err(error) => Err(ImportError::Picture { path: path.to_owned(), error }),
-        }
+        let picture = decode(&bytes, false).map_err(|error| ImportError::Picture { path: path.to_owned(), error })?;
+        Ok(picture.into_gray(&mut self.reconstructor))
     }
 }
 
