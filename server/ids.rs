@@ -39,6 +39,10 @@ identifier!(
     SegmentId
 );
 identifier!(
+    /// A browser that surgeons use, all its tabs together. Random, made by its page and kept there.
+    DeviceId
+);
+identifier!(
     /// Made by a browser for one comment or answer: the same again is the same thing, however often it is sent.
     IdempotencyKey
 );

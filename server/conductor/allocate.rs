@@ -31,7 +31,9 @@ impl Shared {
         let created = Event { number: 1, by, at, wall, kind: EventKind::Created };
         self.store.create_session(&made, &created).await?;
         let session = made.session;
-        live.course = Some(Course::new(made, protocol, created));
+        let mut course = Course::new(made, protocol);
+        course.apply(created, self.time(at));
+        live.course = Some(course);
         self.publish(&live);
         self.changed.notify_one();
         Ok(session)

@@ -10,8 +10,9 @@ use crate::clock::Moment;
 use crate::control::{Command, Drive};
 use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
-use crate::store::{Comment, NewSession, Reader};
+use crate::store::{Comment, NewSession, Reader, RunClocks};
 use crate::trial::event::{Event, EventKind};
+use crate::trial::grace::Grace;
 use crate::trial::protocol::Protocol;
 use crate::trial::session::{Plan, SessionState};
 use crate::trial::view::{CommentLine, Phase, Role};
@@ -24,6 +25,8 @@ pub(super) struct Course {
     pub made: NewSession,
     pub protocol: Protocol,
     pub state: SessionState,
+    /// Whether what is said still counts.
+    pub grace: Grace,
     /// All its events.
     pub events: Vec<Event>,
     /// Comments in all.
@@ -58,29 +61,27 @@ impl Driving {
 }
 
 impl Course {
-    /// A session just made.
-    pub fn new(made: NewSession, protocol: Protocol, created: Event) -> Self {
+    /// A session in which nothing has happened yet.
+    pub fn new(made: NewSession, protocol: Protocol) -> Self {
         let segments = made.segments.iter().map(|(segment, _)| *segment).collect();
         let state = SessionState::new(Plan::new(&protocol, segments));
-        let mut course = Self { made, protocol, state, events: Vec::new(), comments: 0, latest_comments: Vec::new() };
-        course.apply(created);
-        course
+        let grace = Grace::new(protocol.grace);
+        Self { made, protocol, state, grace, events: Vec::new(), comments: 0, latest_comments: Vec::new() }
     }
 
-    /// Session `session` as the database has it, or `None`.
-    pub async fn load(reader: &Reader, session: SessionId) -> Result<Option<Self>, ConductError> {
+    /// Session `session` as the database has it, or `None`; `clocks` are those of the server's starts.
+    pub async fn load(reader: &Reader, clocks: &RunClocks, session: SessionId) -> Result<Option<Self>, ConductError> {
         let Some(stored) = reader.session(session).await? else { return Ok(None) };
-        // Its own policies are known, whatever the registry has now.
-        let known: Vec<PolicyName> = stored.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
-        let protocol = Protocol::parse(&stored.made.protocol_toml, &stored.made.protocol, &known)
-            .map_err(|error| ConductError::Unreadable { session, reason: error.to_string() })?;
-        let segments = stored.made.segments.iter().map(|(segment, _)| *segment).collect();
-        let state = SessionState::new(Plan::new(&protocol, segments));
-        let mut course =
-            Self { made: stored.made, protocol, state, events: Vec::new(), comments: 0, latest_comments: Vec::new() };
-        stored.events.into_iter().for_each(|(_, event)| course.apply(event));
-        for (_, answer) in reader.answers(session).await? {
-            course.state.keep_answer(answer.segment, &answer.question, answer.value);
+        let protocol =
+            stored.protocol().map_err(|error| ConductError::Unreadable { session, reason: error.to_string() })?;
+
+        let mut course = Self::new(stored.made, protocol);
+        for (run, event) in stored.events {
+            let at = clocks.wall(run, event.at);
+            course.apply(event, at);
+        }
+        for (run, answer) in reader.answers(session).await? {
+            course.state.keep_answer(answer.segment, &answer.question, answer.given(run, clocks));
         }
         reader.comments(session).await?.into_iter().for_each(|(_, comment)| course.heard(comment));
         Ok(Some(course))
@@ -102,9 +103,10 @@ impl Course {
         kinds.into_iter().zip(next..).map(|(kind, number)| Event { number, by, at, wall, kind }).collect()
     }
 
-    /// Takes in what happened.
-    pub fn apply(&mut self, event: Event) {
+    /// Takes in what happened, at `at` by the server's clocks over its restarts.
+    pub fn apply(&mut self, event: Event, at: Timestamp) {
         self.state.apply(&event);
+        self.grace.apply(&event.kind, at);
         self.events.push(event);
     }
 

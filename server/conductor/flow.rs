@@ -3,13 +3,17 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use jiff::Timestamp;
 use tokio::sync::watch;
 
 use super::course::Course;
 use super::{ConductError, Live, Shared, views};
+use crate::clock::Moment;
 use crate::control::{Command, Drive};
 use crate::ids::SessionId;
+use crate::store::DeviceReport;
 use crate::trial::event::EventKind;
+use crate::trial::grace::Outstanding;
 use crate::trial::session::{decide, decide_restart, decide_time};
 use crate::trial::view::{Action, Phase, Role};
 
@@ -21,6 +25,7 @@ impl Shared {
         }
         if let Some(course) = live.course.as_mut().filter(|course| course.session() == session) {
             let kinds = decide(&course.state, by, action, self.clock.now())?;
+            self.ask_first(course, action).await?;
             self.record(course, by, kinds).await?;
             self.publish(&live);
             self.drive(&mut live);
@@ -42,11 +47,38 @@ impl Shared {
             return Err(ConductError::Conflict(text));
         }
         let kinds = decide(&earlier.state, by, action, self.clock.now())?;
+        self.ask_first(&earlier, action).await?;
         self.record(&mut earlier, by, kinds).await
     }
 
+    /// Refuses to unblind while something may be outstanding, unless that is known.
+    async fn ask_first(&self, course: &Course, action: &Action) -> Result<(), ConductError> {
+        if !matches!(action, Action::Unblind { despite_outstanding: false, .. }) {
+            return Ok(());
+        }
+        match self.outstanding(course).await? {
+            None => Ok(()),
+            Some(outstanding) => {
+                let text = format!("{outstanding}; to unblind all the same, confirm it (despite_outstanding)");
+                Err(ConductError::Conflict(text))
+            }
+        }
+    }
+
+    /// What may still come in for `course`, which unblinding would keep from counting.
+    pub(super) async fn outstanding(&self, course: &Course) -> Result<Option<Outstanding>, ConductError> {
+        let devices = self.store.reader().surgeon_devices(course.session()).await?;
+        let told = |device: &DeviceReport| device.told.map(|(holding, run, at)| (holding, self.clocks.wall(run, at)));
+        Ok(course.grace.outstanding(self.time(self.clock.now()), devices.iter().map(told)))
+    }
+
+    /// `at`, a moment of this run, on the time that goes on over the server's restarts.
+    pub(super) fn time(&self, at: Moment) -> Timestamp {
+        self.clocks.wall(self.store.run(), at)
+    }
+
     pub(super) async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
-        let course = Course::load(self.store.reader(), session).await?;
+        let course = Course::load(self.store.reader(), &self.clocks, session).await?;
         course.ok_or_else(ConductError::no_session)
     }
 
@@ -86,7 +118,8 @@ impl Shared {
         let events = course.number(by, kinds, self.clock.now(), self.clock.wall());
         self.store.append_events(course.session(), &events).await?;
         for event in events {
-            course.apply(event);
+            let at = self.time(event.at);
+            course.apply(event, at);
         }
         Ok(())
     }

@@ -18,15 +18,15 @@ use tokio::sync::{Mutex, Notify, watch};
 
 pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
-pub use timeline::{PauseSpan, SettingSpan, Timeline, TimelineComment, TimelinePoint};
+pub use timeline::{PauseSpan, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint};
 
 use crate::autofocus::Registry;
 use crate::clock::Clock;
 use crate::control::ControlHandle;
 use crate::ids::SessionId;
-use crate::store::{Store, StoreError};
+use crate::store::{RunClocks, Store, StoreError};
 use crate::trial::session::Refusal;
-use crate::trial::view::{Action, NewAnswer, NewComment, OperatorView, Role, SurgeonView};
+use crate::trial::view::{Action, Holding, NewAnswer, NewComment, OperatorView, Role, SurgeonView};
 use course::Course;
 
 /// Time between two sendings of the time left, and the most that a killed server forgets of a segment's clock.
@@ -61,6 +61,8 @@ struct Shared {
     library: Library,
     registry: Registry,
     clock: Arc<dyn Clock>,
+    /// The clocks of this start of the server and of those before.
+    clocks: RunClocks,
     /// Held from the decision to the view, so that what is decided is decided on what is on disk.
     live: Mutex<Live>,
     surgeon: watch::Sender<Option<Arc<SurgeonView>>>,
@@ -140,8 +142,9 @@ impl Conductor {
     pub async fn open(parts: Parts) -> Result<Self, ConductError> {
         let Parts { store, control, library, registry, clock, mut random } = parts;
         random.set_stream(u64::try_from(store.run()).unwrap_or_default());
+        let clocks = store.reader().run_clocks().await?;
         let course = match store.reader().session_under_way().await? {
-            Some(session) => Course::load(store.reader(), session).await?,
+            Some(session) => Course::load(store.reader(), &clocks, session).await?,
             None => None,
         };
         let shared = Shared {
@@ -150,6 +153,7 @@ impl Conductor {
             library,
             registry,
             clock,
+            clocks,
             live: Mutex::new(Live { course, random, driving: None }),
             surgeon: watch::Sender::new(None),
             operator: watch::Sender::new(None),
@@ -252,6 +256,14 @@ impl Conductor {
     /// When the question has not been asked yet, the value does not fit it, or the disk failed.
     pub async fn answer(&self, answer: NewAnswer) -> Result<(), ConductError> {
         self.to_the_end(|shared| async move { shared.answer(answer).await }).await
+    }
+
+    /// Notes how much of a session a surgeon's device still holds.
+    ///
+    /// # Errors
+    /// When there is no such session, or the disk failed.
+    pub async fn holding(&self, holding: Holding) -> Result<(), ConductError> {
+        self.to_the_end(move |shared| async move { shared.holding(holding).await }).await
     }
 
     /// Runs `work` to its end even if the caller is dropped meanwhile, as a handler is when its browser goes away: what

@@ -5,18 +5,20 @@ use super::{ConductError, Live, Shared};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::{Answer, Comment, Kept, Stamp};
 use crate::trial::answers;
-use crate::trial::view::{AnswerValue, NewAnswer, NewComment, Said};
+use crate::trial::grace::Grace;
+use crate::trial::view::{AnswerValue, Holding, NewAnswer, NewComment, Said};
 
 impl Shared {
     pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {
         check_said(&new.said)?;
         let mut live = self.live.lock().await;
         let current = live.course.as_ref().filter(|course| course.session() == new.session);
-        let segments = match current {
-            Some(course) => course.state.plan().segments.clone(),
-            None => self.segments(new.session).await?,
+        let (segments, grace) = match current {
+            Some(course) => (course.state.plan().segments.clone(), course.grace),
+            None => self.of_earlier(new.session).await?,
         };
         let current = current.is_some();
+        let stamp = self.stamp();
         // A segment that is not this session's can only come from a broken page: what was said is kept all the same.
         let segment = new.segment.filter(|segment| segments.contains(segment));
         let comment = Comment {
@@ -25,9 +27,9 @@ impl Shared {
             segment,
             frame: new.frame,
             frame_run: new.run.filter(|run| (1..=self.store.run()).contains(run)),
-            client_millis: new.client_millis,
-            waited_ms: new.waited_millis.filter(|waited| *waited >= 0),
-            stamp: self.stamp(),
+            origin: new.origin.plausible(),
+            late: grace.is_late(self.time(stamp.at)),
+            stamp,
             said: new.said,
         };
         let kept = self.store.keep_comment(&comment).await?;
@@ -50,13 +52,14 @@ impl Shared {
         };
         let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(ConductError::no_session()) };
         check_answer(course, &new)?;
-        let answer = self.stamped(new);
+        let answer = self.stamped(new, course.grace);
         let kept = self.store.keep_answer(&answer).await?;
         if kept == Kept::New
             && earlier.is_none()
             && let Some(course) = live.course.as_mut()
         {
-            course.state.keep_answer(answer.segment, &answer.question, answer.value);
+            let given = answer.given(self.store.run(), &self.clocks);
+            course.state.keep_answer(answer.segment, &answer.question, given);
             self.publish(&live);
         }
         unless_taken(kept)
@@ -67,23 +70,34 @@ impl Shared {
         if let AnswerValue::Text(text) = &new.value {
             answers::check_length(text).map_err(|misfit| ConductError::Invalid(misfit.to_string()))?;
         }
-        if let Some(segment) = new.segment
-            && !self.segments(new.session).await?.contains(&segment)
-        {
+        let (segments, grace) = self.of_earlier(new.session).await?;
+        if new.segment.is_some_and(|segment| !segments.contains(&segment)) {
             return Err(ConductError::NotFound("this session has no such setting; reload the page".to_owned()));
         }
-        unless_taken(self.store.keep_answer(&self.stamped(new)).await?)
+        unless_taken(self.store.keep_answer(&self.stamped(new, grace)).await?)
     }
 
-    fn stamped(&self, new: NewAnswer) -> Answer {
-        let NewAnswer { key, session, segment, question, value } = new;
-        Answer { key, session, segment, question, value, stamp: self.stamp() }
+    pub(super) async fn holding(&self, holding: Holding) -> Result<(), ConductError> {
+        let live = self.live.lock().await;
+        if live.course.as_ref().is_none_or(|course| course.session() != holding.session) {
+            self.of_earlier(holding.session).await?;
+        }
+        Ok(self.store.note_holding(&holding, self.stamp()).await?)
     }
 
-    /// The segments of an earlier session: known whether or not its protocol can still be read, so that a late comment on it is kept.
-    async fn segments(&self, session: SessionId) -> Result<Vec<SegmentId>, ConductError> {
+    fn stamped(&self, new: NewAnswer, grace: Grace) -> Answer {
+        let NewAnswer { key, session, segment, question, value, origin } = new;
+        let stamp = self.stamp();
+        let late = grace.is_late(self.time(stamp.at));
+        Answer { key, session, segment, question, value, origin: origin.plausible(), late, stamp }
+    }
+
+    /// The segments of an earlier session, and whether what is said of it still counts: known whether or not its protocol
+    /// can still be read, so that a late comment on it is kept.
+    async fn of_earlier(&self, session: SessionId) -> Result<(Vec<SegmentId>, Grace), ConductError> {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
-        Ok(stored.made.segments.into_iter().map(|(segment, _)| segment).collect())
+        let grace = stored.grace(&self.clocks);
+        Ok((stored.made.segments.into_iter().map(|(segment, _)| segment).collect(), grace))
     }
 
     /// Session `session` from the database, unless it is the one in memory.

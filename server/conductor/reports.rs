@@ -1,7 +1,5 @@
 //! What the operator's and researcher's pages read: participants, protocols, sessions, one session in detail.
 
-use std::collections::BTreeMap;
-
 use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -10,9 +8,10 @@ use super::course::Course;
 use super::{ConductError, Conductor, ProtocolSummary, operator_only};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
-use crate::store::{DeviceEvent, Participant, Reader, SessionLine};
+use crate::store::{DeviceEvent, Participant, Reader, SessionLine, standings};
 use crate::trial::answers::sus_score;
-use crate::trial::event::{Event, EventKind};
+use crate::trial::event::EventKind;
+use crate::trial::grace::Outstanding;
 use crate::trial::participant::ParticipantCode;
 use crate::trial::view::{AnswerValue, LogLine, QuestionKind, Role};
 
@@ -32,6 +31,11 @@ pub struct SessionDetail {
     pub settings_detail: Vec<SettingDetail>,
     /// Answers that count, in the order they were given.
     pub answers: Vec<AnswerLine>,
+    /// Until when, by the server's clock, what arrives counts; none while the session is under way.
+    #[schema(value_type = Option<String>)]
+    pub counts_until: Option<Timestamp>,
+    /// What may still come in, and would not count after unblinding.
+    pub outstanding: Option<Outstanding>,
     /// Everything that happened, oldest first.
     pub log: Vec<LogLine>,
     /// What unblinding told, if it happened.
@@ -70,6 +74,8 @@ pub struct AnswerLine {
     pub sus_score: Option<f64>,
     /// Whether it replaced an earlier answer.
     pub changed: bool,
+    /// Whether another of the surgeon's devices said something else; the timeline tells what.
+    pub devices_disagree: bool,
 }
 
 /// What unblinding told.
@@ -144,6 +150,8 @@ impl Conductor {
             commitment: course.made.commitment.clone(),
             settings_detail: settings(&course),
             answers: self.answer_lines(&course).await?,
+            counts_until: course.grace.until(),
+            outstanding: self.shared.outstanding(&course).await?,
             log: self.log(&course).await?,
             unblinding: unblinding(&course),
         })
@@ -151,47 +159,54 @@ impl Conductor {
 
     /// What happened in the session, and to camera and lens since it was made.
     async fn log(&self, course: &Course) -> Result<Vec<LogLine>, ConductError> {
-        let line = |event: &Event| LogLine {
-            at: event.wall,
-            by: event.by,
-            text: event.kind.in_words(|segment| course.setting(segment)),
-        };
-        let mut lines: Vec<LogLine> = course.events.iter().map(line).collect();
-        let made = lines.first().map(|line| line.at);
-        let devices = self.shared.store.reader().device_events(course.session()).await?;
-        let since = devices.into_iter().map(|(_, _, event)| event).filter(|event| Some(event.wall) >= made);
-        lines.extend(since.map(|DeviceEvent { wall, device, message, .. }| LogLine {
-            at: wall,
-            by: Role::System,
-            text: format!("The {device}: {message}"),
-        }));
-        lines.sort_by_key(|line| line.at);
-        Ok(lines)
+        let reader = self.shared.store.reader();
+        let clocks = &self.shared.clocks;
+        let events = reader.events(course.session()).await?;
+        let devices = reader.device_events(course.session()).await?;
+
+        // In the order in which it happened, whatever was done to the wall clock meanwhile.
+        let mut lines: Vec<(Timestamp, LogLine)> = Vec::new();
+        for (run, event) in events {
+            let text = event.kind.in_words(|segment| course.setting(segment));
+            lines.push((clocks.wall(run, event.at), LogLine { at: event.wall, by: event.by, text }));
+        }
+        let made = lines.first().map(|(at, _)| *at);
+        for (_, run, DeviceEvent { wall, at, device, message, .. }) in devices {
+            let at = clocks.wall(run, at);
+            if Some(at) >= made {
+                let text = format!("The {device}: {message}");
+                lines.push((at, LogLine { at: wall, by: Role::System, text }));
+            }
+        }
+        lines.sort_by_key(|(at, _)| *at);
+        Ok(lines.into_iter().map(|(_, line)| line).collect())
     }
 
     async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
-        let mut latest: BTreeMap<(Option<SegmentId>, String), usize> = BTreeMap::new();
-        let mut lines: Vec<Option<AnswerLine>> = Vec::new();
-        for (_, answer) in self.shared.store.reader().answers(course.session()).await? {
+        let clocks = &self.shared.clocks;
+        let answers = self.shared.store.reader().answers(course.session()).await?;
+        let standings = standings(&answers, clocks);
+
+        let mut lines: Vec<(Timestamp, AnswerLine)> = Vec::new();
+        for ((run, answer), standing) in answers.into_iter().zip(standings).filter(|(_, standing)| standing.counts) {
             let question = course.protocol.question(&answer.question, answer.segment.is_some());
-            let before = latest.insert((answer.segment, answer.question.clone()), lines.len());
-            if let Some(before) = before {
-                lines[before] = None;
-            }
-            lines.push(Some(AnswerLine {
+            let line = AnswerLine {
                 at: answer.stamp.wall,
                 setting: answer.segment.map(|segment| course.setting(segment)),
                 text: question.map(|question| question.text.clone()).unwrap_or_default(),
-                sus_score: match (question.map(|question| &question.kind), &answer.value) {
+                sus_score: match (question.map(|question| &question.kind), &standing.value) {
                     (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
                     _ => None,
                 },
                 question: answer.question,
-                value: answer.value,
-                changed: before.is_some(),
-            }));
+                value: standing.value,
+                changed: standing.revision > 1,
+                devices_disagree: standing.disagrees,
+            };
+            lines.push((clocks.said(run, answer.stamp.at, &answer.origin), line));
         }
-        Ok(lines.into_iter().flatten().collect())
+        lines.sort_by_key(|(given, _)| *given);
+        Ok(lines.into_iter().map(|(_, line)| line).collect())
     }
 }
 

@@ -9,9 +9,10 @@ use utoipa::ToSchema;
 use super::course::Course;
 use super::{ConductError, Conductor};
 use crate::ids::SessionId;
-use crate::store::PathPoint;
+use crate::store::{Answer, PathPoint, RunClocks, standings};
 use crate::trial::event::{Event, EventKind};
-use crate::trial::view::Said;
+use crate::trial::standing::Standing;
+use crate::trial::view::{AnswerValue, Said};
 
 /// A session over time. Seconds count from its start by the server's clocks, pauses included.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -24,6 +25,8 @@ pub struct Timeline {
     pub points: Vec<TimelinePoint>,
     /// What was said.
     pub comments: Vec<TimelineComment>,
+    /// Answers that do not count though they are their device's last word.
+    pub set_aside: Vec<SetAside>,
 }
 
 /// When a setting was inspected.
@@ -77,9 +80,33 @@ pub struct TimelineComment {
     pub setting: Option<usize>,
     /// Number of the frame that was on screen.
     pub frame: Option<u64>,
+    /// Whether it arrived after the time in which what a surgeon's device held counted.
+    pub late: bool,
     /// What was said.
     #[serde(flatten)]
     pub said: Said,
+}
+
+/// An answer that does not count: a later one from another device says something else, or it arrived too late.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SetAside {
+    /// When it was kept, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// When it was given, seconds: what it waited on the surgeon's device is taken off.
+    pub seconds: f64,
+    /// Setting, from 1; none for a closing question.
+    pub setting: Option<usize>,
+    /// The question's id.
+    pub question: String,
+    /// The question.
+    pub text: String,
+    /// The answer.
+    pub value: AnswerValue,
+    /// The answer that counts instead, if any does.
+    pub counted: Option<AnswerValue>,
+    /// Whether it arrived too late.
+    pub late: bool,
 }
 
 impl Conductor {
@@ -90,7 +117,7 @@ impl Conductor {
     pub async fn timeline(&self, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
         let course = self.shared.load(session).await?;
         let reader = self.shared.store.reader();
-        let runs = reader.run_clocks().await?;
+        let runs = &self.shared.clocks;
         let events = reader.events(session).await?;
         let events: Vec<(Timestamp, Event)> =
             events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();
@@ -105,16 +132,15 @@ impl Conductor {
             optimal: point.optimal,
         };
         let comments = reader.comments(session).await?;
-        let comments = comments.into_iter().map(|(run, comment)| {
-            let waited = comment.waited_ms.map_or(0.0, |waited| milliseconds(waited.unsigned_abs()));
-            TimelineComment {
-                at: comment.stamp.wall,
-                seconds: (seconds(start, runs.wall(run, comment.stamp.at)) - waited).max(0.0),
-                setting: comment.segment.map(|segment| course.setting(segment)),
-                frame: comment.frame,
-                said: comment.said,
-            }
+        let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
+            at: comment.stamp.wall,
+            seconds: seconds(start, runs.said(run, comment.stamp.at, &comment.origin)).max(0.0),
+            setting: comment.segment.map(|segment| course.setting(segment)),
+            frame: comment.frame,
+            late: comment.late,
+            said: comment.said,
         });
+        let answers = reader.answers(session).await?;
         let events: Vec<(f64, &EventKind)> =
             events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
         let points: Vec<TimelinePoint> = reader.focal_path(session, points).await?.into_iter().map(point).collect();
@@ -123,8 +149,29 @@ impl Conductor {
             pauses: pauses(&events, &points),
             points,
             comments: comments.collect(),
+            set_aside: set_aside(&course, &answers, runs, start),
         })
     }
+}
+
+fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start: Timestamp) -> Vec<SetAside> {
+    let standings = standings(answers, runs);
+    let is_aside = |answer: &Answer, standing: &Standing| !standing.counts && (answer.late || standing.disagrees);
+    let aside = answers.iter().zip(&standings).filter(|((_, answer), standing)| is_aside(answer, standing));
+    let told = aside.map(|((run, answer), _)| {
+        let question = course.protocol.question(&answer.question, answer.segment.is_some());
+        SetAside {
+            at: answer.stamp.wall,
+            seconds: seconds(start, runs.said(*run, answer.stamp.at, &answer.origin)).max(0.0),
+            setting: answer.segment.map(|segment| course.setting(segment)),
+            question: answer.question.clone(),
+            text: question.map(|question| question.text.clone()).unwrap_or_default(),
+            value: answer.value.clone(),
+            counted: course.state.answer(answer.segment, &answer.question).cloned(),
+            late: answer.late,
+        }
+    });
+    told.collect()
 }
 
 fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {

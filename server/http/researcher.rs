@@ -186,25 +186,28 @@ async fn timeline(
 
 /// Why policies are to be told.
 #[derive(Debug, Deserialize, ToSchema)]
-struct Reason {
+struct Unblind {
     /// Kept in the audit trail.
     reason: String,
+    /// Whether to do it though something may be outstanding, which would then not count any more.
+    #[serde(default)]
+    despite_outstanding: bool,
 }
 
 /// Tells which policies ran; on a session still under way this is emergency unblinding and marked so for good.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/unblind", tag = "researcher", params(("session" = SessionId, Path)),
-    request_body = Reason, responses(
+    request_body = Unblind, responses(
     (status = 204, description = "Unblinded"),
     (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "Its order would tell that of another session of its balanced set", body = ErrorBody),
+    (status = 409, description = "Its order would tell that of another session of its balanced set, or something may be outstanding", body = ErrorBody),
     (status = 422, description = "No reason was given", body = ErrorBody)))]
 async fn unblind(
     _: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
-    Json(why): Json<Reason>,
+    Json(Unblind { reason, despite_outstanding }): Json<Unblind>,
 ) -> Result<StatusCode, Error> {
-    app.conductor.act(Role::Researcher, id, Action::Unblind { reason: why.reason }).await?;
+    app.conductor.act(Role::Researcher, id, Action::Unblind { reason, despite_outstanding }).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -16,7 +16,7 @@ use super::error::{Error, ErrorBody};
 use super::roles::Surgeon;
 use super::security::Nonce;
 use crate::ids::SessionId;
-use crate::trial::view::{Action, NewAnswer, NewComment, Role, SurgeonView};
+use crate::trial::view::{Action, Holding, NewAnswer, NewComment, Role, SurgeonView};
 
 #[derive(Template)]
 #[template(path = "surgeon.html")]
@@ -75,7 +75,8 @@ async fn comment(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Keeps an answer: once this has answered, it is on disk. A later answer to the same question replaces it.
+/// Keeps an answer: once this has answered, it is on disk. Of several to a question the one given last counts; one that
+/// comes too long after the session's end is kept, but never counts.
 #[utoipa::path(post, path = "/api/surgeon/answers", tag = "surgeon", request_body = NewAnswer, responses(
     (status = 204, description = "Kept"),
     (status = 404, description = "No such session or question", body = ErrorBody),
@@ -87,6 +88,16 @@ async fn answer(_: Surgeon, State(app): State<AppState>, Json(answer): Json<NewA
     Ok(StatusCode::NO_CONTENT)
 }
 
+/// Hears how much of a session a surgeon's device still holds, so that nobody unblinds it over that unasked.
+#[utoipa::path(post, path = "/api/surgeon/holding", tag = "surgeon", request_body = Holding, responses(
+    (status = 204, description = "Noted"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
+async fn holding(_: Surgeon, State(app): State<AppState>, Json(holding): Json<Holding>) -> Result<StatusCode, Error> {
+    app.conductor.holding(holding).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
@@ -95,4 +106,5 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(act))
         .routes(routes!(comment))
         .routes(routes!(answer))
+        .routes(routes!(holding))
 }

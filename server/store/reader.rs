@@ -1,8 +1,10 @@
 //! Reading: lists and timelines for the pages, also from outside the server while it runs.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
+use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
 use sqlx::{Row, migrate::Migrate};
 
@@ -118,14 +120,33 @@ impl Reader {
         rows.iter().map(line).collect()
     }
 
-    /// The clocks at each start of the server.
+    /// The clocks at each start of the server. A run whose wall clock was behind when it began counts from the last that
+    /// is known of the run before, so that what happened later is never told earlier.
     ///
     /// # Errors
     /// When the database failed.
     pub async fn run_clocks(&self) -> Result<RunClocks, StoreError> {
-        let rows = sqlx::query("SELECT run, wall, monotonic_ns FROM runs").fetch_all(&self.pool).await?;
-        let clocks = rows.iter().map(|row| Ok((row.try_get("run")?, stamp(row)?)));
-        Ok(RunClocks(clocks.collect::<Result<_, StoreError>>()?))
+        let rows = sqlx::query(
+            "SELECT run, wall, monotonic_ns, coalesce(last_ns, monotonic_ns) AS last_ns FROM runs LEFT JOIN (
+                 SELECT run, max(monotonic_ns) AS last_ns FROM (
+                     SELECT run, monotonic_ns FROM events UNION ALL SELECT run, monotonic_ns FROM comments
+                     UNION ALL SELECT run, monotonic_ns FROM answers)
+                 GROUP BY run) USING (run)
+             ORDER BY run",
+        )
+        .fetch_all(&self.pool)
+        .await?;
+
+        let mut clocks = BTreeMap::new();
+        let mut known_until = Timestamp::MIN;
+        for row in &rows {
+            let started = stamp(row)?;
+            let start = Stamp { wall: started.wall.max(known_until), at: started.at };
+            let last = moment(row.try_get("last_ns")?);
+            known_until = start.wall.saturating_add(last.since(start.at)).unwrap_or(start.wall);
+            clocks.insert(row.try_get("run")?, start);
+        }
+        Ok(RunClocks(clocks))
     }
 
     /// What befell camera and lens in `session`, each with its number and the run it was in: from the start of every run

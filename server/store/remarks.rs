@@ -1,15 +1,12 @@
 //! Comments and answers: kept once each, however often they are sent, and never changed.
 
-use std::collections::HashMap;
-
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use super::sessions::{parsed, stamp};
-use super::{Answer, Comment, Reader, Store, StoreError, nanoseconds};
+use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError, moment, nanoseconds};
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
-use crate::trial::answers::on_top_of;
-use crate::trial::view::{AnswerValue, Said};
+use crate::trial::view::{AnswerValue, Holding, Origin, Said, WaitClock};
 
 /// What became of something given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,9 +28,9 @@ impl Store {
         let _turn = self.turn().await;
         let (kind, text) = said_columns(&comment.said);
         let done = sqlx::query(
-            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, client_millis, waited_ms, frame, frame_run,
-                 kind, text)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
+            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, device, sequence, client_millis, waited_ms,
+                 waited_by, late, frame, frame_run, kind, text)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
         )
         .bind(comment.key.to_string())
         .bind(comment.session.to_string())
@@ -41,8 +38,12 @@ impl Store {
         .bind(self.inner.run)
         .bind(comment.stamp.wall.to_string())
         .bind(nanoseconds(comment.stamp.at))
-        .bind(comment.client_millis)
-        .bind(comment.waited_ms)
+        .bind(comment.origin.device.map(|device| device.to_string()))
+        .bind(comment.origin.sequence)
+        .bind(comment.origin.client_millis)
+        .bind(comment.origin.waited_millis)
+        .bind(comment.origin.waited_by.map(WaitClock::name))
+        .bind(comment.late)
         .bind(comment.frame.map(u64::cast_signed))
         .bind(comment.frame_run)
         .bind(kind)
@@ -68,8 +69,9 @@ impl Store {
         let _turn = self.turn().await;
         let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
         let done = sqlx::query(
-            "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
+            "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns, device, sequence,
+                 client_millis, waited_ms, waited_by, late)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
         )
         .bind(answer.key.to_string())
         .bind(answer.session.to_string())
@@ -79,6 +81,12 @@ impl Store {
         .bind(self.inner.run)
         .bind(answer.stamp.wall.to_string())
         .bind(nanoseconds(answer.stamp.at))
+        .bind(answer.origin.device.map(|device| device.to_string()))
+        .bind(answer.origin.sequence)
+        .bind(answer.origin.client_millis)
+        .bind(answer.origin.waited_millis)
+        .bind(answer.origin.waited_by.map(WaitClock::name))
+        .bind(answer.late)
         .execute(&self.inner.trial)
         .await?;
         if done.rows_affected() == 1 {
@@ -92,6 +100,27 @@ impl Store {
         let segment = answer.segment.map(|segment| segment.to_string());
         let same = kept == (answer.session.to_string(), segment, answer.question.clone(), value);
         Ok(if same { Kept::Before } else { Kept::KeyTaken })
+    }
+
+    /// Notes how much of a session a surgeon's device holds, at `stamp`.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn note_holding(&self, holding: &Holding, stamp: Stamp) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        sqlx::query(
+            "INSERT INTO surgeon_devices (session, device, holding, run, monotonic_ns) VALUES (?, ?, ?, ?, ?)
+             ON CONFLICT (session, device) DO UPDATE
+             SET holding = excluded.holding, run = excluded.run, monotonic_ns = excluded.monotonic_ns",
+        )
+        .bind(holding.session.to_string())
+        .bind(holding.device.to_string())
+        .bind(holding.holding)
+        .bind(self.inner.run)
+        .bind(nanoseconds(stamp.at))
+        .execute(&self.inner.telemetry)
+        .await?;
+        Ok(())
     }
 }
 
@@ -108,8 +137,34 @@ impl Reader {
         rows.iter().map(|row| Ok((row.try_get("run")?, comment(row)?))).collect()
     }
 
+    /// The surgeons' devices on which something of `session` was said or that told of it, each with what it told last.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn surgeon_devices(&self, session: SessionId) -> Result<Vec<DeviceReport>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT d.device, t.holding, t.run, t.monotonic_ns
+             FROM (SELECT device FROM surgeon_devices WHERE session = ?1 UNION SELECT device FROM comments WHERE session = ?1
+                 UNION SELECT device FROM answers WHERE session = ?1) AS d
+             LEFT JOIN surgeon_devices AS t ON t.session = ?1 AND t.device = d.device
+             WHERE d.device IS NOT NULL ORDER BY d.device",
+        )
+        .bind(session.to_string())
+        .fetch_all(self.pool())
+        .await?;
+        let report = |row: &SqliteRow| {
+            let holding: Option<u32> = row.try_get("holding")?;
+            let told = match holding {
+                Some(holding) => Some((holding, row.try_get("run")?, moment(row.try_get("monotonic_ns")?))),
+                None => None,
+            };
+            Ok(DeviceReport { device: parsed(row, "device")?, told })
+        };
+        rows.iter().map(report).collect()
+    }
+
     /// The answers of `session`, changed ones included, in the order they were kept, each with the start of the server
-    /// that kept it. An answer given in parts is told as it stood after each part.
+    /// that kept it.
     ///
     /// # Errors
     /// When the database failed.
@@ -118,15 +173,7 @@ impl Reader {
             .bind(session.to_string())
             .fetch_all(self.pool())
             .await?;
-        let mut standing: HashMap<(Option<SegmentId>, String), AnswerValue> = HashMap::new();
-        let mut as_it_stood = |row: &SqliteRow| {
-            let mut answer = answer(row)?;
-            let question = (answer.segment, answer.question.clone());
-            answer.value = on_top_of(standing.get(&question), answer.value);
-            standing.insert(question, answer.value.clone());
-            Ok((row.try_get("run")?, answer))
-        };
-        rows.iter().map(&mut as_it_stood).collect()
+        rows.iter().map(|row| Ok((row.try_get("run")?, answer(row)?))).collect()
     }
 }
 
@@ -138,8 +185,8 @@ fn comment(row: &SqliteRow) -> Result<Comment, StoreError> {
         segment: segment(row)?,
         frame: frame.map(i64::cast_unsigned),
         frame_run: row.try_get("frame_run")?,
-        client_millis: row.try_get("client_millis")?,
-        waited_ms: row.try_get("waited_ms")?,
+        origin: origin(row)?,
+        late: row.try_get("late")?,
         stamp: stamp(row)?,
         said: said(row)?,
     })
@@ -155,8 +202,24 @@ fn answer(row: &SqliteRow) -> Result<Answer, StoreError> {
         segment: segment(row)?,
         question: row.try_get("question")?,
         value,
+        origin: origin(row)?,
+        late: row.try_get("late")?,
         stamp: stamp(row)?,
     })
+}
+
+fn origin(row: &SqliteRow) -> Result<Origin, StoreError> {
+    let device: Option<String> = row.try_get("device")?;
+    let waited_by: Option<String> = row.try_get("waited_by")?;
+    let origin = Origin {
+        device: device.map(|_| parsed(row, "device")).transpose()?,
+        sequence: row.try_get("sequence")?,
+        client_millis: row.try_get("client_millis")?,
+        waited_millis: row.try_get("waited_ms")?,
+        waited_by: waited_by.as_deref().and_then(WaitClock::named),
+    };
+    // What older versions kept names no clock: it was the wall clock.
+    Ok(origin.plausible())
 }
 
 fn segment(row: &SqliteRow) -> Result<Option<SegmentId>, StoreError> {

@@ -1,14 +1,16 @@
 //! What is read from and written to the database, as plain records.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::clock::Moment;
-use crate::ids::{IdempotencyKey, SegmentId, SessionId};
-use crate::trial::view::{AnswerValue, Said};
+use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
+use crate::trial::standing::{Given, Standing, by_question};
+use crate::trial::view::{AnswerValue, Origin, Said};
 
 /// When and by which server something was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,10 +34,10 @@ pub struct Comment {
     pub frame: Option<u64>,
     /// The run that counted it.
     pub frame_run: Option<i64>,
-    /// The browser's clock, milliseconds since 1970.
-    pub client_millis: Option<i64>,
-    /// Milliseconds that it waited on the surgeon's device before it was sent.
-    pub waited_ms: Option<i64>,
+    /// Where and when it was said, as the page told.
+    pub origin: Origin,
+    /// Whether it arrived when nothing counted any more.
+    pub late: bool,
     /// When it was kept.
     pub stamp: Stamp,
     /// What was said.
@@ -53,10 +55,44 @@ pub struct Answer {
     pub segment: Option<SegmentId>,
     /// The question's id.
     pub question: String,
-    /// The answer.
+    /// The answer, or the part of it that was given.
     pub value: AnswerValue,
+    /// Where and when it was given, as the page told.
+    pub origin: Origin,
+    /// Whether it arrived too late to count.
+    pub late: bool,
     /// When it was kept.
     pub stamp: Stamp,
+}
+
+impl Answer {
+    /// As the answers to its question are compared; it was kept in run `run`, of which `clocks` know the clocks.
+    #[must_use]
+    pub fn given(&self, run: i64, clocks: &RunClocks) -> Given {
+        Given {
+            device: self.origin.device,
+            sequence: self.origin.sequence,
+            at: clocks.said(run, self.stamp.at, &self.origin),
+            late: self.late,
+            value: self.value.clone(),
+        }
+    }
+}
+
+/// What became of each of `answers`, which are a session's in the order they were kept, each with the run that kept it.
+#[must_use]
+pub fn standings(answers: &[(i64, Answer)], clocks: &RunClocks) -> Vec<Standing> {
+    let asked = |(run, answer): &(i64, Answer)| ((answer.segment, answer.question.clone()), answer.given(*run, clocks));
+    by_question(answers.iter().map(asked))
+}
+
+/// What a surgeon's device told last of what it holds of a session, if it told anything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeviceReport {
+    /// The device.
+    pub device: DeviceId,
+    /// How much it held; in which run of the server it told so, and when.
+    pub told: Option<(u32, i64, Moment)>,
 }
 
 /// A participant.
@@ -156,5 +192,13 @@ impl RunClocks {
     pub fn wall(&self, run: i64, at: Moment) -> Timestamp {
         let Some(start) = self.0.get(&run) else { return Timestamp::UNIX_EPOCH };
         start.wall.saturating_add(at.since(start.at)).unwrap_or(start.wall)
+    }
+
+    /// When something was said that arrived at `at` in run `run`: its wait on the surgeon's device is taken off.
+    #[must_use]
+    pub fn said(&self, run: i64, at: Moment, origin: &Origin) -> Timestamp {
+        let arrived = self.wall(run, at);
+        let waited = Duration::from_millis(origin.waited_millis.map_or(0, i64::unsigned_abs));
+        arrived.saturating_sub(waited).unwrap_or(arrived)
     }
 }

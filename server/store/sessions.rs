@@ -6,11 +6,13 @@ use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Row};
 
-use super::{Reader, Stamp, Store, StoreError, drop_if_failed, moment, nanoseconds};
+use super::{Reader, RunClocks, Stamp, Store, StoreError, drop_if_failed, moment, nanoseconds};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
 use crate::trial::allocation::{Algorithm, Seed};
 use crate::trial::event::{Event, EventKind};
+use crate::trial::grace::{DEFAULT_GRACE, Grace};
+use crate::trial::protocol::{Protocol, ProtocolError};
 use crate::trial::view::Role;
 
 /// A session to be made.
@@ -51,6 +53,27 @@ pub struct StoredSession {
     pub run: i64,
     /// Its events so far, each with the start of the server that recorded it.
     pub events: Vec<(i64, Event)>,
+}
+
+impl StoredSession {
+    /// Its protocol. Its own policies are known, whatever this version has now.
+    ///
+    /// # Errors
+    /// When this version cannot read it.
+    pub fn protocol(&self) -> Result<Protocol, ProtocolError> {
+        let known: Vec<PolicyName> = self.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
+        Protocol::parse(&self.made.protocol_toml, &self.made.protocol, &known)
+    }
+
+    /// Whether what arrives for it still counts; `clocks` are those of the server's starts.
+    #[must_use]
+    pub fn grace(&self, clocks: &RunClocks) -> Grace {
+        let mut grace = Grace::new(self.protocol().map_or(DEFAULT_GRACE, |protocol| protocol.grace));
+        for (run, event) in &self.events {
+            grace.apply(&event.kind, clocks.wall(*run, event.at));
+        }
+        grace
+    }
 }
 
 impl Store {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::ids::{IdempotencyKey, SegmentId, SessionId};
+use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
 
 /// Where a session stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -125,14 +125,70 @@ pub struct NewComment {
     /// The run that counted it, as its header told.
     #[serde(default)]
     pub run: Option<i64>,
-    /// Milliseconds since 1970 by the browser's clock.
-    pub client_millis: Option<i64>,
-    /// Milliseconds that it waited on the surgeon's device before it was sent this time.
-    #[serde(default)]
-    pub waited_millis: Option<i64>,
+    /// Where and when it was said.
+    #[serde(flatten)]
+    pub origin: Origin,
     /// What was said.
     #[serde(flatten)]
     pub said: Said,
+}
+
+/// Where and when something was said, as the surgeon's page tells.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
+pub struct Origin {
+    /// The device.
+    #[serde(default)]
+    pub device: Option<DeviceId>,
+    /// Counts up with everything that is said on the device, in whatever tab; gaps mean nothing.
+    #[serde(default)]
+    pub sequence: Option<i64>,
+    /// When it was said: milliseconds since 1970 by the browser's clock.
+    #[serde(default)]
+    pub client_millis: Option<i64>,
+    /// Milliseconds that it waited on the device before it was sent this time.
+    #[serde(default)]
+    pub waited_millis: Option<i64>,
+    /// The clock that measured this wait.
+    #[serde(default)]
+    pub waited_by: Option<WaitClock>,
+}
+
+impl Origin {
+    /// The same without a wait below zero. A wait of which the page does not tell the clock is by the wall clock, as
+    /// older pages measured it.
+    #[must_use]
+    pub fn plausible(self) -> Self {
+        let waited_millis = self.waited_millis.filter(|waited| *waited >= 0);
+        let waited_by = waited_millis.map(|_| self.waited_by.unwrap_or(WaitClock::WallClock));
+        Self { waited_millis, waited_by, ..self }
+    }
+}
+
+/// The clock by which a page measured how long something waited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum WaitClock {
+    /// The page's monotonic clock: nobody can set it.
+    PageClock,
+    /// The device's wall clock: the page was loaded anew meanwhile, or the device slept.
+    WallClock,
+}
+
+impl WaitClock {
+    /// Its name, as in the database and in exports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PageClock => "page-clock",
+            Self::WallClock => "wall-clock",
+        }
+    }
+
+    /// The clock called `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::PageClock, Self::WallClock].into_iter().find(|clock| clock.name() == name)
+    }
 }
 
 /// What was said.
@@ -147,8 +203,8 @@ pub enum Said {
     Mark,
 }
 
-/// An answer as a surgeon's browser sends it. The same question again replaces as much of the answer as it
-/// gives; the old one stays in the log.
+/// An answer as a surgeon's browser sends it. Of several to the same question the one given last counts, as far as it
+/// gives an answer, in whatever order they arrive; the others stay in the log.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 pub struct NewAnswer {
     /// Idempotency key.
@@ -161,6 +217,20 @@ pub struct NewAnswer {
     pub question: String,
     /// The answer.
     pub value: AnswerValue,
+    /// Where and when it was given.
+    #[serde(flatten)]
+    pub origin: Origin,
+}
+
+/// How much a surgeon's device still holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+pub struct Holding {
+    /// The session that it was said in.
+    pub session: SessionId,
+    /// The device.
+    pub device: DeviceId,
+    /// Comments and answers that it has not seen saved, half-written ones included.
+    pub holding: u32,
 }
 
 /// Something that moves a session on. `segment` names the one that the page was showing, so that a stale tab or a double
@@ -201,6 +271,9 @@ pub enum Action {
     Unblind {
         /// Why.
         reason: String,
+        /// Whether to do it though what a surgeon's device still holds would then not count any more.
+        #[serde(default)]
+        despite_outstanding: bool,
     },
 }
 

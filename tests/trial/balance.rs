@@ -87,7 +87,13 @@ async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
     let left = session_that_is_left(&bench).await.session;
     // In the place that was given back, and so by the same order.
     let second = bench.begin("balanced").await;
-    let unblind = || bench.conductor.act(Role::Researcher, left, Action::Unblind { reason: "to see".to_owned() });
+    let unblind = || {
+        bench.conductor.act(
+            Role::Researcher,
+            left,
+            Action::Unblind { reason: "to see".to_owned(), despite_outstanding: true },
+        )
+    };
     let refused = unblind().await.unwrap_err();
     assert!(refused.to_string().contains("same balanced set"), "{refused}");
     bench.conductor.act(Role::Operator, second, Action::Abort { reason: "over".to_owned() }).await.unwrap();
@@ -103,8 +109,11 @@ async fn an_aborted_session_does_not_unblind_the_one_in_its_place() {
     let second = bench.whole_session("balanced").await;
     let (one, other) = (made(&bench, left).await, made(&bench, second).await);
     assert!(one.segments.iter().zip(&other.segments).all(|(one, other)| one.1 == other.1), "both have the same order");
-    let refused =
-        bench.conductor.act(Role::Researcher, left, Action::Unblind { reason: "to see".to_owned() }).await.unwrap_err();
+    let refused = bench
+        .conductor
+        .act(Role::Researcher, left, Action::Unblind { reason: "to see".to_owned(), despite_outstanding: true })
+        .await
+        .unwrap_err();
     assert!(refused.to_string().contains("unblind that one first"), "{refused}");
     bench.unblind(second).await;
     bench.unblind(left).await;

@@ -14,7 +14,7 @@ use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal::lens::{FocalPower, LensHealth};
 use parfocal::store::{Run, Store};
 use parfocal::trial::view::{
-    Action, AnswerValue, NewAnswer, NewComment, OperatorView, Phase, QuestionKind, Role, Said, SurgeonView,
+    Action, AnswerValue, NewAnswer, NewComment, OperatorView, Origin, Phase, QuestionKind, Role, Said, SurgeonView,
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -117,8 +117,7 @@ impl Bench {
             segment: view.segment,
             frame: Some(1234),
             run: Some(self.store.run()),
-            waited_millis: None,
-            client_millis: Some(1_772_355_600_000),
+            origin: Origin { client_millis: Some(1_772_355_600_000), ..Origin::default() },
             said: Said::Text(text.to_owned()),
         }
     }
@@ -146,7 +145,8 @@ impl Bench {
     pub async fn answer(&mut self, question: &str, value: AnswerValue) -> Result<(), ConductError> {
         let view = self.view();
         let (key, question) = (self.key(), question.to_owned());
-        let answer = NewAnswer { key, session: view.session, segment: view.segment, question, value };
+        let origin = Origin::default();
+        let answer = NewAnswer { key, session: view.session, segment: view.segment, question, value, origin };
         self.conductor.answer(answer).await
     }
 
@@ -179,7 +179,8 @@ impl Bench {
     }
 
     pub async fn unblind(&self, session: SessionId) {
-        let action = Action::Unblind { reason: "the study is over; CNN won".to_owned() };
+        let reason = "the study is over; CNN won".to_owned();
+        let action = Action::Unblind { reason, despite_outstanding: true };
         self.conductor.act(Role::Researcher, session, action).await.unwrap();
     }
 

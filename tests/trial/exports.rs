@@ -37,7 +37,7 @@ pub async fn with_session(folder: &Path) -> (Bench, SessionId) {
     (bench, session)
 }
 
-fn rows(folder: &Path, table: &str) -> Vec<BTreeMap<String, String>> {
+pub fn rows(folder: &Path, table: &str) -> Vec<BTreeMap<String, String>> {
     let mut reader = csv::Reader::from_path(folder.join(format!("{table}.csv"))).unwrap();
     reader.deserialize().map(Result::unwrap).collect()
 }

@@ -3,6 +3,7 @@
 mod balance;
 mod bench;
 mod exports;
+mod late;
 mod remarks;
 mod sessions;
 mod storage;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use parfocal::conductor::ConductError;
-use parfocal::trial::view::{Action, AnswerValue, NewAnswer, Phase, QuestionKind, Role, Said};
+use parfocal::trial::view::{Action, AnswerValue, NewAnswer, Origin, Phase, QuestionKind, Role, Said};
 
 use crate::bench::Bench;
 
@@ -21,10 +21,10 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
 
     let bench = Bench::start(folder.path()).await;
     bench.clock.advance(Duration::from_secs(40));
-    comment.waited_millis = Some(30_000);
+    comment.origin.waited_millis = Some(30_000);
     bench.conductor.comment(comment.clone()).await.unwrap();
     // Sent once more, it has waited longer, and is still the same comment.
-    comment.waited_millis = Some(31_000);
+    comment.origin.waited_millis = Some(31_000);
     bench.conductor.comment(comment.clone()).await.unwrap();
     comment.key.0 = uuid::Uuid::from_u128(1);
     comment.run = Some(99);
@@ -33,7 +33,10 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
     assert_eq!(timeline.comments.len(), 2);
     assert!((timeline.comments[0].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments[0]);
     let kept = bench.store.reader().comments(session).await.unwrap();
-    assert_eq!((kept[0].0, kept[0].1.frame_run, kept[0].1.waited_ms), (before + 1, Some(before), Some(30_000)));
+    assert_eq!(
+        (kept[0].0, kept[0].1.frame_run, kept[0].1.origin.waited_millis),
+        (before + 1, Some(before), Some(30_000))
+    );
     assert_eq!(kept[1].1.frame_run, None, "a run that never was is not kept, the comment is");
 }
 
@@ -116,6 +119,7 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
         segment,
         question: "sharpness".to_owned(),
         value: AnswerValue::Point(4),
+        origin: Origin::default(),
     };
     let (key, other) = (bench.key(), bench.key());
     bench.conductor.answer(answer(key, segment)).await.unwrap();
@@ -158,7 +162,9 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
         items[place] = point;
         AnswerValue::Points(items)
     };
-    let answer = NewAnswer { key: bench.key(), session, segment: None, question: sus.clone(), value: item(0, 4) };
+    let origin = Origin::default();
+    let answer =
+        NewAnswer { key: bench.key(), session, segment: None, question: sus.clone(), value: item(0, 4), origin };
     bench.conductor.answer(answer.clone()).await.unwrap();
     drop(bench);
     let mut bench = Bench::start(folder.path()).await;

@@ -110,7 +110,10 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     assert_eq!(found(&|| write("comments.csv", all_but_the_last.clone())), ["said", "copies"]);
     assert_eq!(found(&|| write("comments.csv", read("comments.csv").replace('🔬', "!"))), ["copies"]);
     assert_eq!(found(&|| remove("session.json")), ["copies"]);
-    assert_eq!(found(&|| remove("datapackage.json")), ["copies"]);
+    assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "copies"]);
+    // An answer that counts though it came too late.
+    let late = read("answers.csv").replacen(",false,false\n", ",true,false\n", 1);
+    assert_eq!(found(&|| write("answers.csv", late.clone())), ["said", "copies"]);
     // An event without a number.
     let event = read("events.csv").lines().last().unwrap().to_owned();
     let (number, rest) =
@@ -121,6 +124,15 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     let steps =
         read("policy_steps.csv") + &read("policy_steps.csv").lines().nth(1).unwrap().replacen('1', "9", 1) + "\n";
     assert_eq!(found(&|| write("policy_steps.csv", steps.clone())), ["references"]);
+}
+
+/// Made by the program as it was before exports had a format's number.
+#[test]
+fn an_export_of_an_earlier_version_is_still_verified() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/trial/export-of-format-1");
+    let checks = verify(&folder);
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+    assert!(checks.iter().all(|check| matches!(check.verdict, Verdict::Passed(_))), "{checks:?}");
 }
 
 #[tokio::test]

@@ -1,22 +1,22 @@
 //! The blinded part of an export. What it holds has no field for a policy, the order, the seed, or a reason that may
 //! name them.
 
-use std::collections::BTreeMap;
-
 use serde_json::{Value, json};
 
 use super::ExportError;
 use super::description::{ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS, TELEMETRY};
 use super::folder::Folder;
-use super::table::{Row, Table};
+use super::table::{FORMAT, Row, Table};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
-use crate::store::{Answer, Comment, DeviceEvent, Reader, SessionLine, StoreError, nanoseconds};
+use crate::store::{Answer, Comment, DeviceEvent, Reader, RunClocks, SessionLine, StoreError, nanoseconds, standings};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
+use crate::trial::grace::Grace;
 use crate::trial::protocol::Protocol;
-use crate::trial::view::{AnswerValue, QuestionKind};
+use crate::trial::standing::Standing;
+use crate::trial::view::{AnswerValue, QuestionKind, WaitClock};
 
 /// A session without what unblinding tells.
 pub struct Blinded {
@@ -32,6 +32,8 @@ pub struct Blinded {
     events: Vec<(i64, Event)>,
     comments: Vec<(i64, Comment)>,
     answers: Vec<(i64, Answer)>,
+    clocks: RunClocks,
+    grace: Grace,
 }
 
 impl Blinded {
@@ -41,12 +43,14 @@ impl Blinded {
         let lines = reader.sessions(true).await?;
         let line = lines.into_iter().find(|line| line.session == session);
         let line = line.ok_or_else(|| StoreError::Damaged(format!("session {session} is not in the list")))?;
-        let known: Vec<_> = stored.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
+        let clocks = reader.run_clocks().await?;
         let blind = |(run, event): (i64, Event)| (run, Event { kind: event.kind.for_the_blinded(), ..event });
         Ok(Self {
             line,
             run: stored.run,
-            protocol: Protocol::parse(&stored.made.protocol_toml, "protocol.toml", &known).ok(),
+            grace: stored.grace(&clocks),
+            clocks,
+            protocol: stored.protocol().ok(),
             protocol_toml: stored.made.protocol_toml,
             protocol_sha256: stored.made.protocol_sha256,
             algorithm: stored.made.algorithm.name(),
@@ -100,6 +104,7 @@ impl Blinded {
             "description": "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json holds all tables but telemetry and policy_steps.",
             "parfocal": {
                 "version": env!("CARGO_PKG_VERSION"),
+                "format": FORMAT,
                 "practice": self.line.practice,
                 "blinded": !unblinded,
                 "unblinded": self.unblinded(),
@@ -136,6 +141,7 @@ impl Blinded {
             json!(line.finished_settings),
             json!(line.comments),
             json!(self.unblinded()),
+            json!(self.grace.until()),
         ]
     }
 
@@ -174,28 +180,26 @@ impl Blinded {
                 text(comment.stamp.wall),
                 json!(run),
                 json!(nanoseconds(comment.stamp.at)),
-                json!(comment.client_millis),
-                json!(comment.waited_ms),
+                json!(comment.origin.client_millis),
+                json!(comment.origin.waited_millis),
+                json!(comment.origin.waited_by.map(WaitClock::name)),
+                json!(comment.origin.device),
+                json!(comment.origin.sequence),
+                json!(comment.late),
             ]
         };
         self.comments.iter().zip(1..).map(row).collect()
     }
 
     fn answer_rows(&self) -> Vec<Row> {
-        let mut revisions: BTreeMap<(Option<SegmentId>, &str), u32> = BTreeMap::new();
-        for (_, answer) in &self.answers {
-            *revisions.entry((answer.segment, &answer.question)).or_default() += 1;
-        }
-        let row = |((run, answer), number): (&(i64, Answer), u32)| {
-            let key = (answer.segment, answer.question.as_str());
+        let standings = standings(&self.answers, &self.clocks);
+        let row = |(((run, answer), standing), number): ((&(i64, Answer), Standing), u32)| {
             let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
             let kind = question.map(|question| &question.kind);
-            let score = match (kind, &answer.value) {
+            let score = match (kind, &standing.value) {
                 (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
                 _ => None,
             };
-            let revision =
-                self.answers[..number as usize].iter().filter(|(_, a)| key == (a.segment, &a.question)).count();
             vec![
                 json!(number),
                 text(answer.key),
@@ -205,16 +209,24 @@ impl Blinded {
                 json!(answer.question),
                 json!(question.map(|question| &question.text)),
                 json!(kind.map(QuestionKind::name)),
-                json!(revision),
-                json!(revisions.get(&key) == u32::try_from(revision).ok().as_ref()),
-                json!(serde_json::to_string(&answer.value).ok()),
+                json!(standing.revision),
+                json!(standing.counts),
+                json!(serde_json::to_string(&standing.value).ok()),
                 json!(score),
                 text(answer.stamp.wall),
                 json!(run),
                 json!(nanoseconds(answer.stamp.at)),
+                json!(self.clocks.said(*run, answer.stamp.at, &answer.origin)),
+                json!(answer.origin.client_millis),
+                json!(answer.origin.waited_millis),
+                json!(answer.origin.waited_by.map(WaitClock::name)),
+                json!(answer.origin.device),
+                json!(answer.origin.sequence),
+                json!(answer.late),
+                json!(standing.disagrees),
             ]
         };
-        self.answers.iter().zip(1..).map(row).collect()
+        self.answers.iter().zip(standings).zip(1..).map(row).collect()
     }
 
     fn event_rows(&self) -> Vec<Row> {

@@ -4,7 +4,12 @@ use super::table::Type::{Boolean, Datetime, Integer, Number, String};
 use super::table::{Column, Table, Type};
 
 const fn column(name: &'static str, kind: Type, unit: &'static str, description: &'static str) -> Column {
-    Column { name, kind, unit, description }
+    Column { name, kind, unit, description, since: 1 }
+}
+
+/// `column`, which exports of the first format did not have.
+const fn new_in_2(column: Column) -> Column {
+    Column { since: 2, ..column }
 }
 
 const SESSION: Column = column("session", String, "", "Session's random id");
@@ -15,6 +20,38 @@ const WALL: Column = column("wall", Datetime, "UTC", "When it was recorded, by t
 const RUN: Column = column("run", Integer, "", "Start of the server that recorded it; see runs");
 const MONOTONIC: Column =
     column("monotonic_ns", Integer, "ns", "When it was recorded, by the monotonic clock; comparable within a run");
+const DEVICE: Column = new_in_2(column(
+    "device",
+    String,
+    "",
+    "Random id of the surgeon's device, kept by its browser; empty where the page told none",
+));
+const SEQUENCE: Column = new_in_2(column(
+    "sequence",
+    Integer,
+    "",
+    "Counts up with everything that was said on the device, in whatever tab; gaps mean nothing",
+));
+const WAITED_BY: Column = new_in_2(column(
+    "waited_by",
+    String,
+    "",
+    "Clock that measured waited_ms: page-clock, which nobody can set; or wall-clock, the device's, which may have been set meanwhile, where the page was loaded anew or the device slept before sending",
+));
+const CLIENT_MILLIS: Column =
+    column("client_millis", Integer, "ms", "The browser's clock when it was said, milliseconds since 1970-01-01 UTC");
+const WAITED: Column = column(
+    "waited_ms",
+    Integer,
+    "ms",
+    "Time between saying and sending, on the surgeon's device: said at wall less this",
+);
+const LATE: Column = new_in_2(column(
+    "late",
+    Boolean,
+    "",
+    "Whether it arrived after counts_until of sessions.csv; always false of what was kept by a version without that time",
+));
 const FRAME: Column = column("frame", Integer, "", "Frame's number within the run");
 const EXPOSED: Column = column("exposed_ns", Integer, "ns", "End of the exposure, by the monotonic clock");
 const KEY: Column = column("key", String, "", "Key by which the browser could send it again without it counting twice");
@@ -54,6 +91,12 @@ pub const SESSIONS: Table = Table {
         column("finished_settings", Integer, "", "Settings inspected to the end"),
         column("comments", Integer, "", "Comments kept"),
         column("unblinded", String, "", "no; after-end; or while-under-way, which is emergency unblinding"),
+        new_in_2(column(
+            "counts_until",
+            Datetime,
+            "UTC",
+            "Until when what arrived counts: the session's end and the protocol's grace_minutes, or unblinding if that came first; empty while the session is under way",
+        )),
     ],
     key: &["session"],
 };
@@ -91,13 +134,12 @@ pub const COMMENTS: Table = Table {
         WALL,
         RUN,
         MONOTONIC,
-        column("client_millis", Integer, "ms", "The browser's clock, milliseconds since 1970-01-01 UTC"),
-        column(
-            "waited_ms",
-            Integer,
-            "ms",
-            "Time between saying and sending, on the surgeon's device: said at wall less this",
-        ),
+        CLIENT_MILLIS,
+        WAITED,
+        WAITED_BY,
+        DEVICE,
+        SEQUENCE,
+        LATE,
     ],
     key: &["key"],
 };
@@ -105,7 +147,7 @@ pub const COMMENTS: Table = Table {
 /// Answers.
 pub const ANSWERS: Table = Table {
     name: "answers",
-    description: "Answers in the order they were given, replaced ones included",
+    description: "Answers in the order they were kept, those that do not count included",
     columns: &[
         column("number", Integer, "", "Order of the answer in the session, from 1"),
         KEY,
@@ -115,18 +157,36 @@ pub const ANSWERS: Table = Table {
         column("question", String, "", "Question's id in the protocol"),
         column("question_text", String, "", "The question as the surgeon read it"),
         column("kind", String, "", "text, likert, ranking or sus"),
-        column("revision", Integer, "", "1 for the first answer to the question, then counting up"),
-        column("counts", Boolean, "", "Whether it is the latest answer to the question"),
+        column("revision", Integer, "", "Place among the answers to the question in the order they were given, from 1"),
+        column("counts", Boolean, "", "Whether it is the answer that counts: the one given last, late ones left aside"),
         column(
             "value",
             String,
             "",
-            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of 1..5 (sus), 0 for an item still open; as it stood after this revision",
+            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of 1..5 (sus), 0 for an item still open; as it stood after this revision; of a late answer, as it was given",
         ),
         column("sus_score", Number, "points", "System Usability Scale score, 0..100"),
         WALL,
         RUN,
         MONOTONIC,
+        new_in_2(column(
+            "given",
+            Datetime,
+            "UTC",
+            "When it was given, by the server's clocks: when it arrived less waited_ms; answers of one device are ordered by sequence all the same",
+        )),
+        new_in_2(CLIENT_MILLIS),
+        new_in_2(WAITED),
+        WAITED_BY,
+        DEVICE,
+        SEQUENCE,
+        LATE,
+        new_in_2(column(
+            "disagrees",
+            Boolean,
+            "",
+            "Whether it is its device's last answer to the question, and another device's last answer differs",
+        )),
     ],
     key: &["key"],
 };

@@ -28,7 +28,13 @@ pub struct Column {
     pub unit: &'static str,
     /// What it means.
     pub description: &'static str,
+    /// The first format of exports that has it.
+    pub since: u64,
 }
+
+/// The format of exports that this version writes. The second tells what was said late and on which device; the first
+/// did not name itself.
+pub const FORMAT: u64 = 2;
 
 /// A table without its rows.
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +88,11 @@ impl Table {
     /// The names of its columns.
     pub fn header(&self) -> impl Iterator<Item = &'static str> {
         self.columns.iter().map(|column| column.name)
+    }
+
+    /// The columns that it had in exports of format `format`.
+    pub fn columns_of(&self, format: u64) -> impl Iterator<Item = &'static Column> {
+        self.columns.iter().filter(move |column| column.since <= format)
     }
 
     /// Its rows as JSON objects.

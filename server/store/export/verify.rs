@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::description::{ALL, ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS};
 use super::folder::SUMS;
-use super::table::csv_cell;
+use super::table::{FORMAT, csv_cell};
 use super::verify_allocation::{commitment, schedule};
 
 /// One thing checked.
@@ -77,6 +77,7 @@ fn checksums(folder: &Path) -> Outcome {
 }
 
 fn columns(folder: &Path) -> Outcome {
+    let format = format(folder)?;
     let mut rows = 0;
     for table in ALL {
         let file = table.file();
@@ -84,12 +85,13 @@ fn columns(folder: &Path) -> Outcome {
             continue;
         }
         let mut reader = csv(folder, &file)?;
-        if !reader.headers().map_err(|error| format!("{file}: {error}"))?.iter().eq(table.header()) {
+        let described = table.columns_of(format).map(|column| column.name);
+        if !reader.headers().map_err(|error| format!("{file}: {error}"))?.iter().eq(described) {
             return Err(format!("{file}: its columns are not those described"));
         }
         for (row, line) in reader.records().zip(2..) {
             let row = row.map_err(|error| format!("{file}: {error}"))?;
-            let mut cells = table.columns.iter().zip(&row);
+            let mut cells = table.columns_of(format).zip(&row);
             if let Some((column, cell)) = cells.find(|(column, cell)| !column.kind.accepts(cell)) {
                 return Err(format!("{file}, row {line}: '{cell}' is no {}", column.name));
             }
@@ -97,6 +99,15 @@ fn columns(folder: &Path) -> Outcome {
         }
     }
     Ok(Verdict::Passed(format!("{rows} rows are as described")))
+}
+
+/// The format of the export, which says what columns it has.
+fn format(folder: &Path) -> Result<u64, String> {
+    let format = json(folder, "datapackage.json")?["parfocal"]["format"].as_u64().unwrap_or(1);
+    if format > FORMAT {
+        return Err(format!("a newer version of parfocal wrote it (format {format}); verify it with that version"));
+    }
+    Ok(format)
 }
 
 fn events(folder: &Path) -> Outcome {
@@ -114,7 +125,28 @@ fn said(folder: &Path) -> Outcome {
     if told != comments.to_string() {
         return Err(format!("comments.csv holds {comments} comments, and sessions.csv tells of {told}"));
     }
+    if format(folder)? >= 2 {
+        counting(folder)?;
+    }
     Ok(Verdict::Passed(format!("{comments} comments and {answers} answers without a gap")))
+}
+
+/// Checks that of the answers to a question at most one counts, and none that is late.
+fn counting(folder: &Path) -> Result<(), String> {
+    let column = |name| cells(folder, "answers.csv", name);
+    let (segments, questions, counts, late) =
+        (column("segment")?, column("question")?, column("counts")?, column("late")?);
+    let mut counted = BTreeSet::new();
+    for place in (0..counts.len()).filter(|&place| counts[place] == "true") {
+        let number = place + 1;
+        if late[place] == "true" {
+            return Err(format!("answers.csv: answer {number} counts though it is late"));
+        }
+        if !counted.insert((&segments[place], &questions[place])) {
+            return Err(format!("answers.csv: answer {number} is the second to its question that counts"));
+        }
+    }
+    Ok(())
 }
 
 /// The number of rows of `file`, whose column `number` must count them from 1.
@@ -138,6 +170,7 @@ fn copies(folder: &Path) -> Outcome {
         return Err(format!("datapackage.json says that the export is {is}blinded, and {file} is {has}"));
     }
     let session = json(folder, "session.json")?;
+    let format = format(folder)?;
     for table in [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES] {
         let file = table.file();
         let differs = || format!("session.json and {file} tell different things");
@@ -145,7 +178,7 @@ fn copies(folder: &Path) -> Outcome {
         let mut reader = csv(folder, &file)?;
         let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(|error| format!("{file}: {error}"))?;
         let same = |object: &Value, row: &csv::StringRecord| {
-            table.header().map(|name| csv_cell(&object[name])).eq(row.iter().map(str::to_owned))
+            table.columns_of(format).map(|column| csv_cell(&object[column.name])).eq(row.iter().map(str::to_owned))
         };
         if rows.len() != objects.len() || !objects.iter().zip(&rows).all(|(object, row)| same(object, row)) {
             return Err(differs());

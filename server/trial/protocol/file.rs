@@ -12,6 +12,7 @@ use super::{Prompt, Protocol};
 use crate::autofocus::PolicyName;
 use crate::lens::FocalPower;
 use crate::trial::allocation::Order;
+use crate::trial::grace::DEFAULT_GRACE;
 use crate::trial::view::{Question, QuestionKind};
 
 /// Most segments in a session: what a surgeon can still compare, and the ranking's limit.
@@ -37,6 +38,8 @@ struct File {
     start_focal_power: Option<Spanned<f64>>,
     #[serde(default)]
     prompt_seconds: Option<Spanned<u32>>,
+    #[serde(default)]
+    grace_minutes: Option<Spanned<u32>>,
     #[serde(default)]
     quick_comments: Vec<Spanned<String>>,
     #[serde(default)]
@@ -87,6 +90,9 @@ pub(super) fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Faul
     let segment_seconds = between(&file.segment_seconds, "segment_seconds", 5..=3600, " seconds")?;
     let stay =
         file.prompt_seconds.as_ref().map_or(Ok(15), |stay| between(stay, "prompt_seconds", 1..=600, " seconds"))?;
+    let grace = file.grace_minutes.as_ref().map_or(Ok(DEFAULT_GRACE), |minutes| {
+        between(minutes, "grace_minutes", 0..=24 * 60, " minutes").map(|minutes| Duration::from_mins(minutes.into()))
+    })?;
     let mut ids = BTreeSet::new();
     Ok(Protocol {
         title: reader.shown(&file.title, "title")?,
@@ -99,6 +105,7 @@ pub(super) fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Faul
         prompts: reader.prompts(&file.prompts, segment_seconds)?,
         prompt_stay: Duration::from_secs(stay.into()),
         quick_comments: reader.all_shown(&file.quick_comments, "quick_comments")?,
+        grace,
         after_segment: reader.questions(&file.after_segment, &mut ids, false)?,
         closing: reader.questions(&file.closing, &mut ids, true)?,
         policies,

@@ -43,6 +43,8 @@ pub struct Protocol {
     pub prompt_stay: Duration,
     /// One-tap comments.
     pub quick_comments: Vec<String>,
+    /// How long after the end what a surgeon's device still holds counts.
+    pub grace: Duration,
     /// Questions after each segment.
     pub after_segment: Vec<Question>,
     /// Questions at the end.
@@ -140,6 +142,19 @@ mod tests {
         assert_eq!(paper.order, Order::Shuffled);
         assert!(!paper.practice);
         assert_eq!(paper.start, FocalPower::MIDDLE);
+    }
+
+    #[test]
+    fn what_a_tablet_holds_counts_for_half_an_hour_or_as_long_as_the_protocol_says() {
+        let grace = |line: &str| {
+            let source = PAPER.replace("repeats = 2", &format!("repeats = 2\n{line}"));
+            Protocol::parse(&source, "trial.toml", &known()).map(|protocol| protocol.grace)
+        };
+        assert_eq!(grace(""), Ok(Duration::from_mins(30)));
+        assert_eq!(grace("grace_minutes = 5"), Ok(Duration::from_mins(5)));
+        assert_eq!(grace("grace_minutes = 0"), Ok(Duration::ZERO));
+        let said = grace("grace_minutes = 1441").unwrap_err().to_string();
+        assert!(said.contains("key 'grace_minutes': must be from 0 to 1440 minutes, not 1441"), "{said}");
     }
 
     #[test]

@@ -45,7 +45,7 @@ pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> R
         Action::Pause { reason } => pause(state, reason, now),
         Action::Resume => Ok(if state.paused.is_some() { vec![EventKind::Resumed] } else { Vec::new() }),
         Action::Abort { reason } => abort(state, reason, now),
-        Action::Unblind { reason } => unblind(state, reason),
+        Action::Unblind { reason, .. } => unblind(state, reason),
     }
 }
 

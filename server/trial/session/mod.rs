@@ -19,9 +19,9 @@ use std::time::Duration;
 
 pub use decide::{Refusal, decide, decide_restart, decide_time};
 
-use super::answers::on_top_of;
 use super::event::{Event, EventKind};
 use super::protocol::Protocol;
+use super::standing::{Given, counted};
 use super::view::{AnswerValue, Phase, Question};
 use crate::clock::Moment;
 use crate::ids::SegmentId;
@@ -79,7 +79,16 @@ pub struct SessionState {
     inspected: Duration,
     running_since: Option<Moment>,
     unblinded: bool,
-    answers: BTreeMap<(Option<SegmentId>, String), AnswerValue>,
+    answers: BTreeMap<(Option<SegmentId>, String), Answered>,
+}
+
+/// The answers to one question.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Answered {
+    /// All, as they arrived.
+    given: Vec<Given>,
+    /// What counts of them.
+    counts: Option<AnswerValue>,
 }
 
 impl SessionState {
@@ -165,20 +174,21 @@ impl SessionState {
         }
     }
 
-    /// The answer kept to `question`, asked after `segment` or (none) at the end.
+    /// The answer that counts to `question`, asked after `segment` or (none) at the end.
     #[must_use]
     pub fn answer(&self, segment: Option<SegmentId>, question: &str) -> Option<&AnswerValue> {
-        self.answers.get(&(segment, question.to_owned()))
+        self.answers.get(&(segment, question.to_owned()))?.counts.as_ref()
     }
 
-    /// Takes an answer in; a later one to the same question replaces as much of it as it gives.
-    pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, value: AnswerValue) {
-        let value = on_top_of(self.answer(segment, question), value);
-        self.answers.insert((segment, question.to_owned()), value);
+    /// Takes in an answer that arrived; of all to the question the one given last counts.
+    pub fn keep_answer(&mut self, segment: Option<SegmentId>, question: &str, given: Given) {
+        let answered = self.answers.entry((segment, question.to_owned())).or_default();
+        answered.given.push(given);
+        answered.counts = counted(&answered.given);
     }
 
-    /// Whether questions about `segment` (none: about the whole) may be answered: once they have been shown, and for
-    /// good after that.
+    /// Whether answers to questions about `segment` (none: about the whole) are kept: always, once they have been shown.
+    /// Whether a late one counts, [`Grace`](super::grace::Grace) says.
     #[must_use]
     pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
         match segment {

@@ -74,6 +74,12 @@ impl Run {
     }
 }
 
+/// An answer as it arrives at once.
+fn said(text: &str) -> Given {
+    let value = AnswerValue::Text(text.to_owned());
+    Given { device: None, sequence: None, at: Timestamp::UNIX_EPOCH, late: false, value }
+}
+
 const SECOND: Duration = Duration::from_secs(1);
 
 #[test]
@@ -89,11 +95,11 @@ fn a_whole_session_goes_from_ready_to_completed() {
         assert_eq!(run.state.phase(), Phase::Questions);
         let early = run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) });
         assert!(matches!(early, Err(Refusal::Conflict(text)) if text.contains("a?")));
-        run.state.keep_answer(Some(segment), "a", AnswerValue::Text("yes".to_owned()));
+        run.state.keep_answer(Some(segment), "a", said("yes"));
         run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) }).unwrap();
     }
     assert_eq!((run.state.phase(), run.state.segment()), (Phase::Closing, None));
-    run.state.keep_answer(None, "z", AnswerValue::Text("yes".to_owned()));
+    run.state.keep_answer(None, "z", said("yes"));
     run.act(Role::Surgeon, &Action::FinishQuestions { segment: None }).unwrap();
     assert_eq!(run.state.phase(), Phase::Completed);
 }
@@ -181,7 +187,7 @@ fn each_role_does_its_own() {
         (Action::Pause { reason: reason() }, vec![Role::Operator]),
         (Action::Resume, vec![Role::Surgeon, Role::Operator]),
         (Action::Abort { reason: reason() }, vec![Role::Operator]),
-        (Action::Unblind { reason: reason() }, vec![Role::Researcher]),
+        (Action::Unblind { reason: reason(), despite_outstanding: false }, vec![Role::Researcher]),
     ];
     let run = Run::inspecting(true);
     for (action, may) in table {
@@ -195,7 +201,7 @@ fn each_role_does_its_own() {
 #[test]
 fn abort_and_unblinding_need_a_reason_and_an_early_unblinding_is_marked() {
     let mut run = Run::inspecting(true);
-    let unblind = Action::Unblind { reason: "adverse event".to_owned() };
+    let unblind = Action::Unblind { reason: "adverse event".to_owned(), despite_outstanding: false };
     assert!(matches!(run.act(Role::Operator, &Action::Abort { reason: " ".to_owned() }), Err(Refusal::Invalid(_))));
     run.act(Role::Researcher, &unblind).unwrap();
     assert!(matches!(&run.log.last().unwrap().kind, EventKind::Unblinded { emergency: true, .. }));
@@ -205,7 +211,7 @@ fn abort_and_unblinding_need_a_reason_and_an_early_unblinding_is_marked() {
 }
 
 #[test]
-fn questions_take_answers_from_when_they_are_asked_and_for_good() {
+fn questions_take_answers_from_when_they_are_asked_on() {
     let mut run = Run::inspecting(true);
     assert!(!run.state.takes_answers(Some(segment(0))));
     run.act(Role::Operator, &Action::FinishSegment { segment: segment(0) }).unwrap();
@@ -237,7 +243,7 @@ fn any_step() -> impl Strategy<Value = Step> {
         3 => Just(Action::FinishQuestions { segment: None }),
         1 => Just(Action::Pause { reason: "p".to_owned() }),
         3 => Just(Action::Resume),
-        1 => Just(Action::Unblind { reason: "u".to_owned() }),
+        1 => Just(Action::Unblind { reason: "u".to_owned(), despite_outstanding: false }),
     ];
     prop_oneof![
         20 => (role, action).prop_map(|(role, action)| Step::Act(role, action)),
@@ -250,7 +256,7 @@ fn any_step() -> impl Strategy<Value = Step> {
 }
 
 fn take(run: &mut Run, step: Step) {
-    let text = AnswerValue::Text("x".to_owned());
+    let text = said("x");
     match step {
         Step::Act(role, action) => {
             let before = (run.state.clone(), run.log.len());

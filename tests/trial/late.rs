@@ -1,0 +1,267 @@
+//! Answers that arrive late or out of order: which one counts, until when anything does, and what is told of the others.
+
+use std::path::Path;
+use std::time::Duration;
+
+use parfocal::conductor::ConductError;
+use parfocal::ids::{DeviceId, SessionId};
+use parfocal::store::MIGRATOR;
+use parfocal::store::export::export;
+use parfocal::store::export::verify::verify;
+use parfocal::trial::view::{Action, AnswerValue, Holding, NewAnswer, Origin, Phase, Role, WaitClock};
+use uuid::Uuid;
+
+use crate::bench::Bench;
+use crate::exports::{failed, rows};
+
+const SECOND: Duration = Duration::from_secs(1);
+const MINUTE: Duration = Duration::from_mins(1);
+
+const TABLET_A: DeviceId = DeviceId(Uuid::from_u128(0xa));
+const TABLET_B: DeviceId = DeviceId(Uuid::from_u128(0xb));
+
+/// What a page tells of something said on `device` that has waited there for `waited`.
+fn origin(device: DeviceId, sequence: i64, waited: Duration) -> Origin {
+    Origin {
+        device: Some(device),
+        sequence: Some(sequence),
+        client_millis: Some(1_772_355_600_000),
+        waited_millis: Some(i64::try_from(waited.as_millis()).unwrap()),
+        waited_by: Some(WaitClock::PageClock),
+    }
+}
+
+/// An answer about the sharpness of the setting whose questions are asked now.
+fn sharpness(bench: &mut Bench, point: u8, origin: Origin) -> NewAnswer {
+    let view = bench.view();
+    let (key, question) = (bench.key(), "sharpness".to_owned());
+    NewAnswer { key, session: view.session, segment: view.segment, question, value: AnswerValue::Point(point), origin }
+}
+
+/// A session of the paper, at the questions after its first setting.
+async fn at_questions(folder: &Path) -> (Bench, SessionId) {
+    let bench = Bench::start(folder).await;
+    let session = bench.begin("paper").await;
+    let segment = bench.view().segment.unwrap();
+    bench.surgeon(Action::Acknowledge { segment }).await;
+    bench.wait(10 * SECOND).await;
+    bench.surgeon(Action::FinishSegment { segment }).await;
+    (bench, session)
+}
+
+async fn abort(bench: &Bench, session: SessionId) {
+    bench.conductor.act(Role::Operator, session, Action::Abort { reason: "fire alarm".to_owned() }).await.unwrap();
+}
+
+async fn unblind(bench: &Bench, session: SessionId, despite_outstanding: bool) -> Result<(), ConductError> {
+    let reason = "analysis begins".to_owned();
+    bench.conductor.act(Role::Researcher, session, Action::Unblind { reason, despite_outstanding }).await
+}
+
+#[tokio::test]
+async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut bench, session) = at_questions(folder.path()).await;
+    bench.wait(60 * SECOND).await;
+    // "5" is given on tablet B, while tablet A, which has no network, holds a "3" that was given 50 s before.
+    let five = sharpness(&mut bench, 5, origin(TABLET_B, 1, Duration::ZERO));
+    bench.conductor.answer(five).await.unwrap();
+    bench.wait(30 * SECOND).await;
+    let three = sharpness(&mut bench, 3, origin(TABLET_A, 7, 80 * SECOND));
+    bench.conductor.answer(three).await.unwrap();
+    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(5));
+    drop(bench);
+
+    let bench = Bench::start(folder.path()).await;
+    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(5), "over a restart too");
+    let detail = bench.conductor.session_detail(session).await.unwrap();
+    assert_eq!((&detail.answers[0].value, detail.answers[0].devices_disagree), (&AnswerValue::Point(5), true));
+    let timeline = bench.conductor.timeline(session, 10).await.unwrap();
+    let aside = &timeline.set_aside[0];
+    assert_eq!(
+        (&aside.value, &aside.counted, aside.late),
+        (&AnswerValue::Point(3), &Some(AnswerValue::Point(5)), false)
+    );
+    assert!((aside.seconds - 20.0).abs() < 1e-9, "it stands where it was given: {aside:?}");
+
+    let out = folder.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+    let answers = rows(&out, "answers");
+    let told: Vec<_> = answers
+        .iter()
+        .map(|row| ["value", "revision", "counts", "disagrees", "sequence", "late"].map(|column| row[column].as_str()))
+        .collect();
+    assert_eq!(told, [["5", "2", "true", "true", "1", "false"], ["3", "1", "false", "true", "7", "false"]]);
+    assert_eq!(answers[1]["device"], TABLET_A.to_string());
+    assert_eq!((answers[1]["waited_ms"].as_str(), answers[1]["waited_by"].as_str()), ("80000", "page-clock"));
+    assert!(answers[1]["given"] < answers[0]["given"], "{answers:?}");
+    assert_eq!(failed(&verify(&out)), [""; 0]);
+}
+
+#[tokio::test]
+async fn of_two_tabs_the_one_that_answered_last_counts_whatever_the_devices_clock_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut bench, session) = at_questions(folder.path()).await;
+    bench.wait(60 * SECOND).await;
+    let five = sharpness(&mut bench, 5, origin(TABLET_A, 8, 30 * SECOND));
+    bench.conductor.answer(five).await.unwrap();
+    // The wait of the first tab's answer was measured across a clock that was set.
+    let three = sharpness(&mut bench, 3, origin(TABLET_A, 7, Duration::ZERO));
+    bench.conductor.answer(three).await.unwrap();
+    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(5));
+    assert_eq!(bench.conductor.timeline(session, 10).await.unwrap().set_aside, []);
+    assert!(!bench.conductor.session_detail(session).await.unwrap().answers[0].devices_disagree);
+}
+
+#[tokio::test]
+async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arrivals_are_kept_and_marked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut bench, session) = at_questions(folder.path()).await;
+    let held = [3, 5, 1].map(|point| sharpness(&mut bench, point, origin(TABLET_A, point.into(), Duration::ZERO)));
+    let mut comments = ["in time", "too late"].map(|text| bench.comment(text));
+    abort(&bench, session).await;
+    bench.wait(29 * MINUTE).await;
+    bench.conductor.answer(held[0].clone()).await.unwrap();
+    bench.conductor.comment(comments[0].clone()).await.unwrap();
+    drop(bench);
+
+    // The server was started anew meanwhile; a session of its own is under way there.
+    let bench = Bench::start(folder.path()).await;
+    bench.wait(MINUTE).await;
+    bench.conductor.answer(held[1].clone()).await.unwrap();
+    bench.begin("paper").await;
+    bench.wait(SECOND).await;
+    bench.conductor.answer(held[2].clone()).await.unwrap();
+    comments[1].segment = None;
+    bench.conductor.comment(comments[1].clone()).await.unwrap();
+
+    let detail = bench.conductor.session_detail(session).await.unwrap();
+    assert_eq!(detail.answers.iter().map(|line| &line.value).collect::<Vec<_>>(), [&AnswerValue::Point(5)]);
+    let timeline = bench.conductor.timeline(session, 10).await.unwrap();
+    let aside = &timeline.set_aside[0];
+    assert_eq!((&aside.value, aside.late, timeline.set_aside.len()), (&AnswerValue::Point(1), true, 1));
+    assert_eq!(timeline.comments.iter().map(|comment| comment.late).collect::<Vec<_>>(), [false, true]);
+
+    let out = folder.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+    let column = |table: &str, name: &str| rows(&out, table).iter().map(|row| row[name].clone()).collect::<Vec<_>>();
+    assert_eq!(column("answers", "value"), ["3", "5", "1"]);
+    assert_eq!(column("answers", "counts"), ["false", "true", "false"]);
+    assert_eq!(column("answers", "late"), ["false", "false", "true"]);
+    assert_eq!(column("comments", "late"), ["false", "true"]);
+    assert_eq!(column("sessions", "counts_until"), [detail.counts_until.unwrap().to_string()]);
+    assert_eq!(failed(&verify(&out)), [""; 0]);
+}
+
+#[tokio::test]
+async fn a_protocol_says_how_long_what_a_tablet_holds_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = include_str!("../../trial-protocols/paper.toml")
+        .replace("name = \"paper\"", "name = \"short-grace\"")
+        .replace("repeats = 2", "repeats = 2\ngrace_minutes = 1");
+    std::fs::write(folder.path().join("short-grace.toml"), protocol).unwrap();
+    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 7).await;
+    let session = bench.begin("short-grace").await;
+    let early = bench.comment("in time");
+    let late = bench.comment("too late");
+    abort(&bench, session).await;
+    bench.wait(MINUTE).await;
+    bench.conductor.comment(early).await.unwrap();
+    bench.wait(SECOND).await;
+    bench.conductor.comment(late).await.unwrap();
+    let kept = bench.store.reader().comments(session).await.unwrap();
+    assert_eq!(kept.iter().map(|(_, comment)| comment.late).collect::<Vec<_>>(), [false, true]);
+}
+
+#[tokio::test]
+async fn unblinding_asks_while_something_may_be_outstanding_and_then_nothing_counts_any_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut bench, session) = at_questions(folder.path()).await;
+    bench.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
+    let mut late = sharpness(&mut bench, 1, origin(TABLET_A, 1, Duration::ZERO));
+    abort(&bench, session).await;
+    let refused = unblind(&bench, session, false).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("counts until")), "{refused}");
+    assert!(!bench.conductor.session_detail(session).await.unwrap().line.unblinded);
+
+    unblind(&bench, session, true).await.unwrap();
+    bench.conductor.answer(late.clone()).await.unwrap();
+    // The same once the session is off the screens.
+    bench.conductor.dismiss(Role::Operator, session).await.unwrap();
+    late.key = bench.key();
+    bench.conductor.answer(late).await.unwrap();
+    let detail = bench.conductor.session_detail(session).await.unwrap();
+    assert_eq!(detail.answers.iter().map(|line| &line.value).collect::<Vec<_>>(), [&AnswerValue::Point(6)]);
+    let kept = bench.store.reader().answers(session).await.unwrap();
+    assert_eq!(kept.iter().map(|(_, answer)| answer.late).collect::<Vec<_>>(), [false, true, true]);
+}
+
+#[tokio::test]
+async fn unblinding_asks_until_each_tablet_has_said_since_the_end_that_it_holds_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut bench, session) = at_questions(folder.path()).await;
+    let told = |device, holding| Holding { session, device, holding };
+    bench.conductor.holding(told(TABLET_A, 0)).await.unwrap();
+    let answer = sharpness(&mut bench, 4, origin(TABLET_B, 1, Duration::ZERO));
+    bench.conductor.answer(answer).await.unwrap();
+    bench.wait(SECOND).await;
+    abort(&bench, session).await;
+    bench.wait(31 * MINUTE).await;
+
+    let refused = unblind(&bench, session, false).await.unwrap_err().to_string();
+    assert!(refused.contains("2 surgeon's devices have not said"), "{refused}");
+    bench.conductor.holding(told(TABLET_A, 0)).await.unwrap();
+    bench.conductor.holding(told(TABLET_B, 1)).await.unwrap();
+    let refused = unblind(&bench, session, false).await.unwrap_err().to_string();
+    assert!(refused.contains("1 surgeon's device has not said"), "{refused}");
+    bench.conductor.holding(told(TABLET_B, 0)).await.unwrap();
+    unblind(&bench, session, false).await.unwrap();
+
+    let elsewhere = Holding { session: SessionId(Uuid::from_u128(1)), ..told(TABLET_A, 0) };
+    assert!(matches!(bench.conductor.holding(elsewhere).await, Err(ConductError::NotFound(_))));
+}
+
+#[tokio::test]
+async fn an_emergency_unblinding_does_not_wait_and_the_sessions_answers_go_on_to_count_until_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut bench, session) = at_questions(folder.path()).await;
+    unblind(&bench, session, false).await.unwrap();
+    bench.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
+    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(6));
+    let after = sharpness(&mut bench, 1, Origin::default());
+    abort(&bench, session).await;
+    bench.conductor.answer(after).await.unwrap();
+    let kept = bench.store.reader().answers(session).await.unwrap();
+    assert_eq!(kept.iter().map(|(_, answer)| answer.late).collect::<Vec<_>>(), [false, true]);
+}
+
+#[tokio::test]
+async fn a_database_of_the_version_before_keeps_everything_and_its_last_answers_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let session = bench.whole_session("paper").await;
+    assert_eq!(bench.view().phase, Phase::Completed);
+    let before = bench.conductor.session_detail(session).await.unwrap().answers;
+    drop(bench);
+
+    let pool = crate::storage::raw(folder.path()).await;
+    MIGRATOR.undo(&pool, 4).await.unwrap();
+    // As the version before kept a change of mind, long after the end.
+    let changed = "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns)
+        SELECT '00000000-0000-4000-8000-000000000001', session, segment, question, '2', run, '2026-03-02T09:00:00Z', monotonic_ns
+        FROM answers WHERE question = 'sharpness' ORDER BY number LIMIT 1";
+    sqlx::query(changed).execute(&pool).await.unwrap();
+    sqlx::query("UPDATE runs SET version = 'before'").execute(&pool).await.unwrap();
+    pool.close().await;
+
+    let bench = Bench::start(folder.path()).await;
+    let after = bench.conductor.session_detail(session).await.unwrap().answers;
+    assert_eq!(after.len(), before.len());
+    let sharp = after.iter().find(|line| line.question == "sharpness" && line.setting == Some(1)).unwrap();
+    assert_eq!((&sharp.value, sharp.changed), (&AnswerValue::Point(2), true));
+    assert_eq!(bench.store.reader().comments(session).await.unwrap().len(), 6);
+    let out = folder.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+    assert!(rows(&out, "answers").iter().all(|row| row["late"] == "false" && row["device"].is_empty()));
+    assert_eq!(failed(&verify(&out)), [""; 0]);
+}
