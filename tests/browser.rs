@@ -34,6 +34,8 @@ mod outbox;
 mod proxy;
 #[path = "browser/screenshots.rs"]
 mod screenshots;
+#[path = "browser/tabs.rs"]
+mod tabs;
 #[path = "browser/theatre.rs"]
 mod theatre;
 #[path = "browser/trial.rs"]

@@ -31,7 +31,15 @@ pub async fn researcher(theatre: &Theatre<'_>) -> String {
     assert!(held.contains("The server restarted"), "the timeline shows when the lens was held: {held}");
     page.click("#unblind").await;
     page.type_into("#reason", "Analysis begins").await;
+    // A tablet might hold something that still counts: the dialog says so, and wants to be told that it is known.
+    page.sees("#reason-confirm", "Unblind all the same").await;
+    let consequence = page.text("#reason-consequence").await;
+    assert!(consequence.contains("What a tablet still holds counts until"), "{consequence}");
+    assert!(!consequence.contains("not said since the end"), "the tablet has said that it is empty: {consequence}");
     shoot(page, "researcher-3-unblinding").await;
+    page.click("#reason-go").await;
+    assert_eq!(page.run("return document.getElementById('reason-dialog').open", json!([])).await, true);
+    page.click("#reason-confirmed").await;
     page.click("#reason-go").await;
     page.sees(".unblinded", "mlr-hill-climber").await;
     until("the focal path", || async {

@@ -11,10 +11,12 @@ const OUTBOX: &str = r#"
     const page = document.querySelector('script[src*="surgeon.js"]').src;
     const { Outbox } = await import(page.replace("surgeon.js", "outbox.js"));
     const posted = [];
+    const bodies = [];
     const answers = [];
     const arrivals = [];
     window.fetch = (path, { body }) => {
-        posted.push(JSON.parse(body).value);
+        bodies.push(JSON.parse(body));
+        posted.push(bodies.at(-1).value);
         arrivals.shift()?.();
         return answers.shift() ?? Promise.resolve(new Response(null, { status: 204 }));
     };
@@ -46,12 +48,13 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         const done = saved(outbox);
         fail();
         await done;
-        return [posted, kept()];
+        const first = bodies[0].sequence;
+        return [posted, kept(), bodies.map(({ sequence }) => sequence - first), new Set(bodies.map(({ device }) => device)).size];
     "#;
     assert_eq!(
         run(&page, script).await,
-        json!([[3, 5], 0]),
-        "what was replaced is not sent once more, after its successor"
+        json!([[3, 5, 3], 0, [0, 1, 0], 1]),
+        "nothing is dropped, and each says as which of all it was given, so that the server knows the last"
     );
 
     // The same, when the tablet's clock was set back between the two.
@@ -69,9 +72,9 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         fail();
         await done;
         Date.now = clock;
-        return [posted, kept()];
+        return [posted, kept(), bodies[1].sequence - bodies[0].sequence];
     "#;
-    assert_eq!(run(&page, script).await, json!([[3, 5], 0]), "what was said last counts");
+    assert_eq!(run(&page, script).await, json!([[3, 5, 3], 0, 1]), "what was said last is known as the last");
 
     // Only the server's own word that it is kept takes it off the device.
     let script = r#"
@@ -130,4 +133,65 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         return [settled, posted];
     "#;
     assert_eq!(run(&page, script).await, json!([false, ["c", "c", 4]]));
+}
+
+/// What a page tells of an entry's wait: whether that was about as many seconds as `expected`, and by which clock.
+const WAIT: &str = r#"
+    const clock = Date.now;
+    const wait = ({ waited_millis: waited, waited_by: by }, expected) => [Math.abs(waited - expected * 1000) < 30000, by];
+    /** An entry that the server does not take at first; `meanwhile` happens before it is sent again. */
+    const heldBack = async (meanwhile) => {
+        const outbox = new Outbox();
+        let fail;
+        answers.push(new Promise((done) => (fail = () => done(ours(507)))));
+        const arrived = new Promise((done) => arrivals.push(done));
+        outbox.add("/comments", { value: "held" });
+        await arrived;
+        const done = saved(outbox);
+        meanwhile();
+        fail();
+        await done;
+        Date.now = clock;
+        return bodies.at(-1);
+    };
+"#;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_taken_for_quick() {
+    let driver = Driver::start().await;
+    let server = theatre::server();
+    let page = driver.browser().await;
+    page.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
+    let waits = async |script: &str| run(&page, &format!("{WAIT} {script}")).await;
+
+    let forward = "return wait(await heldBack(() => (Date.now = () => clock() + 600000)), 0)";
+    assert_eq!(waits(forward).await, json!([true, "page-clock"]));
+    let back = "return wait(await heldBack(() => (Date.now = () => clock() - 600000)), 0)";
+    assert_eq!(waits(back).await, json!([true, "page-clock"]));
+
+    // Asleep for ten minutes: the page is out of sight, and its own clock stands still.
+    let asleep = "const sight = (hidden) => {
+            Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
+            document.dispatchEvent(new Event('visibilitychange'));
+        };
+        return wait(await heldBack(() => {
+            sight(true);
+            Date.now = () => clock() + 600000;
+            sight(false);
+            delete document.hidden;
+        }), 600)";
+    assert_eq!(waits(asleep).await, json!([true, "wall-clock"]));
+
+    // Kept over a reload, where no page's clock knows how long; the real server knows no such address and takes nothing.
+    let keep = "answers.push(new Promise(() => {}));
+        Date.now = () => clock() - 600000;
+        new Outbox().add('/comments', { session: 's', value: 'kept' });
+        Date.now = clock;";
+    waits(keep).await;
+    page.reload().await;
+    let again = OUTBOX.replace("localStorage.clear();", "");
+    let script = format!(
+        "return (async () => {{ {again} {WAIT} const outbox = new Outbox(); await saved(outbox); return wait(bodies[0], 600); }})()"
+    );
+    assert_eq!(page.run(&script, json!([])).await, json!([true, "wall-clock"]));
 }

@@ -186,6 +186,13 @@ impl Browser<'_> {
         first
     }
 
+    /// Goes to `tab`; gives the handle of the one left.
+    pub async fn to_tab(&self, tab: &Value) -> Value {
+        let left = self.command(Method::GET, "/window", None).await.unwrap();
+        self.post("/window", json!({ "handle": tab })).await;
+        left
+    }
+
     /// Closes the tab and goes back to `tab`.
     pub async fn close_tab(&self, tab: &Value) {
         self.command(Method::DELETE, "/window", None).await.unwrap();

@@ -13,7 +13,7 @@ const REMARKS: &str = "[data-question=remarks] textarea";
 
 impl Theatre<'_> {
     /// The operator ends the session and takes it off the screens.
-    async fn put_away(&self) {
+    pub async fn put_away(&self) {
         self.operator.click("#session-actions .danger").await;
         self.give_reason("Enough").await;
         self.operator.sees("#phase", "Aborted").await;
@@ -31,7 +31,7 @@ impl Theatre<'_> {
     }
 
     /// Waits until what `sql` gives, in the database, is `expected`.
-    async fn keeps(&self, sql: &'static str, expected: &[&str]) {
+    pub async fn keeps(&self, sql: &'static str, expected: &[&str]) {
         let pool = crate::theatre::database(self.server.data.path()).await;
         until(&format!("{sql} to give {expected:?}"), || async {
             sqlx::query_scalar::<_, String>(sql).fetch_all(&pool).await.unwrap() == expected

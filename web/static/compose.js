@@ -1,12 +1,14 @@
 // The comment box, the quick comments and "Mark this moment". A comment belongs to the setting it was begun under, even
-// when the setting changes while it is being written.
+// when the setting changes while it is being written. One begun in another tab is offered, not shown.
 
-import { Draft, draftsOf } from "./outbox.js";
 import { byId, make, setText } from "./dom.js";
+import { Draft, draftsOf, followDrafts, forgetDraft } from "./drafts.js";
 
 const PATH = "/api/surgeon/comments";
 /** A second tap on the same button within this time is the same tap. */
 const SAME_TAP_MS = 700;
+/** As much of a draft elsewhere as its button shows. */
+const OFFERED_LETTERS = 16;
 
 const begin = ({ segment, setting, frame, run }) => ({ segment, setting, frame, run });
 
@@ -19,6 +21,7 @@ export function composer(outbox, now) {
   const quick = byId("quick");
   const mark = byId("mark");
   const send = byId("send");
+  const elsewhere = byId("elsewhere");
   /** The number of each setting that was on screen. */
   const numbers = new Map();
   let draft = null;
@@ -53,18 +56,47 @@ export function composer(outbox, now) {
   /** What stands in the box is sent as it stands: it is about the session that goes. */
   function sendBox() {
     const text = box.value.trim();
-    if (!shown || text === "") return;
-    outbox.add(PATH, said({ kind: "text", text }, { session: shown, ...begun }));
-    draft.write(null);
+    // The tab that took it over sends it.
+    if (!shown || text === "" || draft.claimed) return;
+    const about = { session: shown, ...begun };
+    outbox.add(PATH, said({ kind: "text", text }, about), null, draft.take());
   }
 
   /** Half-written comments on sessions that were put away are sent as they stand: their box is gone. */
   function sendLeft(session) {
-    for (const [other, left] of draftsOf("comment.")) {
-      if (other === session) continue;
-      if (left?.text?.trim()) outbox.add(PATH, said({ kind: "text", text: left.text.trim() }, { session: other, ...left.begun }));
-      new Draft(`comment.${other}`).write(null);
+    for (const left of draftsOf("comment.")) {
+      if (left.rest === session) continue;
+      const text = left.value.text?.trim();
+      const about = { session: left.rest, ...left.value.begun };
+      if (text) outbox.add(PATH, said({ kind: "text", text }, about), null, left);
+      forgetDraft(left);
     }
+  }
+
+  /** Follows what other tabs do with drafts; one has sent or taken over the one in `taken`, if that is given. */
+  function followOtherTabs(taken = null) {
+    if (draft && (draft.isIn(taken) || draft.claimed)) write("");
+    drawOffer();
+  }
+
+  /** Offers what was begun in another tab, while nothing is being written here. */
+  function drawOffer() {
+    const other = draft?.elsewhere().find(({ value }) => value.text?.trim());
+    elsewhere.hidden = !other || box.disabled || box.value !== "";
+    if (elsewhere.hidden) return;
+    const text = other.value.text.trim();
+    const letters = [...text];
+    const start = letters.length > OFFERED_LETTERS ? `${letters.slice(0, OFFERED_LETTERS).join("")}…` : text;
+    setText(elsewhere, `Continue “${start}”`);
+    elsewhere.title = `Begun in another tab: ${text}`;
+    elsewhere.onclick = () => takeOver(other);
+  }
+
+  function takeOver(other) {
+    draft.claim(other);
+    begun = other.value.begun ?? null;
+    write(other.value.text);
+    box.focus();
   }
 
   function drawQuick(texts) {
@@ -84,12 +116,13 @@ export function composer(outbox, now) {
     status.classList.toggle("saved", waiting === 0);
     status.classList.toggle("unsaved", waiting > 0 && outbox.trouble !== null);
     const here = now();
-    const elsewhere = begun && begun.setting > 0 && begun.segment !== here?.segment && box.value !== "";
-    about.hidden = !elsewhere;
-    if (elsewhere) setText(about, `This comment is about setting ${begun.setting}.`);
+    const otherSetting = begun && begun.setting > 0 && begun.segment !== here?.segment && box.value !== "";
+    about.hidden = !otherSetting;
+    drawOffer();
+    if (otherSetting) setText(about, `This comment is about setting ${begun.setting}.`);
   }
 
-  const said = (what, { session, segment = null, frame = null, run = null }) => ({ session, segment, frame, run, client_millis: Date.now(), ...what });
+  const said = (what, { session, segment = null, frame = null, run = null }) => ({ session, segment, frame, run, ...what });
 
   function tap(button, what) {
     const place = now();
@@ -107,7 +140,9 @@ export function composer(outbox, now) {
     const place = now();
     const text = box.value.trim();
     if (!place || text === "") return;
-    outbox.add(PATH, said({ kind: "text", text }, { ...place, ...begun }));
+    // It was said now, whenever it was begun.
+    const { key } = draft.take();
+    outbox.add(PATH, said({ kind: "text", text }, { ...place, ...begun }), null, { key });
     write("");
     setText(trouble, "");
     box.focus();
@@ -140,6 +175,9 @@ export function composer(outbox, now) {
     setText(trouble, `${what}: ${reason}`);
   }
 
+  followDrafts(followOtherTabs);
+  // A page that was put to sleep may not have been told.
+  document.addEventListener("visibilitychange", () => followOtherTabs());
   box.addEventListener("input", () => write(box.value));
   box.addEventListener("keydown", (event) => {
     if (event.key === "Enter" && !event.shiftKey && !event.isComposing) {

@@ -32,7 +32,10 @@ export function askWhetherMeant(ask) {
   open({ ...ask, unreasoned: true });
 }
 
-/** Asks for a reason in the page's reason dialog. `ask` is `{ heading, consequence, go, danger, done(reason) }`. */
+/**
+ * Asks for a reason in the page's reason dialog. `ask` is `{ heading, consequence, go, danger, confirm, done(reason) }`; where
+ * there is a `confirm`, its box has to be ticked too.
+ */
 export function askReason(ask) {
   open(ask);
 }
@@ -48,5 +51,11 @@ function open(ask) {
   document.getElementById("reason-field").hidden = ask.unreasoned ?? false;
   reason.required = !ask.unreasoned;
   reason.value = "";
+  const confirm = document.getElementById("reason-confirm");
+  confirm.hidden = !ask.confirm;
+  setText(confirm.querySelector("span"), ask.confirm ?? "");
+  const confirmed = document.getElementById("reason-confirmed");
+  confirmed.required = Boolean(ask.confirm);
+  confirmed.checked = false;
   askIn(dialog, document.getElementById("reason-trouble"), () => ask.done(reason.value.trim()));
 }

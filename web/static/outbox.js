@@ -1,9 +1,11 @@
 // Keeps what was said until the server says that it is saved. Every entry is written to this device first, under a key of
 // its own, so that a reload, a Wi-Fi gap or a second tab loses nothing; the entry's idempotency key makes sending it
-// twice harmless. What the server refuses stays on this device too, and is tried again when the page is next opened.
+// twice harmless, and what it tells of where and when it was said makes the order of sending harmless. What the server
+// refuses stays on this device too, and is tried again when the page is next opened.
 
 import { keep, Refused, inWords } from "./api.js";
 import { uuid } from "./dom.js";
+import { origin, stamp } from "./given.js";
 
 const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;
@@ -51,17 +53,29 @@ export class Outbox extends EventTarget {
     return [...this.#refused.values()].filter(({ body }) => body.session === session);
   }
 
+  /** How much of what was said in `session` this device holds, in all its tabs: not saved yet, or refused. */
+  held(session) {
+    const entries = [...stored(), ...this.#entries.values(), ...this.#refused.values()];
+    return new Set(entries.filter(({ body }) => body.session === session).map(({ id }) => id)).size;
+  }
+
+  /** The sessions that entries of this page belong to. */
+  get sessions() {
+    return new Set([...this.#entries.values(), ...this.#refused.values()].map(({ body }) => body.session));
+  }
+
   /**
-   * Takes something to be sent to `path`. An entry with the same `slot` (a question) that has not left yet is replaced.
-   * `body.key` is made here.
+   * Takes something to be sent to `path`; `slot` is the question that it answers, if it does. `from` is the `{ key, given }` of
+   * the draft that it was written as, which another tab may send as well.
    */
-  add(path, body, slot = null) {
+  add(path, body, slot = null, from = {}) {
     // A clock that is set back must not put what is said later before what was said.
     this.#latest = Math.max(Date.now(), this.#latest + 1);
-    const entry = { id: `${String(this.#latest).padStart(15, "0")}-${uuid()}`, path, slot, body: { key: uuid(), ...body } };
-    if (slot) {
-      for (const other of [...this.waiting, ...this.#refused.values()]) if (other.slot === slot && !other.sending) this.forget(other);
-    }
+    const id = `${String(this.#latest).padStart(15, "0")}-${uuid()}`;
+    const { key = uuid(), given = stamp() } = from;
+    const entry = { id, path, slot, given, drafted: from.key !== undefined, body: { key, ...body } };
+    // What the server cannot take is in the surgeon's hands again, who has now given another answer.
+    if (slot) for (const other of [...this.#refused.values()]) if (other.slot === slot) this.forget(other);
     this.#entries.set(entry.id, entry);
     entry.stored = store(entry);
     this.#tell(entry, "saving");
@@ -111,13 +125,20 @@ export class Outbox extends EventTarget {
   async #send(entry) {
     entry.sending = true;
     try {
-      await keep(entry.path, withWait(entry.body));
+      await keep(entry.path, { ...entry.body, ...told(entry) });
       this.trouble = null;
       this.forget(entry);
       this.#tell(entry, "saved");
       return true;
     } catch (error) {
       entry.sending = false;
+      if (error instanceof Refused && error.status === 409 && entry.drafted) {
+        // Another tab has sent an earlier text of the same draft under this key: this one is something else.
+        entry.drafted = false;
+        entry.body.key = uuid();
+        entry.stored = store(entry);
+        return this.#send(entry);
+      }
       if (error instanceof Refused && error.final) {
         this.#entries.delete(entry.id);
         this.#refused.set(entry.id, entry);
@@ -125,16 +146,10 @@ export class Outbox extends EventTarget {
         return true;
       }
       this.trouble = inWords(error, "No connection: trying again by itself.");
-      // Tried again later it would be the last to arrive, and count.
-      if (this.#replaced(entry)) this.forget(entry);
       const heard = error instanceof Refused;
       this.#tell(entry, "waiting", this.trouble, heard);
       return heard;
     }
-  }
-
-  #replaced({ id, slot }) {
-    return slot !== null && this.waiting.some((other) => other.slot === slot && other.id > id);
   }
 
   /** Another tab saved or replaced what both held. */
@@ -161,9 +176,10 @@ export class Outbox extends EventTarget {
   }
 }
 
-/** What says when it was said also says how long it has waited since. */
-function withWait(body) {
-  return body.client_millis === undefined ? body : { ...body, waited_millis: Math.max(0, Date.now() - body.client_millis) };
+/** Where and when `entry` was said. Entries of an older page tell no more than the wall clock, and answers not even that. */
+function told({ given, body }) {
+  if (given) return origin(given);
+  return body.client_millis === undefined ? {} : origin({ client_millis: body.client_millis });
 }
 
 function store(entry) {
@@ -190,47 +206,5 @@ function parsed(text) {
     return [{ ...JSON.parse(text), sending: false, stored: true }];
   } catch {
     return [];
-  }
-}
-
-/** The drafts on this device whose names begin with `start`, as `[rest of the name, value]`. */
-export function draftsOf(start) {
-  const prefix = `parfocal.draft.${start}`;
-  const names = ["sessionStorage", "localStorage"].flatMap((storage) => {
-    try {
-      return Object.keys(window[storage]).filter((key) => key.startsWith(prefix));
-    } catch {
-      return [];
-    }
-  });
-  return [...new Set(names)].map((key) => [key.slice(prefix.length), new Draft(key.slice("parfocal.draft.".length)).read()]);
-}
-
-/** A text being written, kept on this device: per tab over a reload, and for the next tab when this one is closed. */
-export class Draft {
-  #name;
-  constructor(name) {
-    this.#name = `parfocal.draft.${name}`;
-  }
-
-  /** What was being written, or null. */
-  read() {
-    try {
-      return JSON.parse(sessionStorage.getItem(this.#name) ?? localStorage.getItem(this.#name));
-    } catch {
-      return null;
-    }
-  }
-
-  /** Keeps `value`; null forgets it. */
-  write(value) {
-    for (const storage of ["sessionStorage", "localStorage"]) {
-      try {
-        if (value === null) window[storage].removeItem(this.#name);
-        else window[storage].setItem(this.#name, JSON.stringify(value));
-      } catch {
-        // full or switched off: the text is still in its box
-      }
-    }
   }
 }

@@ -20,8 +20,8 @@ const TYPING_PAUSE_MS = 900;
 /**
  * Draws `questions` and returns the form.
  *
- * `context.give(question, value, part)` sends an answer, or part `part` of one; `context.draft(question)` keeps a text that
- * is being written; `context.answers` maps question ids to answers already given; `context.settings` is how many settings
+ * `context.give(question, value, part, from)` sends an answer, or part `part` of one, written as the draft `from`;
+ * `context.draft(question)` keeps a text that is being written; `context.answers` maps question ids to answers already given; `context.settings` is how many settings
  * there are. Each question's element has `show(state, reason)`, which tells how far its answer has got; `take(value)`,
  * which shows an answer given on another device; `begun()`, whether something in it waits for a word of the surgeon's; and
  * `want(wanted)`, which marks what is still to be answered, or takes the marks back, and gives the first such place.
@@ -33,9 +33,9 @@ export function questionForm(questions, context) {
     const answered = context.answers[question.id];
     const { nodes, take, open = () => null, begun = () => null, gaps = () => [box] } = draw[question.kind](question, answered, {
       ...context,
-      give: (value, part) => {
+      give: (value, part, from) => {
         box.show("saving");
-        context.give(question, value, part);
+        context.give(question, value, part, from);
       },
       draft: context.draft(question),
       partly: (text) => showState(state, "partly", text),
@@ -87,10 +87,10 @@ function textQuestion(question, answered, context) {
     clearTimeout(timer);
     if (!written) return;
     const text = area.value.trim();
+    const from = context.draft.take();
     if (text === "") context.partly(answered ? "The earlier answer stays until you write another." : "");
-    else context.give(text);
+    else context.give(text, null, from);
     written = false;
-    context.draft.write(null);
   };
   area.addEventListener("input", () => {
     written = true;

@@ -3,7 +3,7 @@
 import { get, inWords, post } from "./api.js";
 import { askReason } from "./dialogs.js";
 import { byId, clockText, make, setText } from "./dom.js";
-import { drawTimeline } from "./timeline.js";
+import { drawTimeline, whyAside } from "./timeline.js";
 
 const { session, ended, unblinded } = byId("session").dataset;
 const API = `/api/researcher/sessions/${session}`;
@@ -19,6 +19,7 @@ async function load() {
     timeline = await get(`${API}/timeline`);
     if (unblinded === "true") policies = (await get(API)).unblinding.policies;
     listComments();
+    listSetAside();
     new ResizeObserver(draw).observe(byId("timeline"));
   } catch (error) {
     setText(byId("timeline-trouble"), inWords(error));
@@ -28,11 +29,23 @@ async function load() {
 function listComments() {
   lines = timeline.comments.map((comment, index) => {
     const said = comment.kind === "mark" ? make("em", {}, "Marked this moment") : comment.text;
+    const late = comment.late && make("span", { className: "badge warn" }, "late");
     const where = comment.setting ? `Setting ${comment.setting}` : "";
     return make("button", { type: "button", onclick: () => choose(index), onfocus: () => choose(index) },
-      make("span", { className: "when" }, clockText(comment.seconds)), make("span", { className: "muted" }, where), make("span", { className: "said" }, said));
+      make("span", { className: "when" }, clockText(comment.seconds)), make("span", { className: "muted" }, where), make("span", { className: "said" }, said, late && " ", late));
   });
   byId("comment-list").replaceChildren(...lines.map((line) => make("li", {}, line)));
+}
+
+/** Answers that do not count: given on another device than a later one, or too late. */
+function listSetAside() {
+  const lines = timeline.set_aside.map((answer) => {
+    const where = answer.setting ? `Setting ${answer.setting}` : "Closing";
+    const when = make("span", { className: "when" }, clockText(answer.seconds));
+    return make("li", {}, when, ` ${where}: ${answer.text || answer.question} `, make("strong", {}, whyAside(answer)));
+  });
+  byId("aside").hidden = lines.length === 0;
+  byId("aside-list").replaceChildren(...lines);
 }
 
 function choose(index) {
@@ -53,16 +66,37 @@ function showKey() {
   for (const entry of byId("timeline-key").children) entry.hidden = !shown[entry.className];
 }
 
-function unblind() {
+/** What a surgeon's tablet may still hold, in words; null where nothing may be outstanding. */
+function stillToCome(outstanding) {
+  if (!outstanding) return null;
+  const { counts_until: until, devices } = outstanding;
+  const said = [];
+  if (until) {
+    const time = new Date(until).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+    said.push(`What a tablet still holds counts until ${time}.`);
+  }
+  if (devices > 0) {
+    const tablets = devices === 1 ? "One tablet has" : `${devices} tablets have`;
+    said.push(`${tablets} not said since the end that nothing is left on it.`);
+  }
+  return said.join(" ");
+}
+
+async function unblind() {
+  // Where the server does not answer, it will ask when it is told to unblind.
+  const { outstanding } = await get(API).catch(() => ({ outstanding: null }));
+  const open = stillToCome(outstanding);
+  const late = open ? ` ${open} What arrives after unblinding is kept, but marked late, and never counts.` : "";
   askReason({
     heading: ended === "true" ? "Unblind this session" : "Emergency unblinding",
+    confirm: open ? "Unblind all the same" : undefined,
     consequence: ended === "true"
-      ? "You and everyone with this page will see which policy ran in which setting. This cannot be undone, and stands in the audit trail and in every export."
+      ? `You and everyone with this page will see which policy ran in which setting. This cannot be undone, and stands in the audit trail and in every export.${late}`
       : "The session is still under way. Unblinding now is an emergency measure: it is marked as such for good, in the audit trail and in every export. The surgeon’s and operator’s pages still do not show the policies.",
     go: ended === "true" ? "Unblind" : "Unblind now",
     danger: true,
     done: async (reason) => {
-      await post(`${API}/unblind`, { reason });
+      await post(`${API}/unblind`, { reason, despite_outstanding: open !== null });
       location.reload();
     },
   });

@@ -4,8 +4,10 @@ import { get, heardAgain, post, Refused, tellTrouble } from "./api.js";
 import { changeNotice } from "./change.js";
 import { composer } from "./compose.js";
 import { byId, clockText, make, setText } from "./dom.js";
+import { Draft, draftsOf, forgetDraft } from "./drafts.js";
+import { holdingTeller } from "./holding.js";
 import { unlessOvertaken } from "./live.js";
-import { Draft, draftsOf, Outbox } from "./outbox.js";
+import { Outbox } from "./outbox.js";
 import { onTopOf, questionForm } from "./questions.js";
 import { twoTaps } from "./twice.js";
 import { mountViewer } from "./viewer.js";
@@ -19,6 +21,7 @@ let endsAt = null;
 
 const here = () => state && { session: state.session, segment: state.segment, setting: state.setting, frame: viewer.frame ?? null, run: viewer.run ?? null };
 const comments = composer(outbox, here);
+const holding = holdingTeller(outbox, () => comments.unsent());
 const change = changeNotice(byId("comment"), (segment) => act({ action: "acknowledge", segment }));
 const finishUntapped = twoTaps(byId("finish"), byId("finish-heard"), () => act({ action: "finish-segment", segment: state.segment }));
 
@@ -34,6 +37,7 @@ function follow(next) {
   // After the form has gone, which hands over what stood in it.
   sendLeftAnswers();
   takeAnswers();
+  holding.follow(state);
   if (state?.phase === "notice" && !state.paused) change.show(state);
   else change.hide();
 }
@@ -169,14 +173,16 @@ function paused() {
 const asked = () => ({ session: state.session, segment: state.phase === "questions" ? state.segment : null });
 const slot = ({ id }, { session, segment } = asked()) => `${session}/${segment ?? "closing"}/${id}`;
 
-/** Text answers left half-written by questions that are no longer on screen are sent as they stand. */
+/** Text answers left half-written, in whatever tab, by questions that are no longer on screen are sent as they stand. */
 function sendLeftAnswers() {
   const present = /questions|closing/.test(state?.phase) ? slot({ id: "" }) : null;
-  for (const [place, text] of draftsOf("answer.")) {
+  for (const left of draftsOf("answer.")) {
+    const { rest: place, value: text } = left;
     if (typeof text !== "string" || (present !== null && place.startsWith(present))) continue;
     const [session, segment, ...question] = place.split("/");
-    if (text.trim()) outbox.add(ANSWERS, { session, segment: segment === "closing" ? null : segment, question: question.join("/"), value: text.trim() }, place);
-    new Draft(`answer.${place}`).write(null);
+    const about = { session, segment: segment === "closing" ? null : segment, question: question.join("/") };
+    if (text.trim()) outbox.add(ANSWERS, { ...about, value: text.trim() }, place, left);
+    forgetDraft(left);
   }
 }
 
@@ -192,9 +198,9 @@ function questions(heading) {
     answers,
     settings: state.settings,
     draft: (question) => new Draft(`answer.${slot(question, place)}`),
-    give(question, value, part = null) {
+    give(question, value, part = null, from = {}) {
       const whole = slot(question, place);
-      outbox.add(ANSWERS, { ...place, question: question.id, value }, part === null ? whole : `${whole}/${part}`);
+      outbox.add(ANSWERS, { ...place, question: question.id, value }, part === null ? whole : `${whole}/${part}`, from);
       settle(question);
     },
   });
@@ -256,18 +262,26 @@ outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }
   const { session, segment, question: id, value } = entry.body;
   if (!state || session !== state.session || segment !== asked().segment) return;
   if (reached === "saved") state.answers[id] = onTopOf(state.answers[id], value);
-  if (reached !== "saved" || outbox.pending(slot({ id })).length === 0) boxOf(id)?.show(reached, reason);
+  const last = outbox.pending(slot({ id })).length === 0;
+  if (reached !== "saved" || last) boxOf(id)?.show(reached, reason);
+  // Another device may have given a newer answer, which counts: the server knows.
+  if (reached === "saved" && last) refresh();
 });
 
 /* Wiring */
 
-byId("comment").addEventListener("input", () => ended() && drawPanel());
+byId("comment").addEventListener("input", () => {
+  if (!ended()) return;
+  drawPanel();
+  holding.tell();
+});
 
 viewer.live.addEventListener("session", (event) => follow(event.detail));
 viewer.live.addEventListener("status", (event) => followStatus(event.detail));
 viewer.live.addEventListener("connection", ({ detail: { open } }) => {
   if (!open) return;
   outbox.nudge();
+  holding.tell();
   heardAgain();
 });
 for (const box of document.querySelectorAll("[data-overlay]")) {

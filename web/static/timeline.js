@@ -1,4 +1,5 @@
-// A session's timeline as SVG: segments shaded, pauses hatched, focal power over time, a marker for each comment.
+// A session's timeline as SVG: segments shaded, pauses hatched, focal power over time, a marker for each comment, and one for
+// each answer that does not count.
 
 const SVG = "http://www.w3.org/2000/svg";
 const HEIGHT = 260;
@@ -20,15 +21,15 @@ export function drawTimeline(figure, timeline, { withPath, policies, choose }) {
   svg.append(shape("path", { class: "path", d: trace(points, powerOf, x, y) }));
   const heights = timeline.comments.map((comment) => y(powerAt(points, comment.seconds)));
   const markers = timeline.comments.map((comment, index) => marker(comment, x(comment.seconds), heights[index], y(0), () => choose(index)));
-  svg.append(...markers);
+  svg.append(...markers, ...timeline.set_aside.map((answer) => asideMarker(answer, x(answer.seconds), y(1) + 10)));
   const caption = document.createElement("figcaption");
   figure.replaceChildren(svg, caption);
   return (index) => point(figure, caption, markers, timeline.comments[index], index, x(timeline.comments[index].seconds), heights[index]);
 }
 
 /** Seconds from the start to the last thing that happened. */
-function length({ settings, pauses, points, comments }) {
-  const ends = [...[...settings, ...pauses].map(({ from, to }) => to ?? from), ...comments.map(({ seconds }) => seconds)];
+function length({ settings, pauses, points, comments, set_aside: aside }) {
+  const ends = [...[...settings, ...pauses].map(({ from, to }) => to ?? from), ...[...comments, ...aside].map(({ seconds }) => seconds)];
   return Math.max(1, points.at(-1)?.seconds ?? 0, ...ends);
 }
 
@@ -111,6 +112,20 @@ function marker(comment, cx, cy, foot, choose) {
   return group;
 }
 
+/** A diamond for an answer that does not count. */
+function asideMarker(answer, cx, cy) {
+  const diamond = shape("path", { class: "aside", d: `M${cx} ${cy - 7} l7 7 l-7 7 l-7 -7 z` });
+  diamond.append(shape("title", {}, `${answer.text || answer.question} ${whyAside(answer)}`));
+  return diamond;
+}
+
+/** What an answer that does not count says, and why it does not. */
+export function whyAside({ value, counted, late }) {
+  const words = (given) => [given].flat().map((part) => (part === 0 ? "–" : part)).join(", ");
+  const instead = counted === null ? "" : `; ${words(counted)} counts`;
+  return `${words(value)} (${late ? "arrived too late" : "another device’s later answer differs"}${instead})`;
+}
+
 function point(figure, caption, markers, comment, index, cx, cy) {
   markers.forEach((each, other) => each.classList.toggle("chosen", other === index));
   caption.textContent = comment.text ?? "Marked this moment";
@@ -119,7 +134,8 @@ function point(figure, caption, markers, comment, index, cx, cy) {
   caption.style.top = `${cy > HEIGHT / 2 ? cy - caption.offsetHeight - 14 : cy + 14}px`;
 }
 
-function description({ settings, pauses, comments }, withPath) {
+function description({ settings, pauses, comments, set_aside: aside }, withPath) {
   const held = pauses.length > 0 ? ` ${pauses.length} ${pauses.length > 1 ? "pauses" : "pause"},` : "";
-  return `${withPath ? "Focal power over time" : "Time line"}: ${settings.length} settings,${held} ${comments.length} comments, which follow as a list.`;
+  const apart = aside.length > 0 ? ` ${aside.length} ${aside.length > 1 ? "answers that do" : "answer that does"} not count,` : "";
+  return `${withPath ? "Focal power over time" : "Time line"}: ${settings.length} settings,${held}${apart} ${comments.length} comments, which follow as a list.`;
 }

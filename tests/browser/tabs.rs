@@ -1,0 +1,99 @@
+//! Two tabs and two tablets of one surgeon: a draft is in one of them, and of two answers the one given last counts.
+
+use serde_json::json;
+
+use crate::theatre::Theatre;
+use crate::webdriver::{Browser, Driver};
+
+const COMMENTS: &str = "SELECT text FROM comments ORDER BY number";
+
+/// Lets no answer through until `window.release()` is called.
+const HOLD_ANSWERS: &str = "const sent = window.fetch;
+    window.fetch = async (path, request) => {
+        if (path.endsWith('/answers')) throw new TypeError('Failed to fetch');
+        return sent(path, request);
+    };
+    window.release = () => { window.fetch = sent; dispatchEvent(new Event('online')); };";
+
+async fn chosen(page: &Browser<'_>, name: &str) -> serde_json::Value {
+    let script = "return document.querySelector(`input[name=${arguments[0]}]:checked`)?.value ?? null";
+    page.run(script, json!([name])).await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_draft_belongs_to_one_tab_and_a_second_one_offers_it() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let surgeon = &theatre.surgeon;
+    let page = format!("http://{}/surgeon", theatre.proxy.address);
+    theatre.begin("S-13", "short").await;
+    theatre.tap_notice(1).await;
+    theatre.write("Half a thought").await;
+
+    let first = surgeon.new_tab(&page).await;
+    surgeon.sees("#elsewhere", "Continue “Half a thought”").await;
+    assert_eq!(theatre.comment_box().await, "", "what is written in one tab is not in the other");
+    surgeon.click("#elsewhere").await;
+    assert_eq!(theatre.comment_box().await, "Half a thought");
+    let second = surgeon.to_tab(&first).await;
+    surgeon.sees("#elsewhere", "Continue").await;
+    assert_eq!(theatre.comment_box().await, "", "it has gone over");
+    surgeon.to_tab(&second).await;
+    theatre.say(", whole", 1).await;
+    surgeon.sees_no("#elsewhere").await;
+    theatre.keeps(COMMENTS, &["Half a thought, whole"]).await;
+
+    // Left half-written in a tab while another is open: when the session goes, it is sent once.
+    theatre.write("Left in a tab").await;
+    surgeon.to_tab(&first).await;
+    surgeon.sees("#elsewhere", "Continue “Left in a tab”").await;
+    theatre.put_away().await;
+    surgeon.sees("#panel", "No trial is under way").await;
+    surgeon.to_tab(&second).await;
+    surgeon.sees("#panel", "No trial is under way").await;
+    let empty = "return Object.keys(localStorage).filter((key) => /outbox|draft/.test(key))";
+    crate::wait::until("both tabs to have sent all", || async { surgeon.run(empty, json!([])).await == json!([]) })
+        .await;
+    theatre.keeps(COMMENTS, &["Half a thought, whole", "Left in a tab"]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let surgeon = &theatre.surgeon;
+    let other = driver.browser().await;
+    other.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("surgeon")))).await;
+    theatre.begin("S-14", "short").await;
+    theatre.tap_notice(1).await;
+    theatre.finish().await;
+
+    surgeon.sees("#panel h2", "a few questions").await;
+    surgeon.run(HOLD_ANSWERS, json!([])).await;
+    theatre.choose("sharpness", 3).await;
+    surgeon.sees("[data-question=sharpness] > .state", "Kept on this device").await;
+    other.click("input[name=sharpness][value='5']").await;
+    other.sees("[data-question=sharpness] > .state", "Saved").await;
+
+    surgeon.run("window.release()", json!([])).await;
+    surgeon.sees("[data-question=sharpness] > .state", "Saved").await;
+    theatre.keeps("SELECT value FROM answers ORDER BY number", &["5", "3"]).await;
+    crate::wait::until("the first tablet to show what counts", || async { chosen(surgeon, "sharpness").await == "5" })
+        .await;
+    assert_eq!(chosen(&other, "sharpness").await, "5");
+
+    // Both say that they hold nothing once the session is over, and the researcher sees that they disagreed.
+    theatre.operator.click("#session-actions .danger").await;
+    theatre.give_reason("Enough").await;
+    theatre.operator.sees("#phase", "Aborted").await;
+    let empty = "SELECT CAST(count(*) AS TEXT) FROM surgeon_devices AS d, events AS e WHERE d.holding = 0
+        AND e.kind = 'aborted' AND d.monotonic_ns > e.monotonic_ns";
+    theatre.keeps(empty, &["2"]).await;
+    let page = &theatre.operator;
+    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.click("td a.button").await;
+    page.sees("#aside-list", "3 (another device’s later answer differs; 5 counts)").await;
+    page.sees("table.answers", "5").await;
+    crate::screenshots::shoot(page, "researcher-6-answers-apart").await;
+    assert_eq!(page.run("return document.querySelectorAll('.timeline .aside').length", json!([])).await, 1);
+}
