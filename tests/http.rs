@@ -10,6 +10,8 @@ mod support;
 mod blinding;
 #[path = "http/disk.rs"]
 mod failing_disk;
+#[path = "http/finality.rs"]
+mod finality;
 #[path = "http/live.rs"]
 mod live;
 #[path = "http/roles.rs"]
