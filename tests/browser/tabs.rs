@@ -32,6 +32,7 @@ async fn a_draft_belongs_to_one_tab_and_a_second_one_offers_it() {
 
     let first = surgeon.new_tab(&page).await;
     surgeon.sees("#elsewhere", "Continue “Half a thought”").await;
+    crate::screenshots::shoot(surgeon, "surgeon-17-begun-elsewhere").await;
     assert_eq!(theatre.comment_box().await, "", "what is written in one tab is not in the other");
     surgeon.click("#elsewhere").await;
     assert_eq!(theatre.comment_box().await, "Half a thought");

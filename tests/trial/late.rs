@@ -114,6 +114,22 @@ async fn of_two_tabs_the_one_that_answered_last_counts_whatever_the_devices_cloc
 }
 
 #[tokio::test]
+async fn a_servers_clock_that_was_set_back_while_it_was_down_makes_no_later_answer_an_earlier_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut bench, _) = at_questions(folder.path()).await;
+    bench.wait(60 * MINUTE).await;
+    let five = sharpness(&mut bench, 5, origin(TABLET_B, 1, Duration::ZERO));
+    bench.conductor.answer(five).await.unwrap();
+    drop(bench);
+    // Both its clocks begin again where they were an hour before.
+    let mut bench = Bench::start(folder.path()).await;
+    let two = sharpness(&mut bench, 2, origin(TABLET_A, 1, Duration::ZERO));
+    bench.wait(SECOND).await;
+    bench.conductor.answer(two).await.unwrap();
+    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(2));
+}
+
+#[tokio::test]
 async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arrivals_are_kept_and_marked() {
     let folder = tempfile::tempdir().unwrap();
     let (mut bench, session) = at_questions(folder.path()).await;

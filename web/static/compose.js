@@ -81,18 +81,21 @@ export function composer(outbox, now) {
 
   /** Offers what was begun in another tab, while nothing is being written here. */
   function drawOffer() {
-    const other = draft?.elsewhere().find(({ value }) => value.text?.trim());
-    elsewhere.hidden = !other || box.disabled || box.value !== "";
-    if (elsewhere.hidden) return;
+    const other = box.disabled || box.value !== "" ? undefined : begunElsewhere();
+    elsewhere.hidden = !other;
+    if (!other) return;
     const text = other.value.text.trim();
     const letters = [...text];
     const start = letters.length > OFFERED_LETTERS ? `${letters.slice(0, OFFERED_LETTERS).join("")}…` : text;
     setText(elsewhere, `Continue “${start}”`);
     elsewhere.title = `Begun in another tab: ${text}`;
-    elsewhere.onclick = () => takeOver(other);
   }
 
-  function takeOver(other) {
+  const begunElsewhere = () => draft?.elsewhere().find(({ value }) => value.text?.trim());
+
+  function takeOver() {
+    const other = begunElsewhere();
+    if (!other) return drawOffer();
     draft.claim(other);
     begun = other.value.begun ?? null;
     write(other.value.text);
@@ -186,6 +189,7 @@ export function composer(outbox, now) {
     }
   });
   send.onclick = submit;
+  elsewhere.onclick = takeOver;
   mark.onclick = () => tap(mark, { kind: "mark" });
   return { follow, draw: drawState, unsent: () => box.value.trim() !== "" };
 }

@@ -7,6 +7,7 @@ import { device } from "./given.js";
 
 const PATH = "/api/surgeon/holding";
 const TRY_AGAIN_MS = 5000;
+const UNDER_WAY = "under way";
 
 /** A session that the server does not know is nobody's business. */
 function unlessFinal(error) {
@@ -28,8 +29,11 @@ export function holdingTeller(outbox, unsent) {
     tell();
   }
 
+  /** Entries and half-written texts; an order of settings that was not confirmed is no answer. */
   function held(session) {
-    const written = ["comment.", "answer."].flatMap((kind) => draftsOf(kind + session)).length;
+    const comments = draftsOf(`comment.${session}`).map(({ value }) => value.text);
+    const answers = draftsOf(`answer.${session}/`).map(({ value }) => value);
+    const written = [...comments, ...answers].filter((text) => typeof text === "string" && text.trim() !== "").length;
     const inBox = shown?.session === session && unsent() && written === 0 ? 1 : 0;
     return outbox.held(session) + written + inBox;
   }
@@ -40,8 +44,9 @@ export function holdingTeller(outbox, unsent) {
   function news() {
     for (const session of outbox.sessions) sessions.add(session);
     for (const session of sessions) {
+      if (underWay(session) && known.get(session) === UNDER_WAY) continue;
       const holding = held(session);
-      const word = underWay(session) ? "under way" : `holds ${holding}`;
+      const word = underWay(session) ? UNDER_WAY : `holds ${holding}`;
       if (known.get(session) !== word) return { session, holding, word };
     }
     return null;
