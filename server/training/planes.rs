@@ -1,0 +1,233 @@
+//! Focal stacks in memory: one scene at several positions of the focal plane, and where each patch of it is sharpest.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "pixel arithmetic on small numbers"
+)]
+
+use multiversion::multiversion;
+
+use crate::imaging::{GrayImage, PATCH_SIDE, Patch};
+
+/// Pixels between two neighbouring places at which the sharpest position is known.
+const STRIDE: usize = 4;
+
+/// A scene's pictures in order of focus, 8 bits a pixel, and the position at which each patch of it is sharpest.
+///
+/// A position says where the focal plane lies: in pixels of blur for simulated scenes, in planes for photographed ones.
+#[derive(Debug, Clone)]
+pub struct PlaneStack {
+    width: usize,
+    height: usize,
+    /// Where the focal plane lay for each picture, rising.
+    positions: Vec<f32>,
+    planes: Vec<Box<[u8]>>,
+    /// The sharpest position of the patches whose corners lie [`STRIDE`] pixels apart, row after row.
+    sharpest: Vec<f32>,
+}
+
+/// Why pictures cannot be a focal stack.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PlanesError {
+    /// Fewer than three.
+    #[error("a focal stack needs at least 3 pictures at rising positions, and has {0}")]
+    TooFew(usize),
+    /// Sizes differ.
+    #[error("picture {0} of the focal stack differs in size from the first")]
+    SizesDiffer(usize),
+    /// Too small to hold a patch and its way.
+    #[error("the focal stack's pictures must have at least 64x64 pixels, and have {0}x{1}")]
+    TooSmall(usize, usize),
+}
+
+impl PlaneStack {
+    /// A stack of `pictures`, each with the position of its focal plane, which rise. Gray levels beyond 0..=255 are clipped.
+    ///
+    /// # Errors
+    /// When there are fewer than three, sizes differ, or they are smaller than 64x64 pixels.
+    pub fn new(pictures: &[(f32, GrayImage)]) -> Result<Self, PlanesError> {
+        let (Some((_, first)), 3..) = (pictures.first(), pictures.len()) else {
+            return Err(PlanesError::TooFew(pictures.len()));
+        };
+        let (width, height) = (first.width, first.height);
+        if width < 64 || height < 64 {
+            return Err(PlanesError::TooSmall(width, height));
+        }
+        if let Some(index) = pictures.iter().position(|(_, picture)| (picture.width, picture.height) != (width, height))
+        {
+            return Err(PlanesError::SizesDiffer(index + 1));
+        }
+        if !pictures.is_sorted_by(|a, b| a.0 < b.0) {
+            return Err(PlanesError::TooFew(pictures.len()));
+        }
+
+        let positions: Vec<f32> = pictures.iter().map(|picture| picture.0).collect();
+        let sharpness: Vec<Vec<f32>> = pictures.iter().map(|(_, picture)| sharpness(picture)).collect();
+        let places = sharpness[0].len();
+        let peak_at = |place: usize| {
+            let curve: Vec<f32> = sharpness.iter().map(|plane| plane[place]).collect();
+            peak(&positions, &curve)
+        };
+        let sharpest = (0..places).map(peak_at).collect();
+        let bytes = |picture: &GrayImage| picture.data.iter().map(|value| value.round() as u8).collect();
+        let planes = pictures.iter().map(|(_, picture)| bytes(picture)).collect();
+        Ok(Self { width, height, positions, planes, sharpest })
+    }
+
+    /// Width and height in pixels.
+    #[must_use]
+    pub const fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// First and last position.
+    #[must_use]
+    pub fn range(&self) -> (f64, f64) {
+        (f64::from(self.positions[0]), f64::from(self.positions[self.positions.len() - 1]))
+    }
+
+    /// The position at which the patch with its corner at `(x, y)` is sharpest: where its mean gradient magnitude peaks, refined
+    /// by a parabola through the peak and its neighbours.
+    #[must_use]
+    pub fn sharpest(&self, (x, y): (usize, usize)) -> f64 {
+        let (columns, rows) = grid(self.width, self.height);
+        let column = ((x + STRIDE / 2) / STRIDE).min(columns - 1);
+        let row = ((y + STRIDE / 2) / STRIDE).min(rows - 1);
+        f64::from(self.sharpest[row * columns + column])
+    }
+
+    /// The patch with its corner at `(x, y)` with the focal plane at `position`: a mix of the two pictures around it. Beyond the
+    /// first and the last picture, those; beyond the borders, the nearest patch within them.
+    #[must_use]
+    pub fn patch(&self, (x, y): (usize, usize), position: f64) -> Patch {
+        let position = position as f32;
+        let last = self.positions.len() - 1;
+        let above = self.positions.partition_point(|&at| at <= position).clamp(1, last);
+        let (low, high) = (self.positions[above - 1], self.positions[above]);
+        let share = ((position - low) / (high - low)).clamp(0.0, 1.0);
+        let corner = (x.min(self.width - PATCH_SIDE), y.min(self.height - PATCH_SIDE));
+        let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
+        mix(&self.planes[above - 1], &self.planes[above], share, self.width, corner, &mut patch.0);
+        patch
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn mix(low: &[u8], high: &[u8], share: f32, width: usize, (x, y): (usize, usize), out: &mut [f32]) {
+    for (row, line) in out.chunks_exact_mut(PATCH_SIDE).enumerate() {
+        let from = (y + row) * width + x;
+        let pairs = low[from..from + PATCH_SIDE].iter().zip(&high[from..from + PATCH_SIDE]);
+        for (value, (&low, &high)) in line.iter_mut().zip(pairs) {
+            let low = f32::from(low);
+            *value = low + share * (f32::from(high) - low);
+        }
+    }
+}
+
+/// Columns and rows of patches whose corners lie [`STRIDE`] pixels apart.
+const fn grid(width: usize, height: usize) -> (usize, usize) {
+    ((width - PATCH_SIDE) / STRIDE + 1, (height - PATCH_SIDE) / STRIDE + 1)
+}
+
+/// The mean gradient magnitude of each patch of the [`grid`], row after row.
+fn sharpness(picture: &GrayImage) -> Vec<f32> {
+    let magnitudes = gradient_magnitudes(picture);
+    let (width, height) = (picture.width, picture.height);
+    let (columns, rows) = grid(width, height);
+
+    // Sums over the columns of each patch first, then over its rows.
+    let mut across = vec![0.0f32; columns * height];
+    for (line, sums) in magnitudes.chunks_exact(width).zip(across.chunks_exact_mut(columns)) {
+        let blocks: Vec<f32> = line.chunks(STRIDE).map(|block| block.iter().sum()).collect();
+        for (column, sum) in sums.iter_mut().enumerate() {
+            *sum = blocks[column..column + PATCH_SIDE / STRIDE].iter().sum();
+        }
+    }
+    let mut out = vec![0.0f32; columns * rows];
+    for (row, sums) in out.chunks_exact_mut(columns).enumerate() {
+        for line in across.chunks_exact(columns).skip(row * STRIDE).take(PATCH_SIDE) {
+            sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += value);
+        }
+    }
+    out
+}
+
+/// The length of the 3x3 Sobel gradient at each pixel; borders replicate.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn gradient_magnitudes(picture: &GrayImage) -> Vec<f32> {
+    let (width, height) = (picture.width, picture.height);
+    let mut out = vec![0.0f32; width * height];
+    let line = |y: usize| &picture.data[y * width..][..width];
+    for (y, out) in out.chunks_exact_mut(width).enumerate() {
+        let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(height - 1)));
+        for x in 1..width - 1 {
+            let left = above[x - 1] + 2.0 * here[x - 1] + below[x - 1];
+            let right = above[x + 1] + 2.0 * here[x + 1] + below[x + 1];
+            let up = above[x - 1] + 2.0 * above[x] + above[x + 1];
+            let down = below[x - 1] + 2.0 * below[x] + below[x + 1];
+            out[x] = ((right - left).powi(2) + (down - up).powi(2)).sqrt();
+        }
+        out[0] = out[1];
+        out[width - 1] = out[width - 2];
+    }
+    out
+}
+
+/// Where `curve` over `positions` peaks: at the vertex of the parabola through its greatest value and that one's neighbours.
+fn peak(positions: &[f32], curve: &[f32]) -> f32 {
+    let top = (0..curve.len()).max_by(|&a, &b| curve[a].total_cmp(&curve[b])).unwrap_or(0);
+    if top == 0 || top + 1 == curve.len() {
+        return positions[top];
+    }
+    // Newton's divided differences, since positions need not be evenly spread.
+    let [x0, x1, x2] = [positions[top - 1], positions[top], positions[top + 1]];
+    let [y0, y1, y2] = [curve[top - 1], curve[top], curve[top + 1]];
+    let first = (y1 - y0) / (x1 - x0);
+    let bend = ((y2 - y1) / (x2 - x1) - first) / (x2 - x0);
+    if bend >= 0.0 { x1 } else { (0.5 * (x0 + x1) - first / (2.0 * bend)).clamp(x0, x2) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_peaks_at_its_vertex() {
+        let positions = [0.0, 1.0, 2.5, 4.0, 5.0];
+        let curve = positions.map(|x: f32| 7.0 - (x - 2.9).powi(2));
+        assert!((peak(&positions, &curve) - 2.9).abs() < 1e-4);
+        assert!((peak(&positions, &[5.0, 4.0, 3.0, 2.0, 1.0]) - 0.0).abs() < 1e-6);
+    }
+
+    /// Stripes of `contrast` along x, four pixels a stripe, in the left half; of 160 less that in the right one.
+    fn stripes(contrast: f32) -> GrayImage {
+        let value = |i: usize| {
+            let (x, contrast) = (i % 128, if i % 128 < 64 { contrast } else { 80.0 - contrast });
+            128.0 + if x % 8 < 4 { contrast } else { -contrast }
+        };
+        GrayImage { width: 128, height: 64, data: (0..128 * 64).map(value).collect() }
+    }
+
+    #[test]
+    fn each_patch_is_sharpest_where_its_gradient_is() {
+        let contrasts = [10.0, 40.0, 60.0, 40.0, 10.0, 5.0];
+        let pictures: Vec<_> = (0..6).map(|index| (index as f32, stripes(contrasts[index]))).collect();
+        let stack = PlaneStack::new(&pictures).unwrap();
+        assert!((stack.sharpest((8, 8)) - 2.0).abs() < 1e-3);
+        assert!((stack.sharpest((90, 8)) - 5.0).abs() < 1e-3);
+        let mixed = stack.patch((0, 0), 0.5).0;
+        assert!((mixed[0] - 153.0).abs() < 1e-4 && (mixed[4] - 103.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn what_is_no_stack_is_refused() {
+        let picture = GrayImage { width: 64, height: 64, data: vec![0.0; 64 * 64] };
+        let small = GrayImage { width: 64, height: 63, data: vec![0.0; 64 * 63] };
+        let at = |position: f32, picture: &GrayImage| (position, picture.clone());
+        let refused = |pictures: &[(f32, GrayImage)]| PlaneStack::new(pictures).unwrap_err();
+        assert_eq!(refused(&[at(0.0, &picture), at(1.0, &picture)]), PlanesError::TooFew(2));
+        assert_eq!(refused(&[at(0.0, &picture), at(1.0, &small), at(2.0, &picture)]), PlanesError::SizesDiffer(2));
+        assert_eq!(refused(&[at(0.0, &small), at(1.0, &small), at(2.0, &small)]), PlanesError::TooSmall(64, 63));
+    }
+}
