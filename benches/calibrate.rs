@@ -11,7 +11,7 @@ use parfocal::imaging::GrayImage;
 use parfocal::training::clip::Clip;
 use parfocal::training::evaluate::{Benchmark, Conditions, FRAMES, Outcome, evaluate};
 use parfocal::training::pictures::{Split, sharp_phantom};
-use parfocal::training::scan::ScanSettings;
+use parfocal::training::scan::{ScanSettings, Scene};
 use parfocal::training::texture::vary_contrast;
 
 const COUNT: usize = 200;
@@ -53,15 +53,15 @@ fn main() {
     let policies = PAPER.map(|(name, _)| PolicyName::new(name));
     println!("largest deviation; then MAE and share in focus of fixed, MGM and MLR hill-climber");
     for Candidate { name, settings, uneven } in candidates() {
-        let clips = pictures.iter().zip(0..).map(|(picture, seed)| {
+        let scenes = pictures.iter().zip(0..).map(|(picture, seed)| {
             let mut picture = picture.clone();
             if uneven > 0.0 {
                 vary_contrast(&mut picture, uneven, seed);
             }
-            Arc::new(Clip::still(picture).unwrap())
+            Scene::Flat(Arc::new(Clip::still(picture).unwrap()))
         });
         let conditions = Conditions::Same(settings);
-        let benchmark = Benchmark { clips: clips.collect(), conditions, seed: 1, count: COUNT, frames: FRAMES };
+        let benchmark = Benchmark { scenes: scenes.collect(), conditions, seed: 1, count: COUNT, frames: FRAMES };
         let outcomes = evaluate(&registry, &policies, &benchmark, &|_| ()).unwrap();
         let rows: Vec<_> = outcomes.iter().skip(1).map(Outcome::row).collect();
         let deviation = rows.iter().zip(PAPER).map(|(row, (_, mae))| (row.mae / mae - 1.0).abs()).fold(0.0, f64::max);

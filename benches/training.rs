@@ -21,6 +21,7 @@ use parfocal::training::dqn::DqnTrainer;
 use parfocal::training::pictures::{Split, varied};
 use parfocal::training::recipe::{Recipe, shipped};
 use parfocal::training::replay::{Replay, Seen, Step};
+use parfocal::training::scenery::Scenery;
 use parfocal::training::session::Session;
 use parfocal::training::trainer::Trainer;
 use parfocal::training::variety::Variety;
@@ -39,9 +40,10 @@ fn rate(times: u32, mut work: impl FnMut()) -> f64 {
 }
 
 fn environment(clips: &[Arc<Clip>]) {
+    let scenery = Scenery::from(clips.to_vec());
     for (name, share) in [("reference scans", 0.0), ("varied scans", 1.0)] {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut sessions: Vec<_> = (0..64).map(|_| Session::draw(clips, Variety { share }, 0.0, &mut rng)).collect();
+        let mut sessions: Vec<_> = (0..64).map(|_| Session::draw(&scenery, Variety { share }, 0.0, &mut rng)).collect();
         let rounds = rate(200, || {
             for session in &mut sessions {
                 black_box(session.observe());
@@ -59,7 +61,7 @@ fn updates(clips: &[Arc<Clip>], name: &str, sight: Sight, batch: usize, times: u
     (recipe.windows, recipe.window) = (batch / TRANSITIONS, TRANSITIONS + 8);
     // As in `peer.py` the memory is filled once and no frame is played meanwhile.
     (recipe.frames_an_update, recipe.warm_up, recipe.replay) = (0, 20_000, 20_000);
-    let mut trainer = DqnTrainer::new(sight, recipe, clips.to_vec(), 1, tch::Device::Cpu);
+    let mut trainer = DqnTrainer::new(sight, recipe, clips.to_vec().into(), 1, tch::Device::Cpu);
     trainer.update();
     let rate = rate(times, || {
         black_box(trainer.update());
@@ -74,7 +76,7 @@ fn trainings(clips: &[Arc<Clip>]) {
         let (rate, threads) = pool.install(|| {
             compute_on_this_thread();
             let recipe = Recipe::parse(shipped("cnn-learned").unwrap()).unwrap().dqn.unwrap();
-            let mut trainer = DqnTrainer::new(Sight::Patch, recipe, clips.to_vec(), 1, tch::Device::Cpu);
+            let mut trainer = DqnTrainer::new(Sight::Patch, recipe, clips.to_vec().into(), 1, tch::Device::Cpu);
             let update = || {
                 black_box(trainer.update());
             };

@@ -16,6 +16,7 @@ use crate::training::evaluate::{Benchmark, COUNT, Conditions, FRAMES, Outcome, S
 use crate::training::footage;
 use crate::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
 use crate::training::report::Report;
+use crate::training::scan::Scene;
 use crate::training::stack_bench::{FIRST_SEED, SEEDS, StackSource, bench};
 
 /// What to evaluate, and on what.
@@ -203,7 +204,7 @@ fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
     let set = if clips.is_empty() {
         Benchmark { seed, ..Benchmark::reference(count)? }
     } else {
-        Benchmark { clips, conditions: Conditions::Fitting, seed, count, frames: FRAMES }
+        Benchmark { scenes: clips.into_iter().map(Scene::Flat).collect(), conditions: Conditions::Fitting, seed, count, frames: FRAMES }
     };
     Ok(Scans { set: Box::new(set), seed, between: None })
 }

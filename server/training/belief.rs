@@ -2,16 +2,14 @@
 //! by cross-entropy, on scans that the tracker itself steers.
 #![allow(clippy::cast_possible_wrap, clippy::cast_precision_loss, reason = "small counts as tensor sizes and shares")]
 
-use std::sync::Arc;
-
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
-use super::clip::Clip;
 use super::optimiser::{Optimiser, Rule, half_cosine};
+use super::scenery::Scenery;
 use super::session::{Session, lead_astray};
 use super::trainer::Trainer;
 use super::variety::Variety;
@@ -45,7 +43,7 @@ pub struct BeliefRecipe {
 /// A training in progress.
 pub struct BeliefTrainer {
     recipe: BeliefRecipe,
-    clips: Vec<Arc<Clip>>,
+    scenery: Scenery,
     store: nn::VarStore,
     network: BeliefNetwork,
     optimiser: Optimiser,
@@ -68,9 +66,9 @@ struct Batch {
 }
 
 impl BeliefTrainer {
-    /// A training from nothing on `clips`, its network on `device`.
+    /// A training from nothing on `scenery`, its network on `device`.
     #[must_use]
-    pub fn new(recipe: BeliefRecipe, clips: Vec<Arc<Clip>>, seed: u64, device: Device) -> Self {
+    pub fn new(recipe: BeliefRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
         let store = nn::VarStore::new(device);
@@ -78,7 +76,7 @@ impl BeliefTrainer {
         let optimiser = Optimiser::new(recipe.optimiser, &store);
         let seats = Vec::new();
         let memory = network.blank(recipe.scans, device);
-        let mut trainer = Self { recipe, clips, store, network, optimiser, seats, memory, rng, updates: 0 };
+        let mut trainer = Self { recipe, scenery, store, network, optimiser, seats, memory, rng, updates: 0 };
         trainer.begin_leg(seed);
         trainer
     }
@@ -123,7 +121,7 @@ impl BeliefTrainer {
         for (index, seat) in self.seats.iter_mut().enumerate() {
             seat.windows_left -= 1;
             if seat.windows_left == 0 {
-                *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+                *seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
                 let _ = self.memory.select(1, index as i64).fill_(0.0);
             }
         }
@@ -142,7 +140,7 @@ impl Trainer for BeliefTrainer {
     fn begin_leg(&mut self, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = |index| {
-            let mut seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+            let mut seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
             // Scans end one after another, not all at once.
             seat.windows_left = 1 + index % self.recipe.windows_a_scan;
             seat
@@ -180,8 +178,8 @@ impl Trainer for BeliefTrainer {
 }
 
 impl Seat {
-    fn draw(recipe: &BeliefRecipe, clips: &[Arc<Clip>], rng: &mut ChaCha8Rng) -> Self {
-        let session = Session::draw(clips, Variety { share: recipe.variety }, recipe.wandering, rng);
+    fn draw(recipe: &BeliefRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
+        let session = Session::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
         Self { session, trace: Trace::default(), windows_left: recipe.windows_a_scan }
     }
 }

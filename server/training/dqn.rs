@@ -7,19 +7,17 @@
     reason = "small counts as tensor sizes and shares"
 )]
 
-use std::sync::Arc;
-
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tch::{Device, Tensor, nn};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
-use super::clip::Clip;
 use super::dqn_batch::{Batch, Bonus, Returns, Wanted, bellman, lookahead, smooth_l1};
 use super::dqn_recipe::{DqnRecipe, Target};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::replay::{Frames, Replay, Seen, Step};
+use super::scenery::Scenery;
 use super::session::{Session, lead_astray};
 use super::trainer::Trainer;
 use super::values::Values;
@@ -31,7 +29,7 @@ use crate::autofocus::weights::{self, WeightsError, floats};
 /// A training in progress.
 pub struct DqnTrainer {
     recipe: DqnRecipe,
-    clips: Vec<Arc<Clip>>,
+    scenery: Scenery,
     online: Values,
     target: Values,
     target_variables: Flat,
@@ -53,9 +51,9 @@ struct Seat {
 }
 
 impl DqnTrainer {
-    /// A training from nothing on `clips`, its networks on `device`.
+    /// A training from nothing on `scenery`, its networks on `device`.
     #[must_use]
-    pub fn new(sight: Sight, recipe: DqnRecipe, clips: Vec<Arc<Clip>>, seed: u64, device: Device) -> Self {
+    pub fn new(sight: Sight, recipe: DqnRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
         let (online, mut target) = (Values::new(sight, device), Values::new(sight, device));
@@ -66,7 +64,7 @@ impl DqnTrainer {
         let replay = Replay::new(recipe.replay, recipe.scans);
         let (seats, updates, frames) = (Vec::new(), 0, 0);
         let mut trainer =
-            Self { recipe, clips, online, target, target_variables, optimiser, seats, replay, rng, updates, frames };
+            Self { recipe, scenery, online, target, target_variables, optimiser, seats, replay, rng, updates, frames };
         trainer.begin_leg(seed);
         trainer
     }
@@ -124,7 +122,7 @@ impl DqnTrainer {
         seat.age += 1;
         seat.frames_left -= 1;
         if seat.frames_left == 0 {
-            *seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+            *seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
         }
     }
 
@@ -171,7 +169,7 @@ impl Trainer for DqnTrainer {
     fn begin_leg(&mut self, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = |_| {
-            let mut seat = Seat::draw(&self.recipe, &self.clips, &mut self.rng);
+            let mut seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
             // Scans end one after another, not all at once.
             seat.frames_left = self.rng.random_range(1..=self.recipe.frames_a_scan);
             seat
@@ -231,8 +229,8 @@ impl Trainer for DqnTrainer {
 }
 
 impl Seat {
-    fn draw(recipe: &DqnRecipe, clips: &[Arc<Clip>], rng: &mut ChaCha8Rng) -> Self {
-        let session = Session::draw(clips, Variety { share: recipe.variety }, recipe.wandering, rng);
+    fn draw(recipe: &DqnRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
+        let session = Session::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
         Self {
             session,
             age: 0,

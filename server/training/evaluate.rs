@@ -1,17 +1,15 @@
 //! Evaluation: every policy on the same focal-time scans, figures over all of them, and tests between any two.
 #![allow(clippy::cast_precision_loss, reason = "counts of scans and frames are small")]
 
-use std::sync::Arc;
-
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::clip::{Clip, ClipError};
+use super::clip::ClipError;
 use super::pictures::{Split, reference};
 use super::rollout::{FocalTimeScan, NoTarget, Path, PathFigures, roll_out, roll_out_oracle};
-use super::scan::{Scan, ScanSettings};
+use super::scan::{Scan, ScanSettings, Scene};
 use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
 use super::variety::Variety;
 use crate::autofocus::networks::compute_on_this_thread;
@@ -45,18 +43,18 @@ pub trait ScanSet: Sync {
 pub enum Conditions {
     /// All by these settings.
     Same(ScanSettings),
-    /// As fits each clip: [`ScanSettings::over`].
+    /// As fits each scene: [`ScanSettings::fitting`].
     Fitting,
-    /// The first half as the reference's, the second half as varied as training's scans can be: what holds on both is likely
-    /// to hold elsewhere.
-    HalfVaried,
+    /// The first so many as fits each scene, the others as varied as training's scans can be: what holds on both is likely to hold
+    /// elsewhere.
+    VariedFrom(usize),
 }
 
-/// A set of simulated scans: scan `i` goes over clip `i` modulo their number.
+/// A set of simulated scans: scan `i` goes over scene `i` modulo their number.
 #[derive(Debug, Clone)]
 pub struct Benchmark {
     /// What is scanned.
-    pub clips: Vec<Arc<Clip>>,
+    pub scenes: Vec<Scene>,
     /// How.
     pub conditions: Conditions,
     /// Seed that all scans' courses are drawn from.
@@ -73,24 +71,24 @@ impl Benchmark {
     /// # Errors
     /// None in practice: its pictures are large enough.
     pub fn reference(count: usize) -> Result<Self, ClipError> {
-        let clips = reference(Split::Test, count.min(COUNT) as u64)?;
+        let scenes = reference(Split::Test, count.min(COUNT) as u64)?.into_iter().map(Scene::Flat).collect();
         let conditions = Conditions::Fitting;
-        Ok(Self { clips, conditions, seed: SEED, count, frames: FRAMES })
+        Ok(Self { scenes, conditions, seed: SEED, count, frames: FRAMES })
     }
 
     /// Scan `index`, at its beginning.
     #[must_use]
     pub fn scan(&self, index: usize) -> Scan {
-        let clip = Arc::clone(&self.clips[index % self.clips.len()]);
+        let scene = self.scenes[index % self.scenes.len()].clone();
         // Distinct streams for neighbouring seeds: the golden-ratio increment of SplitMix64.
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64);
         let settings = match self.conditions {
             Conditions::Same(settings) => settings,
-            Conditions::Fitting => ScanSettings::over(&clip),
-            Conditions::HalfVaried if index < self.count / 2 => ScanSettings::over(&clip),
-            Conditions::HalfVaried => Variety { share: 1.0 }.draw(&clip, &mut ChaCha8Rng::seed_from_u64(!seed)),
+            Conditions::Fitting => ScanSettings::fitting(&scene),
+            Conditions::VariedFrom(first) if index < first => ScanSettings::fitting(&scene),
+            Conditions::VariedFrom(_) => Variety { share: 1.0 }.draw(&scene, &mut ChaCha8Rng::seed_from_u64(!seed)),
         };
-        Scan::new(clip, settings, seed)
+        Scan::over(scene, settings, seed)
     }
 }
 

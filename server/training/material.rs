@@ -10,6 +10,10 @@ use super::clip::{Clip, ClipError};
 use super::error::TrainError;
 use super::footage;
 use super::pictures::{Split, varied};
+use super::recipe::Recipe;
+use super::relief;
+use super::scan::Scene;
+use super::scenery::Scenery;
 
 /// Names of the notes in a checkpoint.
 const FOOTAGE: &str = "footage";
@@ -82,6 +86,14 @@ impl Material {
             checkpoint.notes.insert(FOOTAGE.to_owned(), paths.join("\n"));
             checkpoint.notes.insert(SHA256.to_owned(), sum.clone());
         }
+    }
+
+    /// What the scans of a training by `recipe` go over.
+    pub fn scenery(&self, recipe: &Recipe) -> Result<Scenery, TrainError> {
+        let relief = relief::scenes(Split::Training, recipe.reliefs)
+            .map_err(|error| TrainError::Recipe(error.to_string()))?;
+        let relief = relief.into_iter().map(Scene::Stack).collect();
+        Ok(Scenery::from(self.clips.clone()).with(relief, recipe.relief_share))
     }
 
     /// The same in words, for a model card.

@@ -24,7 +24,7 @@ pub enum Split {
 }
 
 impl Split {
-    const fn first_seed(self) -> u64 {
+    pub(super) const fn first_seed(self) -> u64 {
         match self {
             Self::Training => 0,
             Self::Validation => 1 << 32,
@@ -54,7 +54,13 @@ pub fn reference(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> 
 /// The middle of brain phantom `index` of `split`, sharp.
 #[must_use]
 pub fn sharp_phantom(split: Split, index: u64) -> GrayImage {
-    Scene::new(split.first_seed() + index).sharp_gray(SIDE, SIDE)
+    sharp_phantom_of(split, index, SIDE)
+}
+
+/// The middle `side` x `side` pixels of brain phantom `index` of `split`, sharp.
+#[must_use]
+pub fn sharp_phantom_of(split: Split, index: u64, side: usize) -> GrayImage {
+    Scene::new(split.first_seed() + index).sharp_gray(side, side)
 }
 
 /// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds; half of all with a

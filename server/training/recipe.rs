@@ -18,6 +18,12 @@ pub struct Recipe {
     pub policy: String,
     /// Pictures drawn to train on, where no footage is given; validation draws as many others, 60 at most.
     pub pictures: u64,
+    /// Scenes with relief drawn to train on beside them; validation draws as many others, 60 at most. 0: none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub reliefs: u64,
+    /// Share of the scans that go over scenes with relief.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub relief_share: f64,
     /// Updates from one validation to the next; a checkpoint is written with each.
     pub validate_every: u64,
     /// Scans of the reference benchmark that the best weights are run on in the end, for their model card; 0: none.
@@ -29,6 +35,16 @@ pub struct Recipe {
     /// How, for the belief tracker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub belief: Option<BeliefRecipe>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over references")]
+const fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over references")]
+fn is_nothing(share: &f64) -> bool {
+    *share <= 0.0
 }
 
 const fn whole_benchmark() -> usize {

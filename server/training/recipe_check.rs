@@ -23,6 +23,8 @@ pub(super) fn check(recipe: &Recipe) -> Result<(), String> {
     if !recipe.validate_every.is_multiple_of(LEG) {
         return Err(format!("'validate_every' must be a multiple of {LEG}, and is {}", recipe.validate_every));
     }
+    within("reliefs", recipe.reliefs, 0..=10_000)?;
+    within("relief_share", recipe.relief_share, 0.0..=1.0)?;
     within("benchmark", recipe.benchmark, 0..=10_000)?;
     match (&recipe.dqn, &recipe.belief) {
         (Some(dqn), None) => check_dqn(dqn),

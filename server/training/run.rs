@@ -16,7 +16,9 @@ use super::material::Material;
 use super::model_card::{self, Made};
 use super::pictures::{Split, varied};
 use super::recipe::Recipe;
+use super::relief;
 use super::run_folder::RunFolder;
+use super::scan::Scene;
 use super::tensorboard::EventFile;
 use super::trainer::{Trainer, trainer};
 use crate::autofocus::shipped::{self, Design};
@@ -116,12 +118,8 @@ impl Run {
         material: Material,
         device: Device,
     ) -> Result<Self, TrainError> {
-        let held_out = varied(Split::Validation, recipe.pictures.min(60))
-            .map_err(|error| TrainError::Recipe(error.to_string()))?;
-        let count = 2 * held_out.len();
-        let validation =
-            Benchmark { clips: held_out, conditions: Conditions::HalfVaried, seed: 1, count, frames: FRAMES };
-        let trainer = trainer(design, &recipe, material.clips.clone(), seed, device)?;
+        let validation = validation(&recipe)?;
+        let trainer = trainer(design, &recipe, material.scenery(&recipe)?, seed, device)?;
         let (curve, best, other_version, origin) = (Vec::new(), f64::INFINITY, None, None);
         Ok(Self { recipe, design, seed, folder, trainer, validation, curve, best, other_version, material, origin })
     }
@@ -286,6 +284,20 @@ impl Run {
         self.material.note(&mut checkpoint);
         self.folder.save(&checkpoint)
     }
+}
+
+/// The scans that the best weights are chosen by: as the reference benchmark's and as varied as training's can be over the same pictures;
+/// and, where the recipe trains on relief, as many over scenes with relief.
+fn validation(recipe: &Recipe) -> Result<Benchmark, TrainError> {
+    let unfit = |error: &dyn std::fmt::Display| TrainError::Recipe(error.to_string());
+    let flat = varied(Split::Validation, recipe.pictures.min(60)).map_err(|error| unfit(&error))?;
+    let flat: Vec<Scene> = flat.into_iter().map(Scene::Flat).collect();
+    let relief = relief::scenes(Split::Validation, recipe.reliefs.min(60)).map_err(|error| unfit(&error))?;
+    let plain = flat.len();
+    let scenes: Vec<Scene> =
+        flat.iter().cloned().chain(flat.clone()).chain(relief.into_iter().map(Scene::Stack)).collect();
+    let count = scenes.len();
+    Ok(Benchmark { scenes, conditions: Conditions::VariedFrom(plain), seed: 1, count, frames: FRAMES })
 }
 
 /// The weights in `file` for a policy of `design`.

@@ -1,13 +1,12 @@
 //! Scans for training, one after another, seen through a lens that may lag: what one of many side by side does.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
-use super::clip::Clip;
 use super::scan::Scan;
+use super::scenery::Scenery;
 use super::variety::Variety;
 use crate::imaging::Patch;
 use crate::lens::FocalPower;
@@ -32,11 +31,11 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session on a scan drawn by `rng` from `clips`, which must not be empty.
-    pub fn draw(clips: &[Arc<Clip>], variety: Variety, wandering: f64, rng: &mut ChaCha8Rng) -> Self {
-        let clip = Arc::clone(&clips[rng.random_range(0..clips.len())]);
-        let settings = variety.draw(&clip, rng);
-        let scan = Scan::new(clip, settings, rng.random());
+    /// A session on a scan over a scene that `rng` draws from `scenery`.
+    pub fn draw(scenery: &Scenery, variety: Variety, wandering: f64, rng: &mut ChaCha8Rng) -> Self {
+        let scene = scenery.draw(rng);
+        let settings = variety.draw(&scene, rng);
+        let scan = Scan::over(scene, settings, rng.random());
         let slow = rng.random_bool(0.4 * variety.share);
         let response = if slow { rng.random_range(0.4..1.0) } else { 1.0 };
         let late = rng.random_bool(0.25 * variety.share);

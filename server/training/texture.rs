@@ -7,6 +7,8 @@
     reason = "pixel arithmetic on small numbers"
 )]
 
+use std::ops::Range;
+
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -16,7 +18,7 @@ use crate::imaging::{GrayImage, gaussian_blur};
 #[must_use]
 pub fn texture(seed: u64, side: usize) -> GrayImage {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut canvas = Canvas { side, data: vec![0.0; side * side] };
+    let mut canvas = Canvas::blank(side);
     match rng.random_range(0..4) {
         0 => canvas.add_noise(&mut rng, 1.0),
         1 => canvas.add_leaves(&mut rng),
@@ -43,7 +45,7 @@ pub fn vary_contrast(picture: &mut GrayImage, strength: f32, seed: u64) {
     const AROUND: f64 = 12.0;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let side = picture.width.max(picture.height);
-    let mut field = Canvas { side, data: vec![0.0; side * side] };
+    let mut field = Canvas::blank(side);
     field.add_octave(&mut rng, 70.0, 1.6);
     field.add_octave(&mut rng, 30.0, 1.6);
     let around = gaussian_blur(picture, AROUND);
@@ -54,12 +56,18 @@ pub fn vary_contrast(picture: &mut GrayImage, strength: f32, seed: u64) {
     }
 }
 
-struct Canvas {
+/// A square picture being drawn.
+pub(super) struct Canvas {
     side: usize,
-    data: Vec<f32>,
+    pub data: Vec<f32>,
 }
 
 impl Canvas {
+    /// A canvas of `side` x `side` zeros.
+    pub fn blank(side: usize) -> Self {
+        Self { side, data: vec![0.0; side * side] }
+    }
+
     /// Octaves of smoothly interpolated noise; each finer one weaker by a drawn factor.
     fn add_noise(&mut self, rng: &mut impl Rng, amplitude: f32) {
         let falloff = rng.random_range(0.45f32..0.95);
@@ -73,7 +81,8 @@ impl Canvas {
         }
     }
 
-    fn add_octave(&mut self, rng: &mut impl Rng, cell: f32, weight: f32) {
+    /// Smooth noise with a knot every `cell` pixels, from `-weight` to `weight`.
+    pub fn add_octave(&mut self, rng: &mut impl Rng, cell: f32, weight: f32) {
         let knots = (self.side as f32 / cell) as usize + 3;
         let values: Vec<f32> = (0..knots * knots).map(|_| rng.random_range(-1.0..1.0)).collect();
         let weights: Vec<(usize, f32)> = (0..self.side)
@@ -113,7 +122,8 @@ impl Canvas {
         rng.random_range(0.0..self.side as f32)
     }
 
-    fn add_leaf(&mut self, (cx, cy): (f32, f32), radius: f32, stretch: f32, shade: f32) {
+    /// An ellipse of the area of a disc of `radius`, `stretch` times as wide as high, in the place of what is there.
+    pub fn add_leaf(&mut self, (cx, cy): (f32, f32), radius: f32, stretch: f32, shade: f32) {
         let (rx, ry) = (radius * stretch.sqrt(), radius / stretch.sqrt());
         for y in self.span(cy, ry) {
             let dy = (y as f32 - cy) / ry;
@@ -134,17 +144,28 @@ impl Canvas {
     /// Dark, winding, thinning lines.
     fn add_vessels(&mut self, rng: &mut impl Rng) {
         for _ in 0..rng.random_range(4..20) {
-            let (mut x, mut y) = (self.place(rng), self.place(rng));
-            let mut heading = rng.random_range(0.0..std::f32::consts::TAU);
-            let mut radius = rng.random_range(0.8f32..4.0);
-            let shade = rng.random_range(-1.5f32..-0.2);
-            for _ in 0..rng.random_range(60..300) {
-                self.add_leaf((x, y), radius, 1.0, shade);
-                heading += rng.random_range(-0.25f32..0.25);
-                x += heading.cos();
-                y += heading.sin();
-                radius = (radius * 0.998).max(0.6);
-            }
+            self.add_winding_line(rng, 0.8..4.0, |rng| rng.random_range(-1.5f32..-0.2));
+        }
+    }
+
+    /// Winding, thinning lines of `value`: as many as drawn from `count`, their first radius from `radii`.
+    pub fn add_winding_lines(&mut self, rng: &mut impl Rng, count: Range<usize>, radii: Range<f32>, value: f32) {
+        for _ in 0..rng.random_range(count) {
+            self.add_winding_line(rng, radii.clone(), |_| value);
+        }
+    }
+
+    fn add_winding_line<R: Rng>(&mut self, rng: &mut R, radii: Range<f32>, shade: impl Fn(&mut R) -> f32) {
+        let (mut x, mut y) = (self.place(rng), self.place(rng));
+        let mut heading = rng.random_range(0.0..std::f32::consts::TAU);
+        let mut radius = rng.random_range(radii);
+        let shade = shade(rng);
+        for _ in 0..rng.random_range(60..300) {
+            self.add_leaf((x, y), radius, 1.0, shade);
+            heading += rng.random_range(-0.25f32..0.25);
+            x += heading.cos();
+            y += heading.sin();
+            radius = (radius * 0.998).max(0.6);
         }
     }
 

@@ -1,19 +1,17 @@
 //! What a training does over and over, whichever kind of policy learns.
 
-use std::sync::Arc;
-
 use tch::{Device, nn};
 
 use super::belief::BeliefTrainer;
 use super::checkpoint::{Checkpoint, CheckpointError};
-use super::clip::Clip;
 use super::dqn::DqnTrainer;
 use super::error::TrainError;
 use super::recipe::Recipe;
+use super::scenery::Scenery;
 use crate::autofocus::shipped::Design;
 use crate::autofocus::weights::{self, WeightsError};
 
-/// One that learns. What it does depends on its recipe, its seed, its clips and the seeds of its legs alone.
+/// One that learns. What it does depends on its recipe, its seed, its scenery and the seeds of its legs alone.
 pub trait Trainer: Send {
     /// The variables of the network that is trained.
     fn store(&self) -> &nn::VarStore;
@@ -57,13 +55,13 @@ pub trait Trainer: Send {
 pub fn trainer(
     design: Design,
     recipe: &Recipe,
-    clips: Vec<Arc<Clip>>,
+    scenery: Scenery,
     seed: u64,
     device: Device,
 ) -> Result<Box<dyn Trainer>, TrainError> {
     Ok(match (design, &recipe.dqn, &recipe.belief) {
-        (Design::Values(sight), Some(dqn), _) => Box::new(DqnTrainer::new(sight, dqn.clone(), clips, seed, device)),
-        (Design::Belief, _, Some(belief)) => Box::new(BeliefTrainer::new(belief.clone(), clips, seed, device)),
+        (Design::Values(sight), Some(dqn), _) => Box::new(DqnTrainer::new(sight, dqn.clone(), scenery, seed, device)),
+        (Design::Belief, _, Some(belief)) => Box::new(BeliefTrainer::new(belief.clone(), scenery, seed, device)),
         _ => return Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", recipe.policy))),
     })
 }

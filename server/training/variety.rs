@@ -2,9 +2,8 @@
 
 use rand::{Rng, RngExt};
 
-use super::clip::Clip;
 use super::defocus::Spot;
-use super::scan::ScanSettings;
+use super::scan::{ScanSettings, Scene};
 use super::unrest::Restlessness;
 use crate::camera::walk::{Motion, standard_normal};
 
@@ -16,9 +15,9 @@ pub struct Variety {
 }
 
 impl Variety {
-    /// Settings for one scan over `clip`: with probability `share` varied in speed, spot, noise, exposure and what else is in view.
-    pub fn draw(&self, clip: &Clip, rng: &mut impl Rng) -> ScanSettings {
-        let mut settings = ScanSettings::over(clip);
+    /// Settings for one scan over `scene`: with probability `share` varied in speed, spot, noise, exposure and what else is in view.
+    pub fn draw(&self, scene: &Scene, rng: &mut impl Rng) -> ScanSettings {
+        let mut settings = ScanSettings::fitting(scene);
         if !rng.random_bool(self.share) {
             return settings;
         }

@@ -1,8 +1,11 @@
 //! What an evaluation's figures are, worked by hand, and how it ends.
 
+use std::sync::Arc;
+
 use super::*;
 use crate::autofocus::{Decision, Observation, Policy};
 use crate::lens::FocalPower;
+use crate::training::clip::Clip;
 use crate::training::recorded::PARTS;
 use crate::training::texture::texture;
 
@@ -57,17 +60,17 @@ impl Policy for GivesUp {
 #[test]
 fn a_policy_that_gives_up_has_no_figures() {
     let registry = Registry::default().with("lazy", "", || Box::new(GivesUp(0)));
-    let clips = vec![Arc::new(Clip::still(texture(1, 64)).unwrap())];
+    let scenes = vec![Scene::Flat(Arc::new(Clip::still(texture(1, 64)).unwrap()))];
     let conditions = Conditions::Same(ScanSettings::default());
-    let scans = Benchmark { clips, conditions, seed: 1, count: 1, frames: 9 };
+    let scans = Benchmark { scenes, conditions, seed: 1, count: 1, frames: 9 };
     let told = evaluate(&registry, &[PolicyName::new("lazy")], &scans, &|_| ()).unwrap_err().to_string();
     assert!(told.starts_with("policy 'lazy' failed on scan 1: at frame 3 it answered NaN"), "{told}");
 }
 
 #[test]
-fn the_first_half_of_half_varied_scans_are_the_references() {
+fn the_first_scans_of_a_partly_varied_set_are_the_references() {
     let same = Benchmark::reference(4).unwrap();
-    let varied = Benchmark { conditions: Conditions::HalfVaried, ..same.clone() };
+    let varied = Benchmark { conditions: Conditions::VariedFrom(2), ..same.clone() };
     let seen = |set: &Benchmark, index| Benchmark::scan(set, index).observe(FocalPower::MIDDLE);
     let alike: Vec<bool> = (0..4).map(|index| seen(&same, index) == seen(&varied, index)).collect();
     assert_eq!(alike, [true, true, false, false]);
