@@ -113,6 +113,12 @@ pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
 }
 
 impl Spectrum {
+    /// Standard deviation of the patch, in gray levels.
+    #[must_use]
+    pub fn contrast(&self) -> f32 {
+        self.variance.sqrt()
+    }
+
     /// Whether the patch shows more than noise: tissue has far more energy at low frequencies than at high ones however sharp it
     /// is, the sensor's noise and rounding have as much at all.
     #[must_use]

@@ -148,7 +148,8 @@ pub fn decode_raw(bytes: &[u8]) -> Result<MosaicFrame, DecodeError> {
     Ok(MosaicFrame::new(width, height, samples)?)
 }
 
-/// Reads a PNG, JPEG or TIFF picture, whatever its pixels.
+/// Reads a PNG, JPEG or TIFF picture, whatever its pixels, floating-point ones excepted: nothing says which value is white,
+/// and the `image` crate, which takes 1 for it, would make most such pictures white.
 ///
 /// # Errors
 /// When the bytes are not such a picture, not all of one, or one too large.
@@ -169,11 +170,17 @@ pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     limits.max_alloc = Some(LARGEST_MEMORY);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
-    reader.decode().map_err(|error| match error {
+    let picture = reader.decode().map_err(|error| match error {
         ImageError::Limits(_) => DecodeError::TooLarge,
         ImageError::Unsupported(error) => DecodeError::OtherPixels(error.to_string()),
         error => DecodeError::Damaged(error.to_string()),
-    })
+    })?;
+    match picture {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+            Err(DecodeError::OtherPixels(format!("{:?}", picture.color())))
+        }
+        picture => Ok(picture),
+    }
 }
 
 /// Whether an end marker follows the last scan: the decoder fills up pictures that are cut short, and says nothing.
@@ -266,6 +273,9 @@ mod tests {
         let message = decode(b"GIF89a and so on", false).unwrap_err().to_string();
         assert!(message.starts_with("gif pictures are not read"), "{message}");
         let floats = DynamicImage::ImageRgb32F(image::ImageBuffer::new(4, 4));
-        assert!(matches!(decode(&encoded(&floats, ImageFormat::Tiff), false), Err(DecodeError::OtherPixels(_))));
+        // Of any reader: 8-bit pictures made of such would be white.
+        let floats = encoded(&floats, ImageFormat::Tiff);
+        assert!(matches!(decode(&floats, false), Err(DecodeError::OtherPixels(_))));
+        assert!(matches!(decode_any(&floats), Err(DecodeError::OtherPixels(_))));
     }
 }

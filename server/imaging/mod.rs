@@ -13,6 +13,7 @@ mod geometry;
 mod jpeg;
 mod luma;
 mod reconstruct;
+mod reduce;
 mod references;
 
 pub use blur::gaussian_blur;
@@ -24,4 +25,5 @@ pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
 pub use jpeg::{JpegEncoder, JpegError};
 pub use luma::{rgb_patch, rgb_to_gray};
 pub use reconstruct::Reconstructor;
+pub use reduce::reduced;
 pub use references::{Average, BadReference};

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::checkpoint::CheckpointError;
+use super::detail::NothingToFocusOn;
 use super::footage::FootageError;
 use super::run_folder::CHECKPOINT;
 
@@ -19,6 +20,9 @@ pub enum TrainError {
     /// The footage cannot be used.
     #[error(transparent)]
     Footage(#[from] FootageError),
+    /// The footage shows nothing to focus on.
+    #[error(transparent)]
+    Blank(#[from] NothingToFocusOn),
     /// What is asked for is not what the checkpoint's training was begun with.
     #[error("{0}")]
     Differs(String),

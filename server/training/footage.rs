@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use super::clip::{Area, Clip, ClipError};
 use crate::camera::footage::{self, ffmpeg, is_picture};
-use crate::imaging::{Calibration, ContentArea, GrayImage, Reconstructor, content_area, decode};
+use crate::imaging::{Calibration, ContentArea, GrayImage, Reconstructor, content_area, decode, reduced};
 use crate::notices::tell;
 
 /// Most lines of a picture: the height the paper's walks are meant for.
-const LINES: u32 = 480;
+const LINES: usize = 480;
 /// Most frames taken of one video: a minute at 25 a second.
 const FRAMES: usize = 1500;
 
@@ -58,16 +58,11 @@ fn image(path: &Path) -> Result<GrayImage, FootageError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = decode(&bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
     let gray = picture.into_gray(&mut Reconstructor::new(&Calibration::default()));
-    if gray.height <= LINES as usize {
+    if gray.height <= LINES {
         return Ok(gray);
     }
-    #[allow(clippy::cast_possible_truncation, reason = "decoded pictures have 16384 pixels a side at most")]
-    let (width, height) = (gray.width as u32, gray.height as u32);
-    let scaled = (width * LINES / height).max(1);
-    let whole = image::ImageBuffer::<image::Luma<f32>, _>::from_raw(width, height, gray.data)
-        .ok_or_else(|| unreadable(path, "its pixels do not fit its size"))?;
-    let small = image::imageops::resize(&whole, scaled, LINES, image::imageops::FilterType::Triangle);
-    Ok(GrayImage { width: scaled as usize, height: LINES as usize, data: small.into_raw() })
+    let width = gray.width * LINES / gray.height;
+    Ok(reduced(&gray, width, LINES))
 }
 
 fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
@@ -171,6 +166,20 @@ mod tests {
         let small = folder.path().join("small.png");
         image::GrayImage::new(40, 40).save(&small).unwrap();
         assert!(clips(&small).unwrap_err().to_string().contains("at least 64x64"));
+    }
+
+    #[test]
+    fn a_picture_of_many_lines_is_made_smaller_and_keeps_its_gray_levels() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("large.png");
+        // Blocks of 2x2 pixels, as large as one of the result.
+        let gray = |x: u32, y: u32| u8::try_from((7 * (x / 2) + 31 * (y / 2)) % 256).unwrap();
+        image::GrayImage::from_fn(1000, 960, |x, y| image::Luma([gray(x, y)])).save(&file).unwrap();
+        let clips = clips(&file).unwrap();
+        let picture = clips[0].at(0);
+        assert_eq!((picture.width, picture.height), (500, 480));
+        let expected = (0..480).flat_map(|y| (0..500).map(move |x| f32::from(gray(2 * x, 2 * y))));
+        assert!(picture.data.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-3));
     }
 
     #[test]

@@ -7,17 +7,22 @@ use sha2::{Digest, Sha256};
 
 use super::checkpoint::Checkpoint;
 use super::clip::{Clip, ClipError};
+use super::detail::{warning, without_detail};
 use super::error::TrainError;
+use super::evaluate::{Benchmark, Conditions, FRAMES};
 use super::footage;
 use super::pictures::{Split, varied};
 use super::recipe::Recipe;
 use super::relief;
 use super::scan::Scene;
 use super::scenery::Scenery;
+use crate::notices::tell;
 
 /// Names of the notes in a checkpoint.
 const FOOTAGE: &str = "footage";
 const SHA256: &str = "footage_sha256";
+/// Least number of scans that are looked at for detail.
+const LEAST_CHECKED: usize = 60;
 
 /// What a training trains on.
 pub(super) struct Material {
@@ -41,6 +46,7 @@ impl Material {
         for clip in &clips {
             clip.digest(&mut hash);
         }
+        check_detail(&clips)?;
         // A training may go on from another folder.
         let paths = paths.iter().map(|path| std::path::absolute(path).unwrap_or_else(|_| path.clone())).collect();
         Ok(Self { clips, footage: Some((paths, hex::encode(hash.finalize()))) })
@@ -103,4 +109,14 @@ impl Material {
             Some(_) => format!("{} clips of footage", self.clips.len()),
         }
     }
+}
+
+/// Tells of scans over `clips` that show nothing to focus on.
+fn check_detail(clips: &[Arc<Clip>]) -> Result<(), TrainError> {
+    let count = clips.len().max(LEAST_CHECKED);
+    let set = Benchmark { clips: clips.to_vec(), conditions: Conditions::Fitting, seed: 1, count, frames: FRAMES };
+    if let Some(warning) = warning(without_detail(&set), count)? {
+        tell(format_args!("note: {warning}; nothing can be learned there"));
+    }
+    Ok(())
 }

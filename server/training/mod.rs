@@ -7,6 +7,7 @@ pub mod clip;
 mod cover;
 mod curves;
 pub mod defocus;
+pub mod detail;
 pub mod dqn;
 mod dqn_batch;
 pub mod dqn_recipe;

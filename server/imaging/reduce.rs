@@ -1,0 +1,92 @@
+//! Gray pictures made smaller by area means.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "positions within pictures of 16384 pixels a side at most"
+)]
+
+use std::ops::Range;
+
+use super::frame::GrayImage;
+
+/// `picture` at `width` x `height` pixels, each the mean of the area that it covers. A side is at least 1 and at most the
+/// picture's own. Where it divides the picture's side these are means of whole blocks.
+///
+/// The `image` crate cannot do this for gray levels: it clamps floating-point samples to 0..=1.
+#[must_use]
+pub fn reduced(picture: &GrayImage, width: usize, height: usize) -> GrayImage {
+    let columns = covered(picture.width, width);
+    let lines = covered(picture.height, height);
+    let mut data = Vec::with_capacity(columns.len() * lines.len());
+    let mut sum = vec![0.0; picture.width];
+
+    for line in &lines {
+        sum.fill(0.0);
+        for (y, weight) in line.pixels() {
+            let row = &picture.data[y * picture.width..(y + 1) * picture.width];
+            sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * value);
+        }
+        data.extend(columns.iter().map(|column| column.pixels().map(|(x, weight)| weight * sum[x]).sum::<f32>()));
+    }
+    GrayImage { width: columns.len(), height: lines.len(), data }
+}
+
+/// The part of a line of pixels that one pixel of the result covers.
+struct Cover {
+    pixels: Range<usize>,
+    /// Where it begins and ends, in pixels.
+    from: f64,
+    to: f64,
+}
+
+impl Cover {
+    /// Each pixel with its share in the mean.
+    fn pixels(&self) -> impl Iterator<Item = (usize, f32)> + '_ {
+        let length = self.to - self.from;
+        self.pixels.clone().map(move |pixel| {
+            let inside = (pixel as f64 + 1.0).min(self.to) - (pixel as f64).max(self.from);
+            (pixel, (inside / length) as f32)
+        })
+    }
+}
+
+/// What each of `into` pixels covers of `length` pixels.
+fn covered(length: usize, into: usize) -> Vec<Cover> {
+    let into = into.clamp(1, length.max(1));
+    let edge = |index: usize| (index * length) as f64 / into as f64;
+    (0..into)
+        .map(|index| {
+            let (from, to) = (edge(index), edge(index + 1));
+            Cover { pixels: from.floor() as usize..(to.ceil() as usize).min(length), from, to }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gray(width: usize, height: usize, data: &[f32]) -> GrayImage {
+        GrayImage::new(width, height, data.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn where_sides_divide_pixels_are_means_of_blocks() {
+        let picture = gray(4, 2, &[10.0, 20.0, 200.0, 240.0, 30.0, 40.0, 250.0, 250.0]);
+        assert_eq!(reduced(&picture, 2, 1), gray(2, 1, &[25.0, 235.0]));
+        assert_eq!(reduced(&picture, 4, 2), picture);
+        // Never larger.
+        assert_eq!(reduced(&picture, 9, 9), picture);
+    }
+
+    #[test]
+    fn where_they_do_not_each_pixel_counts_by_its_share() {
+        let across = reduced(&gray(3, 1, &[30.0, 60.0, 240.0]), 2, 1).data;
+        let down = reduced(&gray(1, 3, &[30.0, 60.0, 240.0]), 1, 2).data;
+        // (30 + 60 / 2) / 1.5 and (60 / 2 + 240) / 1.5.
+        for (found, expected) in [across, down].concat().iter().zip([40.0, 180.0, 40.0, 180.0]) {
+            assert!((found - expected).abs() < 1e-4, "{found} {expected}");
+        }
+    }
+}
