@@ -1,9 +1,9 @@
 //! `parfocal evaluate`: all policies on the same focal-time scans, and the paper's table with ours beside it.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use clap::ArgGroup;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -12,15 +12,20 @@ use crate::autofocus::networks::compute_on_this_thread;
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::ScanFolder;
-use crate::training::evaluate::{Benchmark, COUNT, Conditions, FRAMES, Outcome, SEED, ScanSet, compare, evaluate};
+use crate::files::replace;
+use crate::notices::tell;
+use crate::training::detail::{warning, without_detail};
+use crate::training::evaluate::{Benchmark, COUNT, Conditions, FRAMES, SEED, ScanSet, evaluate};
 use crate::training::footage;
 use crate::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
-use crate::training::report::Report;
+use crate::training::report::Subject;
 use crate::training::scan::Scene;
+use crate::training::shard::{MergeError, Part, PartOf, Shard, merge};
 use crate::training::stack_bench::{FIRST_SEED, SEEDS, StackSource, bench};
 
 /// What to evaluate, and on what.
 #[derive(Debug, clap::Args)]
+#[command(group = ArgGroup::new("destination").multiple(true))]
 pub struct Arguments {
     /// Which scans: `simulated`, the reference benchmark; `phantom`, recorded over the phantom as an arm would; or the folder
     /// of a recorded scan.
@@ -32,7 +37,7 @@ pub struct Arguments {
     /// The folder of a focal stack: pictures of one still scene in order of focus. Each stack is evaluated at two scales and three
     /// seeds, 31 to 33 unless --seed names the first. May be given more than once; `DIR:K` makes K of its planes the range 0 to
     /// 1, two fifths of them otherwise.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["scans", "footage", "between", "count"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"])]
     stacks: Vec<String>,
     /// A video (its first 1500 frames), an image or a folder of images to scan in place of the reference pictures.
     #[arg(long, value_name = "PATH")]
@@ -50,11 +55,20 @@ pub struct Arguments {
     /// Number of scans, 10000 at most, 100 over the phantom; 200 simulated ones or 1 over the phantom, if not said.
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     count: Option<usize>,
+    /// Run only the I-th of N parts of the scans, as 2/8, and give its paths as JSON for --merge: with --out as
+    /// shard-I-of-N.json in that folder, with --json on standard output.
+    #[arg(long, value_name = "I/N", requires = "destination")]
+    shard: Option<Part>,
+    /// Put all shards of an evaluation together: the result is, to the last digit, that of one run.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = [
+        "scans", "between", "footage", "policies", "weights", "seed", "count", "shard",
+    ])]
+    merge: Vec<PathBuf>,
     /// Print JSON.
-    #[arg(long)]
+    #[arg(long, group = "destination")]
     json: bool,
     /// Folder for the table (Markdown, CSV, JSON) and the figure.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", group = "destination")]
     out: Option<PathBuf>,
 }
 
@@ -64,8 +78,40 @@ const MOST_PHANTOM: usize = 100;
 /// Runs the command.
 ///
 /// # Errors
-/// When scans, footage or policies cannot be had, or results cannot be written.
+/// When scans, footage, policies or shards cannot be had, or results cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+    }
+    if !arguments.stacks.is_empty() {
+        return stacks(arguments);
+    }
+    let shards = if arguments.merge.is_empty() {
+        let shard = evaluated(arguments)?;
+        if arguments.shard.is_some() {
+            return give_shard(arguments, &shard);
+        }
+        vec![(String::new(), shard)]
+    } else {
+        arguments.merge.iter().map(|file| read_shard(file)).collect::<Result<_, _>>()?
+    };
+    let (report, outcomes) = merge(shards)?;
+
+    // Both in any case: what one cannot take, the other has.
+    let written = arguments
+        .out
+        .as_ref()
+        .map_or(Ok(()), |folder| report.write(&outcomes, folder).map_err(|error| unwritable(folder, &error)));
+    print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })?;
+    Ok(written?)
+}
+
+fn unwritable(folder: &Path, error: &std::io::Error) -> String {
+    format!("cannot write the results to {}: {error}", folder.display())
+}
+
+/// The policies asked for, each of which can run, and the registry that builds them.
+fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyName>), Failure> {
     compute_on_this_thread();
     let mut registry = Registry::standard();
     if let Some(folder) = &arguments.weights {
@@ -73,33 +119,72 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let policies = policies(&arguments.policies, &registry);
     let registry = policies.iter().fold(registry, scripted::with_file);
-    // What cannot be had is told before anything that takes time.
+    // What cannot run is told before anything that takes time.
     policies.iter().try_for_each(|name| registry.build(name).map(drop))?;
-    let unwritable = |folder: &Path, error| format!("cannot write the results to {}: {error}", folder.display());
-    if let Some(folder) = &arguments.out {
-        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
+    Ok((registry, policies))
+}
+
+/// Runs the policies on the scans asked for, or on the shard of them.
+fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
+    let (registry, policies) = registry_and_policies(arguments)?;
+
+    let part = arguments.shard.unwrap_or(Part::WHOLE);
+    let Scans { set, seed, count, between } = scans(arguments, part)?;
+    if set.count() == 0 {
+        return Err(format!("shard {part} has no scans: there are only {count}; make fewer shards").into());
     }
-    if !arguments.stacks.is_empty() {
-        return stacks(arguments, &registry, &policies);
+    let blank = without_detail(set.as_ref());
+    match warning(blank, set.count()) {
+        Ok(None) => {}
+        Ok(Some(warning)) => tell(format_args!("note: {warning}")),
+        // The other shards may show something.
+        Err(error) if part == Part::WHOLE => return Err(error.into()),
+        Err(error) => tell(format_args!("note: shard {part}: {error}")),
     }
-    let scans = scans(arguments)?;
-    let bar = progress(policies.len() * scans.set.count());
-    let outcomes = evaluate(&registry, &policies, scans.set.as_ref(), &|name| {
+
+    let bar = progress(policies.len() * set.count());
+    let outcomes = evaluate(&registry, &policies, set.as_ref(), &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     });
     bar.finish_and_clear();
-    let outcomes = outcomes?;
+
     let mut weights = registry.weights();
     weights.retain(|name, _| policies.contains(name));
-    let report = report(arguments, &scans, weights, &outcomes);
-    // Both in any case: what one cannot take, the other has.
-    let written = arguments
-        .out
-        .as_ref()
-        .map_or(Ok(()), |folder| report.write(&outcomes, folder).map_err(|error| unwritable(folder, error)));
-    print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })?;
-    Ok(written?)
+    let subject = Subject {
+        scans: arguments.scans.clone(),
+        seed,
+        count,
+        footage: arguments.footage.iter().map(|path| path.display().to_string()).collect(),
+        between,
+        weights_folder: arguments.weights.as_ref().map(|folder| folder.display().to_string()),
+        weights,
+    };
+    Ok(Shard::new(part, subject, blank, outcomes?))
+}
+
+/// Writes and prints a shard for `--merge`.
+fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
+    let text = serde_json::to_string(shard)? + "\n";
+    let mut told = String::new();
+    if let Some(folder) = &arguments.out {
+        let file = folder.join(shard.part.file_name());
+        replace(&file, text.as_bytes()).map_err(|error| unwritable(folder, &error))?;
+        let folder = folder.display();
+        told = format!(
+            "shard {} is in {}; when all are there: parfocal evaluate --merge {folder}/shard-*.json --out {folder}\n",
+            shard.part,
+            file.display()
+        );
+    }
+    print(if arguments.json { &text } else { &told })
+}
+
+fn read_shard(file: &Path) -> Result<(String, Shard), Failure> {
+    let name = file.display().to_string();
+    let text = std::fs::read(file).map_err(|error| format!("cannot read the shard {name}: {error}"))?;
+    let shard = serde_json::from_slice(&text).map_err(|_| MergeError::NoShard(name.clone()))?;
+    Ok((name, shard))
 }
 
 impl Arguments {
@@ -109,18 +194,17 @@ impl Arguments {
 }
 
 /// Evaluates on focal stacks.
-fn stacks(arguments: &Arguments, registry: &Registry, policies: &[PolicyName]) -> Result<(), Failure> {
+fn stacks(arguments: &Arguments) -> Result<(), Failure> {
+    let (registry, policies) = registry_and_policies(arguments)?;
     let sources: Vec<StackSource> = arguments.stacks.iter().map(|text| StackSource::parse(text)).collect();
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS as usize);
-    let (report, outcomes) = bench(registry, policies, &sources, arguments.seed.unwrap_or(FIRST_SEED), &|name| {
+    let (report, outcomes) = bench(&registry, &policies, &sources, arguments.seed.unwrap_or(FIRST_SEED), &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;
     bar.finish_and_clear();
     if let Some(folder) = &arguments.out {
-        report
-            .write(&outcomes, folder)
-            .map_err(|error| format!("cannot write the results to {}: {error}", folder.display()))?;
+        report.write(&outcomes, folder).map_err(|error| unwritable(folder, &error))?;
     }
     print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })
 }
@@ -149,14 +233,17 @@ fn names(argument: &str) -> Vec<&str> {
 
 /// What to evaluate on.
 struct Scans {
+    /// The scans of one part.
     set: Box<dyn ScanSet>,
     seed: u64,
+    /// Number of scans in all parts.
+    count: usize,
     between: Option<Between>,
 }
 
-fn scans(arguments: &Arguments) -> Result<Scans, Failure> {
+fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     if arguments.scans == "simulated" {
-        return simulated(arguments);
+        return simulated(arguments, part);
     }
     if !arguments.footage.is_empty() {
         return Err("--footage makes simulated scans; leave out --scans".into());
@@ -167,8 +254,9 @@ fn scans(arguments: &Arguments) -> Result<Scans, Failure> {
         if arguments.count.is_some_and(|count| count > MOST_PHANTOM) {
             return Err(format!("--count is at most {MOST_PHANTOM} over the phantom").into());
         }
-        let scans = (0..arguments.count.unwrap_or(1) as u64).map(|index| phantom(arguments.seed().wrapping_add(index)));
-        return Ok(Scans { set: recorded(scans.collect()), seed: arguments.seed(), between });
+        let count = arguments.count.unwrap_or(1);
+        let scans = part.scans(count).into_iter().map(|index| phantom(arguments.seed().wrapping_add(index as u64)));
+        return Ok(Scans { set: recorded(scans.collect()), seed: arguments.seed(), count, between });
     }
     let folder = Path::new(&arguments.scans);
     if !folder.is_dir() {
@@ -181,11 +269,14 @@ fn scans(arguments: &Arguments) -> Result<Scans, Failure> {
     if arguments.count.is_some_and(|count| count > 1) {
         return Err("a folder holds one scan; leave out --count".into());
     }
+    if part != Part::WHOLE {
+        return Err("a folder holds one scan, which cannot be cut into shards; leave out --shard".into());
+    }
     let folder = ScanFolder::open(folder)?;
     let bar = scan::bar(folder.poses().len(), 0);
     let scan = RecordedScan::read(&folder, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, between })
+    Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, count: 1, between })
 }
 
 fn phantom(seed: u64) -> Arc<RecordedScan> {
@@ -195,7 +286,7 @@ fn phantom(seed: u64) -> Arc<RecordedScan> {
     Arc::new(scan)
 }
 
-fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
+fn simulated(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     let mut clips = Vec::new();
     for path in &arguments.footage {
         clips.extend(footage::clips(path)?);
@@ -204,27 +295,15 @@ fn simulated(arguments: &Arguments) -> Result<Scans, Failure> {
     let set = if clips.is_empty() {
         Benchmark { seed, ..Benchmark::reference(count)? }
     } else {
-        Benchmark { scenes: clips.into_iter().map(Scene::Flat).collect(), conditions: Conditions::Fitting, seed, count, frames: FRAMES }
+        Benchmark {
+            scenes: clips.into_iter().map(Scene::Flat).collect(),
+            conditions: Conditions::Fitting,
+            seed,
+            count,
+            frames: FRAMES,
+        }
     };
-    Ok(Scans { set: Box::new(set), seed, between: None })
-}
-
-fn report(arguments: &Arguments, scans: &Scans, weights: BTreeMap<PolicyName, String>, outcomes: &[Outcome]) -> Report {
-    let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();
-    let comparisons = compare(&rows);
-    let footage = arguments.footage.iter().map(|path| path.display().to_string()).collect();
-    let weights_folder = arguments.weights.as_ref().map(|folder| folder.display().to_string());
-    Report {
-        scans: arguments.scans.clone(),
-        seed: scans.seed,
-        count: scans.set.count(),
-        footage,
-        between: scans.between,
-        weights_folder,
-        weights,
-        rows,
-        comparisons,
-    }
+    Ok(Scans { set: Box::new(PartOf::new(set, part)), seed, count, between: None })
 }
 
 fn progress(total: usize) -> ProgressBar {

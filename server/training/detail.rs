@@ -91,8 +91,8 @@ mod tests {
 
     /// The share of 20 scans over `picture` that show nothing.
     fn share(picture: GrayImage) -> f64 {
-        let clips = vec![Arc::new(Clip::still(picture).unwrap())];
-        let set = Benchmark { clips, conditions: Conditions::Fitting, seed: 3, count: 20, frames: 20 };
+        let scenes = vec![Scene::Flat(Arc::new(Clip::still(picture).unwrap()))];
+        let set = Benchmark { scenes, conditions: Conditions::Fitting, seed: 3, count: 20, frames: 20 };
         f64::from(u32::try_from(without_detail(&set)).unwrap()) / 20.0
     }
 

@@ -4,13 +4,13 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::clip::ClipError;
 use super::pictures::{Split, reference};
 use super::rollout::{FocalTimeScan, NoTarget, Path, PathFigures, roll_out, roll_out_oracle};
 use super::scan::{Scan, ScanSettings, Scene};
-use super::statistics::{bootstrap_interval, deviation, mean, wilcoxon};
+use super::statistics::{Method, SignedRank, bootstrap_interval, deviation, holm, mean, wilcoxon};
 use super::variety::Variety;
 use crate::autofocus::networks::compute_on_this_thread;
 use crate::autofocus::{PolicyError, PolicyName, Registry};
@@ -103,7 +103,7 @@ impl ScanSet for Benchmark {
 }
 
 /// One policy's paths over the scans of a set.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Outcome {
     /// The policy, or [`ORACLE`].
     pub policy: String,
@@ -147,8 +147,12 @@ pub struct Comparison {
     pub b: String,
     /// The test's name.
     pub test: &'static str,
+    /// How p was had.
+    pub method: Method,
     /// Its two-sided p.
     pub p: f64,
+    /// The same, corrected by Holm's method for all comparisons of the evaluation.
+    pub p_holm: f64,
 }
 
 /// Why an evaluation ended without figures.
@@ -233,14 +237,20 @@ impl Outcome {
 #[must_use]
 pub fn compare(rows: &[Row]) -> Vec<Comparison> {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.policy != ORACLE).collect();
-    let mut comparisons = Vec::new();
-    for (index, a) in rows.iter().enumerate() {
-        for b in &rows[index + 1..] {
-            let p = wilcoxon(&a.scan_mae, &b.scan_mae);
-            comparisons.push(Comparison { a: a.policy.clone(), b: b.policy.clone(), test: "wilcoxon-signed-rank", p });
-        }
-    }
-    comparisons
+    let pairs = rows.iter().enumerate().flat_map(|(index, a)| rows[index + 1..].iter().map(move |b| (*a, *b)));
+    let pairs: Vec<(&Row, &Row)> = pairs.collect();
+    let tests: Vec<SignedRank> = pairs.iter().map(|(a, b)| wilcoxon(&a.scan_mae, &b.scan_mae)).collect();
+    let corrected = holm(&tests.iter().map(|test| test.p).collect::<Vec<_>>());
+
+    let comparison = |(((a, b), test), p_holm): (((&Row, &Row), SignedRank), f64)| Comparison {
+        a: a.policy.clone(),
+        b: b.policy.clone(),
+        test: "wilcoxon-signed-rank",
+        method: test.method,
+        p: test.p,
+        p_holm,
+    };
+    pairs.into_iter().zip(tests).zip(corrected).map(comparison).collect()
 }
 
 #[cfg(test)]

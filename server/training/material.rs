@@ -96,8 +96,8 @@ impl Material {
 
     /// What the scans of a training by `recipe` go over.
     pub fn scenery(&self, recipe: &Recipe) -> Result<Scenery, TrainError> {
-        let relief = relief::scenes(Split::Training, recipe.reliefs)
-            .map_err(|error| TrainError::Recipe(error.to_string()))?;
+        let relief =
+            relief::scenes(Split::Training, recipe.reliefs).map_err(|error| TrainError::Recipe(error.to_string()))?;
         let relief = relief.into_iter().map(Scene::Stack).collect();
         Ok(Scenery::from(self.clips.clone()).with(relief, recipe.relief_share))
     }
@@ -114,7 +114,8 @@ impl Material {
 /// Tells of scans over `clips` that show nothing to focus on.
 fn check_detail(clips: &[Arc<Clip>]) -> Result<(), TrainError> {
     let count = clips.len().max(LEAST_CHECKED);
-    let set = Benchmark { clips: clips.to_vec(), conditions: Conditions::Fitting, seed: 1, count, frames: FRAMES };
+    let scenes = clips.iter().cloned().map(Scene::Flat).collect();
+    let set = Benchmark { scenes, conditions: Conditions::Fitting, seed: 1, count, frames: FRAMES };
     if let Some(warning) = warning(without_detail(&set), count)? {
         tell(format_args!("note: {warning}; nothing can be learned there"));
     }

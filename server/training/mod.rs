@@ -35,6 +35,7 @@ mod run_folder;
 pub mod scan;
 pub mod scenery;
 pub mod session;
+pub mod shard;
 mod spots;
 pub mod stack_bench;
 pub mod stack_scan;

@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::evaluate::ScanSet;
 use super::rollout::FocalTimeScan;
@@ -28,7 +28,7 @@ pub const PARTS: usize = 16;
 const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
 
 /// What is shown between two recorded focal powers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Between {
     /// The picture taken at the nearest focal power.

@@ -62,8 +62,7 @@ pub fn scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesEr
 pub fn scene(split: Split, index: u64) -> Result<StackScene, PlanesError> {
     let seed = split.first_seed() + index;
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7265_6c69_6566);
-    let softness =
-        if rng.random_bool(0.3) { rng.random_range(0.0..0.6) } else { rng.random_range(0.0..MOST_SOFTNESS) };
+    let softness = if rng.random_bool(0.3) { rng.random_range(0.0..0.6) } else { rng.random_range(0.0..MOST_SOFTNESS) };
     let relief = if rng.random_bool(0.15) { 0.0 } else { rng.random_range(0.3..MOST_RELIEF) };
 
     let ground = gaussian_blur(&surface(split, index, &mut rng), softness);
@@ -96,10 +95,12 @@ pub fn scene(split: Split, index: u64) -> Result<StackScene, PlanesError> {
 /// Positions of the focal plane: close together where blur changes what is seen most.
 fn positions() -> Vec<f32> {
     let steps = std::iter::repeat_n(0.25, 12).chain(std::iter::repeat_n(0.5, 6)).chain(std::iter::repeat_n(1.0, 6));
-    let side: Vec<f32> = steps.scan(0.0, |at, step| {
-        *at += step;
-        Some(*at)
-    }).collect();
+    let side: Vec<f32> = steps
+        .scan(0.0, |at, step| {
+            *at += step;
+            Some(*at)
+        })
+        .collect();
     let below = side.iter().rev().map(|at| -at);
     below.chain([0.0]).chain(side.iter().copied()).collect()
 }

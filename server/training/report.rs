@@ -5,18 +5,20 @@ use std::fmt::Write as _;
 use std::path::Path as FilePath;
 use std::{fs, io};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::detail::warning;
 use super::evaluate::{Comparison, ORACLE, Outcome, Row};
 use super::plot::{PANEL, finished, line, panel};
 use super::recorded::Between;
 use super::rollout::Path;
+use super::statistics::Method;
 use crate::autofocus::{IN_FOCUS, PolicyName};
 use crate::files::replace;
 
-/// What `evaluate` gives. docs/scripting.md promises the names of its fields.
-#[derive(Debug, Clone, Serialize)]
-pub struct Report {
+/// What was evaluated.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Subject {
     /// Which scans.
     pub scans: String,
     /// Seed of their courses.
@@ -26,13 +28,40 @@ pub struct Report {
     /// Footage scanned, if any.
     pub footage: Vec<String>,
     /// What a recorded scan shows between two of its focal powers.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub between: Option<Between>,
     /// Folder of weights in the place of those that ship, if any.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights_folder: Option<String>,
     /// SHA-256 of the weights of each learned policy that was evaluated.
     pub weights: BTreeMap<PolicyName, String>,
+}
+
+impl Subject {
+    /// In what it differs from `other`, in words.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Option<&'static str> {
+        let differences = [
+            (self.scans != other.scans, "the scans"),
+            (self.seed != other.seed, "the seed"),
+            (self.count != other.count, "the number of scans"),
+            (self.footage != other.footage, "the footage"),
+            (self.between != other.between, "what is shown between two focal powers"),
+            (self.weights != other.weights, "the weights"),
+            (self != other, "the folder of the weights"),
+        ];
+        differences.into_iter().find_map(|(differs, what)| differs.then_some(what))
+    }
+}
+
+/// What `evaluate` gives. docs/scripting.md promises the names of its fields.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// What was evaluated.
+    #[serde(flatten)]
+    pub subject: Subject,
+    /// Number of scans in which even the sharpest patch shows nothing to focus on.
+    pub without_detail: usize,
     /// One a policy.
     pub rows: Vec<Row>,
     /// One a pair of policies.
@@ -70,7 +99,7 @@ impl Report {
             "| policy | MAE ± sd | 95 % CI | in focus | travel / frame | reversals / s | paper: MAE ± sd | in focus |\n\
              |---|---|---|---|---|---|---|---|\n",
         );
-        let paper = if self.between.is_some() { ROBOTIC } else { SIMULATED };
+        let paper = if self.subject.between.is_some() { ROBOTIC } else { SIMULATED };
         for row in &self.rows {
             let paper = paper
                 .iter()
@@ -99,13 +128,24 @@ impl Report {
         let names: Vec<&str> =
             self.rows.iter().map(|row| row.policy.as_str()).filter(|policy| *policy != ORACLE).collect();
         let Some(columns) = names.get(1..).filter(|columns| !columns.is_empty()) else { return String::new() };
-        let over = if self.between.is_some() { "stretches of the scans" } else { "scans" };
-        let mut text = format!("\np of the paired Wilcoxon signed-rank test over {over}:\n\n");
+        let over = if self.subject.between.is_some() { "stretches of the scans" } else { "scans" };
+        let exact = self.comparisons.iter().filter(|test| test.method == Method::Exact).count();
+        let method = match exact {
+            0 => "by its normal approximation",
+            _ if exact == self.comparisons.len() => "exact",
+            _ => "exact for at most 50 pairs that differ, else by its normal approximation",
+        };
+        let corrected = match self.comparisons.len() {
+            1 => String::new(),
+            count => format!("; behind the stroke, by Holm's method corrected for {count} comparisons"),
+        };
+
+        let mut text = format!("\np of the paired Wilcoxon signed-rank test over {over}, {method}{corrected}:\n\n");
         let _ = writeln!(text, "| | {} |\n|{}", columns.join(" | "), "---|".repeat(names.len()));
         for a in &names[..columns.len()] {
             let cell = |b: &&str| {
                 let of = |test: &&Comparison| test.a == *a && test.b == **b;
-                self.comparisons.iter().find(of).map_or_else(String::new, |test| probability(test.p))
+                self.comparisons.iter().find(of).map_or_else(String::new, |test| self.probabilities(test))
             };
             let cells: Vec<String> = columns.iter().map(cell).collect();
             let _ = writeln!(text, "| {a} | {} |", cells.join(" | "));
@@ -113,24 +153,33 @@ impl Report {
         text
     }
 
+    /// A test's p, and the corrected one where there are several tests.
+    fn probabilities(&self, test: &Comparison) -> String {
+        let p = probability(test.p);
+        if self.comparisons.len() == 1 { p } else { format!("{p} / {}", probability(test.p_holm)) }
+    }
+
     /// What was evaluated, in sentences.
     fn about(&self) -> String {
-        let mut text = format!("Scans: {}", self.scans);
-        if !self.footage.is_empty() {
-            let _ = write!(text, " over {}", self.footage.join(", "));
+        let mut text = format!("Scans: {}", self.subject.scans);
+        if !self.subject.footage.is_empty() {
+            let _ = write!(text, " over {}", self.subject.footage.join(", "));
         }
-        let _ = write!(text, ", {} of them, seed {}.", self.count, self.seed);
-        text.push_str(match self.between {
+        let _ = write!(text, ", {} of them, seed {}.", self.subject.count, self.subject.seed);
+        if let Ok(Some(warning)) = warning(self.without_detail, self.subject.count) {
+            let _ = write!(text, " Note that {warning}.");
+        }
+        text.push_str(match self.subject.between {
             None => "",
             Some(Between::Nearest) => " A frame shows the picture recorded at the nearest focal power.",
             Some(Between::Interpolated) => {
                 " A frame shows a mix of the pictures recorded at the two focal powers around."
             }
         });
-        if !self.weights.is_empty() {
-            let weights: Vec<_> = self.weights.iter().map(|(name, sum)| format!("{name} {sum:.12}")).collect();
+        if !self.subject.weights.is_empty() {
+            let weights: Vec<_> = self.subject.weights.iter().map(|(name, sum)| format!("{name} {sum:.12}")).collect();
             let _ = write!(text, " Weights, by how their SHA-256 begins: {}", weights.join(", "));
-            match &self.weights_folder {
+            match &self.subject.weights_folder {
                 None => text.push('.'),
                 Some(folder) => {
                     let _ = write!(text, "; those in {folder} took the place of those that ship.");
@@ -148,13 +197,13 @@ impl Report {
         let mut table = csv::Writer::from_writer(Vec::new());
         table.write_record(COLUMNS)?;
         for row in &self.rows {
-            let weights = self.weights.get(&PolicyName::new(&row.policy));
+            let weights = self.subject.weights.get(&PolicyName::new(&row.policy));
             let numbers = [row.mae, row.sd, row.in_focus, row.travel, row.reversals];
             let intervals = [row.mae_interval, row.in_focus_interval].map(|(low, high)| [low, high]);
             let numbers = numbers.iter().chain(intervals.as_flattened()).map(f64::to_string);
             let mut record = vec![row.policy.clone(), row.frames.to_string()];
             record.extend(numbers);
-            record.extend([self.scans.clone(), self.seed.to_string(), self.footage.join("; ")]);
+            record.extend([self.subject.scans.clone(), self.subject.seed.to_string(), self.subject.footage.join("; ")]);
             record.push(weights.cloned().unwrap_or_default());
             table.write_record(record)?;
         }
@@ -248,7 +297,7 @@ mod tests {
             ("file:far,b.pt", path([0.11, 0.12, 0.13, 0.14])),
         ];
         let rows: Vec<Row> = outcomes.map(outcome).iter().map(Outcome::row).collect();
-        Report {
+        let subject = Subject {
             scans: "simulated".to_owned(),
             seed: 7,
             count: 4,
@@ -256,18 +305,43 @@ mod tests {
             between: None,
             weights_folder: Some("runs/x".to_owned()),
             weights: [(PolicyName::new("near"), "0123456789abcdef".repeat(4))].into(),
-            comparisons: super::super::evaluate::compare(&rows),
-            rows,
-        }
+        };
+        Report { subject, without_detail: 1, comparisons: super::super::evaluate::compare(&rows), rows }
     }
 
     #[test]
     fn what_was_evaluated_and_the_tests_stand_below_the_table() {
         let text = report().markdown();
-        // All four pairs differ alike: z = -5 / sqrt(7.5 - 1.25), two-sided.
-        assert!(text.contains("| | file:far,b.pt |\n|---|---|\n| near | 0.046 |\n"), "{text}");
-        assert!(text.contains("Scans: simulated over endo.mp4, 4 of them, seed 7. Weights, "), "{text}");
+        // All four pairs differ alike: two of the sixteen patterns of signs are as extreme.
+        assert!(text.contains("| | file:far,b.pt |\n|---|---|\n| near | 0.125 |\n"), "{text}");
+        assert!(text.contains("signed-rank test over scans, exact:\n"), "{text}");
+        assert!(
+            text.contains(
+                "Scans: simulated over endo.mp4, 4 of them, seed 7. Note that in 25.0 % of the scans (1 of 4) even"
+            ),
+            "{text}"
+        );
+        assert!(text.contains("shows no detail. Weights, by "), "{text}");
         assert!(text.contains("near 0123456789ab; those in runs/x took"), "{text}");
+    }
+
+    #[test]
+    fn several_comparisons_are_corrected_for_their_number() {
+        let outcome = |name: &str, errors| Outcome { policy: name.to_owned(), paths: path(errors), parts: 1 };
+        let outcomes = [
+            outcome("a", [0.01, 0.02, 0.03, 0.04]),
+            outcome("b", [0.11, 0.13, 0.15, 0.17]),
+            outcome("c", [0.10, 0.14, 0.14, 0.18]),
+        ];
+        let rows: Vec<Row> = outcomes.iter().map(Outcome::row).collect();
+        let report = Report { comparisons: super::super::evaluate::compare(&rows), rows, ..report() };
+        let text = report.markdown();
+        assert!(text.contains("exact; behind the stroke, by Holm's method corrected for 3 comparisons:\n"), "{text}");
+        assert!(text.contains("| a | 0.125 / 0.375 | 0.125 / 0.375 |\n"), "{text}");
+        let json = serde_json::to_value(&report).unwrap();
+        let first = &json["comparisons"][0];
+        assert_eq!((&first["test"], &first["method"]), (&"wilcoxon-signed-rank".into(), &"exact".into()));
+        assert_eq!((&first["p"], &first["p_holm"]), (&0.125.into(), &0.375.into()));
     }
 
     #[test]

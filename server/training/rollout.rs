@@ -1,6 +1,8 @@
 //! One policy on one focal-time scan: where it went, and how well that was.
 #![allow(clippy::cast_precision_loss, reason = "counts of frames are small")]
 
+use serde::{Deserialize, Serialize};
+
 use super::scan::Scan;
 use crate::autofocus::{IN_FOCUS, Observation, Policy, STEP};
 use crate::imaging::Patch;
@@ -36,7 +38,7 @@ impl FocalTimeScan for Scan {
 pub const FRAMES_A_SECOND: f64 = 25.0;
 
 /// Where the lens and the optimum stood, frame by frame.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Path {
     /// Focal power of each frame.
     pub focal_power: Vec<f64>,

@@ -214,9 +214,7 @@ impl Scan {
         let contrast = (settings.flicker * standard_normal(&mut course)).exp();
         let optics = match &scene {
             Scene::Flat(_) => None,
-            Scene::Stack(stack) => {
-                Some(Optics::draw(stack, stack.planes.sharpest(whole(corner(&crop))), &mut course))
-            }
+            Scene::Stack(stack) => Some(Optics::draw(stack, stack.planes.sharpest(whole(corner(&crop))), &mut course)),
         };
         let defocus = Defocus::default();
         Self {

@@ -107,3 +107,100 @@ fn results_say_what_was_evaluated() {
     assert!(csv.lines().nth(3).unwrap().ends_with(&format!(",simulated,2023,{},{sum}", text(&still))), "{csv}");
     assert!(read("figure.svg").contains("a,b&amp;c.pt</title>"));
 }
+
+/// A picture of overlapping squares of many sizes and gray levels.
+fn gravel(path: &Path, side: u32) {
+    let mut picture = image::GrayImage::new(side, side);
+    let mut state = 1u32;
+    let mut draw = |below: u32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) % below
+    };
+    for _ in 0..side * 8 {
+        let (left, top, size, level) = (draw(side), draw(side), 4 + draw(20), draw(256));
+        for (x, y) in (top..top + size).flat_map(|y| (left..left + size).map(move |x| (x, y))) {
+            if x < side && y < side {
+                picture.put_pixel(x, y, image::Luma([u8::try_from(level).unwrap()]));
+            }
+        }
+    }
+    picture.save(path).unwrap();
+}
+
+#[test]
+fn a_large_still_picture_is_focused_on_as_well_as_a_small_one() {
+    let folder = TempDir::new().unwrap();
+    let still = folder.path().join("still.png");
+    let in_focus = |side: u32| {
+        gravel(&still, side);
+        let arguments = ["evaluate", "--count", "8", "--json", "--policies", "parfocal", "--footage", text(&still)];
+        let output = parfocal(&arguments);
+        assert!(output.status.success(), "{}", complaint(&output));
+        let report: Value = serde_json::from_str(&said(&output)).unwrap();
+        report["rows"][1]["in_focus"].as_f64().unwrap()
+    };
+    let (small, large) = (in_focus(480), in_focus(512));
+    assert!(small > 0.9 && large > 0.9, "{small} {large}");
+}
+
+#[test]
+fn footage_without_anything_to_focus_on_is_refused_and_a_part_without_is_told() {
+    let folder = TempDir::new().unwrap();
+    let (wall, gravel_picture) = (folder.path().join("1-wall.png"), folder.path().join("2-gravel.png"));
+    image::GrayImage::from_pixel(160, 160, image::Luma([200])).save(&wall).unwrap();
+    let told = complaint(&evaluate(&["--policies", "fixed", "--footage", text(&wall)]).output().unwrap());
+    assert!(
+        told.contains("nothing to focus on: in none of 1 scans does even the sharpest patch show detail"),
+        "{told}"
+    );
+    let run = folder.path().join("run");
+    let train = ["train", "mgm-learned", "--out", text(&run), "--footage", text(&wall)];
+    assert!(complaint(&parfocal(&train)).contains("nothing to focus on: in none of 60 scans"));
+
+    // Scans take turns between the pictures of a folder.
+    fs::remove_dir_all(&run).unwrap();
+    gravel(&gravel_picture, 160);
+    let arguments = ["evaluate", "--count", "4", "--policies", "fixed", "--footage", text(folder.path())];
+    let output = parfocal(&arguments);
+    assert!(output.status.success(), "{}", complaint(&output));
+    let share = "in 50.0 % of the scans (2 of 4) even the sharpest patch shows no detail";
+    assert!(said(&output).contains(share), "{}", said(&output));
+    assert!(String::from_utf8_lossy(&output.stderr).contains(share));
+}
+
+#[test]
+fn shards_put_together_are_one_run_to_the_last_digit() {
+    let folder = TempDir::new().unwrap();
+    let (whole, parts) = (folder.path().join("whole"), folder.path().join("parts"));
+    let arguments = ["evaluate", "--count", "5", "--seed", "11", "--policies", "mgm-hill-climber,mlr-learned,parfocal"];
+    let run = |more: &[&str]| {
+        let output = parfocal(&[&arguments, more].concat());
+        assert!(output.status.success(), "{}", complaint(&output));
+        said(&output)
+    };
+    let told = run(&["--out", text(&whole)]);
+    assert!(run(&["--shard", "2/3", "--out", text(&parts)]).contains("shard-2-of-3.json; when all are there: "));
+    run(&["--shard", "3/3", "--out", text(&parts)]);
+    fs::write(parts.join("shard-1-of-3.json"), run(&["--shard", "1/3", "--json"])).unwrap();
+
+    let files = ["shard-3-of-3.json", "shard-1-of-3.json", "shard-2-of-3.json"].map(|file| parts.join(file));
+    let files: Vec<&str> = files.iter().map(|file| text(file)).collect();
+    let merged = parfocal(&[&["evaluate", "--merge"], &files[..], &["--out", text(&parts)]].concat());
+    assert!(merged.status.success(), "{}", complaint(&merged));
+    assert_eq!(said(&merged), told);
+    for file in ["results.json", "results.md", "results.csv", "figure.svg"] {
+        let read = |folder: &Path| fs::read_to_string(folder.join(file)).unwrap();
+        assert_eq!(read(&parts), read(&whole), "{file}");
+    }
+
+    let incomplete = complaint(&parfocal(&[&["evaluate", "--merge"], &files[..2]].concat()));
+    assert!(incomplete.contains("shards are missing: 2/3; run"), "{incomplete}");
+    let none = complaint(&parfocal(&["evaluate", "--merge", text(&parts.join("results.json"))]));
+    assert!(none.contains("results.json holds no shard"), "{none}");
+    let many = complaint(&parfocal(&["evaluate", "--count", "2", "--policies", "fixed", "--shard", "3/3", "--json"]));
+    assert!(many.contains("shard 3/3 has no scans: there are only 2"), "{many}");
+    // Usage: a shard must go somewhere, a merge has its scans already.
+    for wrong in [["--shard", "1/2"].as_slice(), &["--shard", "3/2", "--json"], &["--merge", "a", "--seed", "1"]] {
+        assert_eq!(parfocal(&[&["evaluate"], wrong].concat()).status.code(), Some(2), "{wrong:?}");
+    }
+}
