@@ -12,7 +12,7 @@ FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null &
 
 run:
 	@.ci/setup build
-	@cargo build --release --quiet
+	@cargo build --release
 	@exec target/release/parfocal serve --bind $(BIND) $(ARGS)
 
 test:
