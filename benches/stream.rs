@@ -96,8 +96,8 @@ async fn measure(scenario: &Scenario) -> Row {
         Some(bits) => link::slow(server.address, bits).await,
         None => server.address,
     };
-    let viewers: Vec<_> =
-        (0..scenario.viewers).map(|_| tokio::spawn(viewer::watch(address, WARM_UP + MEASURED))).collect();
+    let watch = |_| tokio::spawn(viewer::watch(address, server.key.clone(), WARM_UP + MEASURED));
+    let viewers: Vec<_> = (0..scenario.viewers).map(watch).collect();
     tokio::time::sleep(WARM_UP).await;
     let (from, before) = (SystemClock.now().as_nanos(), server.usage());
     tokio::time::sleep(MEASURED).await;

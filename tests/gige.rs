@@ -18,7 +18,7 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 
 use fake_camera::Fake;
-use support::{Server, client};
+use support::Server;
 
 const SECOND: Duration = Duration::from_secs(1);
 
@@ -182,7 +182,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
 }
 
 async fn offered(server: &Server, setting: &str) -> Value {
-    let offer: Value = server.get("/api/operator/camera").send().await.unwrap().json().await.unwrap();
+    let offer: Value = server.get_as("operator", "/api/operator/camera").send().await.unwrap().json().await.unwrap();
     let settings = offer["settings"].as_array().unwrap();
     settings.iter().find(|one| one["setting"] == setting).cloned().unwrap_or_default()
 }
@@ -193,7 +193,7 @@ async fn the_operator_changes_them_through_the_server() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--camera", "gige:Aravis-Fake-TEST?width=512&height=512"]);
     let change = async |setting: &str, value: f64| {
         let request =
-            client().post(server.url("/api/operator/camera")).json(&json!({"setting": setting, "value": value}));
+            server.post_as("operator", "/api/operator/camera").json(&json!({"setting": setting, "value": value}));
         let response = request.send().await.unwrap();
         (response.status(), response.text().await.unwrap())
     };

@@ -16,6 +16,8 @@ pub struct Server {
     started: Moment,
     /// Where it is reached.
     pub address: SocketAddr,
+    /// The operator's key.
+    pub key: String,
     data: TempDir,
 }
 
@@ -32,9 +34,12 @@ impl Server {
             .spawn()
             .expect("the server");
         let lines = BufReader::new(process.stdout.take().expect("its output")).lines();
-        let link = lines.map_while(Result::ok).find(|line| line.contains("/enter?key=")).expect("its address");
-        let port = link.split("/enter").next().and_then(|host| host.rsplit(':').next()?.parse().ok()).expect("a port");
-        Self { process, started, address: SocketAddr::from(([127, 0, 0, 1], port)), data }
+        let mut lines = lines.map_while(Result::ok);
+        let link = lines.find(|line| line.trim_start().starts_with("operator ")).expect("the operator's link");
+        let (host, key) = link.split_once("/enter?key=").expect("a link");
+        let port = host.rsplit(':').next().and_then(|port| port.parse().ok()).expect("a port");
+        let key = key.trim().to_owned();
+        Self { process, started, address: SocketAddr::from(([127, 0, 0, 1], port)), key, data }
     }
 
     /// From the start of the process to its first answer.

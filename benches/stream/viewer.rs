@@ -7,6 +7,7 @@ use futures_util::{SinkExt, StreamExt};
 use parfocal::clock::{Clock, SystemClock};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 
 /// A frame that arrived.
 pub struct Seen {
@@ -18,9 +19,11 @@ pub struct Seen {
     pub bytes: usize,
 }
 
-/// Watches for `time`.
-pub async fn watch(address: SocketAddr, time: Duration) -> Vec<Seen> {
-    let (mut socket, _) = connect_async(format!("ws://{address}/live?role=operator")).await.expect("the stream");
+/// Watches for `time` as the operator, whose key is `key`.
+pub async fn watch(address: SocketAddr, key: String, time: Duration) -> Vec<Seen> {
+    let mut request = format!("ws://{address}/live?role=operator").into_client_request().expect("an address");
+    request.headers_mut().insert("authorization", format!("Bearer {key}").parse().expect("a key"));
+    let (mut socket, _) = connect_async(request).await.expect("the stream");
     let mut seen = Vec::new();
     let end = tokio::time::Instant::now() + time;
     while let Ok(Some(Ok(message))) = tokio::time::timeout_at(end, socket.next()).await {

@@ -38,10 +38,13 @@ pub fn announcement(
     if let Ok(code) = QrCode::new(link(Role::Surgeon)) {
         let _ = writeln!(text, "\nThe surgeon's tablet can scan this:\n\n{}", drawn(&code, terminal));
     }
+    text.push_str(
+        "Every page opens only by its link, and whoever has a link has its role: give each to its person only.\n",
+    );
     let advice = if host.ip().is_loopback() {
         "Only this machine can reach it. For a tablet, start with --bind 0.0.0.0:8080 on a network you trust."
     } else {
-        "Whoever has a link has its role: give each to its person only. The connection is not encrypted."
+        "The connection is not encrypted: use a network you trust."
     };
     let _ = writeln!(text, "{advice}\nCtrl-C ends it.");
     text

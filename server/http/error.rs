@@ -29,6 +29,12 @@ pub enum Error {
     /// The browser has not been let in to this role.
     #[error("This page is for the {role}. Open it with the {role}'s link{}.", whence(*.0), role = role_name(*.0))]
     NeedsRole(Role),
+    /// The browser has not been let in to any role.
+    #[error(
+        "This browser has not been let in yet. Open it with the link of your role: the server prints all three when it starts; a surgeon gets \
+         the link from the operator."
+    )]
+    NoRole,
     /// The key in the link is not one of this server's.
     #[error(
         "This link is not, or no longer, valid. A surgeon gets the link from the operator; the server printed all of them when it last started."
@@ -71,7 +77,9 @@ impl Error {
             Self::NotFound(_) => StatusCode::NOT_FOUND,
             Self::Conflict(_) => StatusCode::CONFLICT,
             Self::Invalid(_) => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::NeedsRole(_) | Self::Forbidden(_) | Self::WrongKey | Self::CrossSite => StatusCode::FORBIDDEN,
+            Self::NeedsRole(_) | Self::NoRole | Self::Forbidden(_) | Self::WrongKey | Self::CrossSite => {
+                StatusCode::FORBIDDEN
+            }
             Self::WrongHost => StatusCode::MISDIRECTED_REQUEST,
             Self::Storage(_) => StatusCode::INSUFFICIENT_STORAGE,
             Self::Unreadable(_) | Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
@@ -123,6 +131,7 @@ pub async fn render(request: Request, next: Next) -> Response {
     let (mut parts, body) = response.into_parts();
     let error = parts.extensions.remove::<Error>();
     let message = match &error {
+        Some(error @ (Error::NeedsRole(_) | Error::NoRole)) if !page => format!("{error} {FOR_PROGRAMS}"),
         Some(error) => error.to_string(),
         // What a parser said of an address is for programmers.
         None if page && status == StatusCode::BAD_REQUEST => MISSPELLED.to_owned(),
@@ -136,13 +145,15 @@ pub async fn render(request: Request, next: Next) -> Response {
     let html = ErrorPage {
         title: title_of(status),
         message: &message,
-        reload: from_elsewhere && matches!(error, Some(Error::NeedsRole(_))),
+        reload: from_elsewhere && matches!(error, Some(Error::NeedsRole(_) | Error::NoRole)),
     };
     match html.render() {
         Ok(html) => (parts, Html(html)).into_response(),
         Err(_) => (parts, message).into_response(),
     }
 }
+
+const FOR_PROGRAMS: &str = "A program sends the key that stands in that link, as 'Authorization: Bearer KEY'.";
 
 const MISSPELLED: &str =
     "This address is incomplete or misspelled. Open the link once more as you were given it, or go to the start page.";
@@ -185,7 +196,7 @@ fn title_of(status: StatusCode) -> &'static str {
 const fn whence(role: Role) -> &'static str {
     match role {
         Role::Surgeon => ": the operator has it",
-        _ => ", which the server printed when it started",
+        _ => ", which the server prints when it starts",
     }
 }
 

@@ -1,14 +1,14 @@
 //! Roles: who a request speaks for, and the links that let a browser in.
 //!
 //! A role is shown by its cookie, or by its key as a bearer token (programs). One cookie a role, so that one laptop can
-//! be operator and researcher at a time. On a server that listens on loopback alone, whoever sits at the machine is its
-//! operator without a key.
+//! be operator and researcher at a time. Nothing else shows a role: where a request comes from tells only which proxy
+//! handed it on.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 
-use axum::extract::{ConnectInfo, FromRequestParts, Query, State};
-use axum::http::header::{AUTHORIZATION, COOKIE, HOST, SET_COOKIE};
+use axum::extract::{FromRequestParts, Query, State};
+use axum::http::HeaderMap;
+use axum::http::header::{AUTHORIZATION, COOKIE, SET_COOKIE};
 use axum::http::request::Parts;
 use axum::response::{AppendHeaders, IntoResponse, Redirect};
 use serde::Deserialize;
@@ -16,8 +16,7 @@ use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::{Error, role_name};
-use super::keys::ROLES;
-use super::security::is_loopback_name;
+use super::keys::{Keys, ROLES};
 use super::{App, AppState};
 use crate::trial::view::Role;
 
@@ -49,7 +48,7 @@ impl Roles {
         match wanted {
             Some(role) if self.0.contains(&role) => Ok(role),
             Some(role) => Err(Error::NeedsRole(role)),
-            None => self.0.first().copied().ok_or(Error::NeedsRole(Role::Surgeon)),
+            None => self.0.first().copied().ok_or(Error::NoRole),
         }
     }
 }
@@ -60,7 +59,11 @@ macro_rules! proof {
             type Rejection = Error;
 
             async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
-                if holds(parts, app, Role::$proof) { Ok(Self) } else { Err(Error::NeedsRole(Role::$proof)) }
+                if holds(&parts.headers, &app.keys, Role::$proof) {
+                    Ok(Self)
+                } else {
+                    Err(Error::NeedsRole(Role::$proof))
+                }
             }
         }
     };
@@ -74,19 +77,15 @@ impl FromRequestParts<AppState> for Roles {
     type Rejection = Error;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
-        let held: Vec<_> = ROLES.into_iter().filter(|role| holds(parts, app, *role)).collect();
-        if held.is_empty() { Err(Error::NeedsRole(Role::Operator)) } else { Ok(Self(held)) }
+        let held: Vec<_> = ROLES.into_iter().filter(|role| holds(&parts.headers, &app.keys, *role)).collect();
+        if held.is_empty() { Err(Error::NoRole) } else { Ok(Self(held)) }
     }
 }
 
-fn holds(parts: &Parts, app: &App, role: Role) -> bool {
-    shows_key(parts, app, role) || (role == Role::Operator && app.loopback_only && sits_at_the_machine(parts))
-}
-
-/// By its cookie or its bearer token.
-fn shows_key(parts: &Parts, app: &App, role: Role) -> bool {
-    cookie(parts, cookie_name(role)).is_some_and(|token| app.keys.opens(role, token))
-        || bearer(parts).is_some_and(|key| app.keys.role_of(key) == Some(role))
+/// Whether a request with these headers speaks for `role`: by its cookie or its bearer token.
+pub(super) fn holds(headers: &HeaderMap, keys: &Keys, role: Role) -> bool {
+    cookie(headers, cookie_name(role)).is_some_and(|token| keys.opens(role, token))
+        || bearer(headers).is_some_and(|key| keys.role_of(key) == Some(role))
 }
 
 const fn cookie_name(role: Role) -> &'static str {
@@ -98,21 +97,13 @@ const fn cookie_name(role: Role) -> &'static str {
     }
 }
 
-fn cookie<'a>(parts: &'a Parts, name: &str) -> Option<&'a str> {
-    let cookies = parts.headers.get_all(COOKIE).iter().filter_map(|header| header.to_str().ok());
+fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    let cookies = headers.get_all(COOKIE).iter().filter_map(|header| header.to_str().ok());
     cookies.flat_map(|header| header.split(';')).find_map(|pair| pair.trim().strip_prefix(name)?.strip_prefix('='))
 }
 
-fn bearer(parts: &Parts) -> Option<&str> {
-    parts.headers.get(AUTHORIZATION)?.to_str().ok()?.strip_prefix("Bearer ")
-}
-
-/// From this machine, by one of this machine's own names, and not handed on by a proxy, behind which anyone may be.
-fn sits_at_the_machine(parts: &Parts) -> bool {
-    let from_here = parts.extensions.get::<ConnectInfo<SocketAddr>>().is_some_and(|peer| peer.0.ip().is_loopback());
-    let by_our_name = parts.headers.get(HOST).and_then(|host| host.to_str().ok()).is_some_and(is_loopback_name);
-    let handed_on = ["forwarded", "x-forwarded-for", "x-real-ip"].iter().any(|name| parts.headers.contains_key(*name));
-    from_here && by_our_name && !handed_on
+fn bearer(headers: &HeaderMap) -> Option<&str> {
+    headers.get(AUTHORIZATION)?.to_str().ok()?.strip_prefix("Bearer ")
 }
 
 /// The page of `role`.
@@ -152,10 +143,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
 #[utoipa::path(get, path = "/", tag = "roles", responses(
     (status = 303, description = "On to the role's page"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
-async fn start(roles: Roles, State(app): State<AppState>, parts: Parts) -> Redirect {
-    // Whoever sits at the machine is its operator, also who was let in there by the surgeon's link: the link counts.
-    let by_key: Vec<_> = roles.0.iter().copied().filter(|role| shows_key(&parts, &app, *role)).collect();
-    let held = if by_key.is_empty() { roles.0 } else { by_key };
+async fn start(Roles(held): Roles) -> Redirect {
     // Whoever holds more than one role works here rather than being a subject of the trial.
     Redirect::to(home(held.into_iter().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)))
 }

@@ -57,7 +57,7 @@ fn content_security_policy(nonce: &str) -> String {
 }
 
 /// Turns away what another site asks for, and, on a loopback server, names that are not this machine's own: a site whose
-/// name is made to point here (DNS rebinding) would otherwise be the operator.
+/// name is made to point here (DNS rebinding) has no role's cookie, and gets not even a page that says so.
 pub async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();

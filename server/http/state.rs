@@ -37,7 +37,7 @@ pub struct App {
     pub keys: Keys,
     /// Where other machines reach the server.
     pub address: SocketAddr,
-    /// Whether the server listens on the machine itself alone: then its operator needs no key.
+    /// Whether the server listens on the machine itself alone, where no tablet reaches it.
     pub loopback_only: bool,
     /// Counters for Prometheus.
     pub metrics: Metrics,

@@ -18,7 +18,7 @@ fn keys(text: &str) -> String {
 
 /// A setting's value as the camera has it.
 async fn value(server: &Server, setting: &str) -> f64 {
-    let offer: Value = server.get("/api/operator/camera").send().await.unwrap().json().await.unwrap();
+    let offer: Value = server.get_as("operator", "/api/operator/camera").send().await.unwrap().json().await.unwrap();
     let settings = offer["settings"].as_array().unwrap();
     settings.iter().find(|one| one["setting"] == setting).unwrap()["value"].as_f64().unwrap()
 }

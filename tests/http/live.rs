@@ -270,7 +270,7 @@ async fn pages_are_told_when_the_server_ends() {
 async fn motion_jpeg_sends_the_next_parts_headers_at_once() {
     const PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
     let server = Server::start();
-    let mut response = server.get("/stream.mjpeg").send().await.unwrap();
+    let mut response = server.get_as("surgeon", "/stream.mjpeg").send().await.unwrap();
     assert_eq!(response.headers()["content-type"], "multipart/x-mixed-replace; boundary=parfocal-frame");
     let mut stream = Vec::new();
     let mut complete = 0;

@@ -24,7 +24,7 @@ async fn it_says_where_it_is_and_what_is_simulated() {
 async fn it_ends_well_when_asked_to() {
     for signal in [Signal::TERM, Signal::INT, Signal::HUP] {
         let mut server = Server::start();
-        let mut stream = server.get("/stream.mjpeg").send().await.unwrap();
+        let mut stream = server.get_as("surgeon", "/stream.mjpeg").send().await.unwrap();
         assert!(stream.chunk().await.unwrap().is_some());
         assert!(server.end(signal), "exit code 0");
         while let Ok(Some(_)) = stream.chunk().await {}
@@ -72,7 +72,7 @@ async fn every_page_has_a_nonce_of_its_own_and_strict_headers() {
     let server = Server::start();
     let mut nonces = Vec::new();
     for _ in 0..2 {
-        let response = server.get("/operator").send().await.unwrap();
+        let response = server.get_as("operator", "/operator").send().await.unwrap();
         let headers = response.headers().clone();
         let policy = headers["content-security-policy"].to_str().unwrap();
         assert!(policy.starts_with("default-src 'none'") && policy.contains("frame-ancestors 'none'"), "{policy}");
@@ -127,7 +127,7 @@ async fn failures_are_pages_for_browsers_and_json_for_programs() {
 #[tokio::test]
 async fn static_files_are_kept_for_ever_by_their_hash() {
     let server = Server::start();
-    let page = server.get("/operator").send().await.unwrap().text().await.unwrap();
+    let page = server.get_as("operator", "/operator").send().await.unwrap().text().await.unwrap();
     let address = page.split('"').find(|part| part.starts_with("/static/") && part.ends_with("style.css")).unwrap();
     let file = server.get(address).send().await.unwrap();
     assert_eq!(file.headers()[CONTENT_TYPE], "text/css; charset=utf-8");
@@ -148,7 +148,7 @@ async fn static_files_are_kept_for_ever_by_their_hash() {
 #[tokio::test]
 async fn every_endpoint_is_described() {
     let server = Server::start();
-    let document: Value = server.get("/api/openapi.json").send().await.unwrap().json().await.unwrap();
+    let document: Value = server.get_as("operator", "/api/openapi.json").send().await.unwrap().json().await.unwrap();
     let paths = document["paths"].as_object().unwrap();
     for path in
         ["/", "/enter", "/surgeon", "/operator", "/researcher", "/live", "/stream.mjpeg", "/healthz", "/metrics"]
@@ -162,7 +162,7 @@ async fn every_endpoint_is_described() {
 #[tokio::test]
 async fn counters_are_told_to_prometheus_without_naming_a_policy() {
     let server = Server::start();
-    let response = server.get("/metrics").send().await.unwrap();
+    let response = server.get_as("operator", "/metrics").send().await.unwrap();
     assert!(response.headers()[CONTENT_TYPE].to_str().unwrap().starts_with("application/openmetrics-text"));
     let text = response.text().await.unwrap();
     assert!(text.ends_with("# EOF\n"));
@@ -181,10 +181,10 @@ async fn counters_are_told_to_prometheus_without_naming_a_policy() {
 #[tokio::test]
 async fn a_camera_without_settings_offers_none() {
     let server = Server::start();
-    let offer: Value = server.get("/api/operator/camera").send().await.unwrap().json().await.unwrap();
+    let offer: Value = server.get_as("operator", "/api/operator/camera").send().await.unwrap().json().await.unwrap();
     assert_eq!(offer["settings"], serde_json::json!([]));
     let change = serde_json::json!({"setting": "gain", "value": 3});
-    let answer = client().post(server.url("/api/operator/camera")).json(&change).send().await.unwrap();
+    let answer = server.post_as("operator", "/api/operator/camera").json(&change).send().await.unwrap();
     assert_eq!(answer.status(), StatusCode::CONFLICT);
     assert!(answer.text().await.unwrap().contains("does not offer this setting"));
 }

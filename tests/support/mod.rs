@@ -71,6 +71,16 @@ impl Server {
         client().get(self.url(path))
     }
 
+    /// A GET with the key of `role`.
+    pub fn get_as(&self, role: &str, path: &str) -> RequestBuilder {
+        self.get(path).bearer_auth(self.key(role))
+    }
+
+    /// A POST with the key of `role`.
+    pub fn post_as(&self, role: &str, path: &str) -> RequestBuilder {
+        client().post(self.url(path)).bearer_auth(self.key(role))
+    }
+
     /// Ends the server as Ctrl-C or a service manager would, and waits: whether it ended well.
     pub fn end(&mut self, signal: rustix::process::Signal) -> bool {
         let id = rustix::process::Pid::from_child(&self.process);
