@@ -1,7 +1,8 @@
-//! Files that are there whole or not at all, whenever the disk is full or the power goes.
+//! Files that are there whole or not at all, whenever the disk is full or the power goes; and files that are nobody else's.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 /// Puts a file with these bytes at `path` (see [`replace_with`]), or where a link there leads. A device or a pipe is written to, never
@@ -54,6 +55,25 @@ fn write_through_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io
 pub fn sync_folder_of(path: &Path) {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
+
+/// Takes every other account's access to the file or folder `path` away.
+///
+/// # Errors
+/// When it is not there or not ours, or when it is a folder that all accounts share, such as /tmp, which must stay theirs too.
+pub fn make_private(path: &Path) -> io::Result<()> {
+    const OTHERS: u32 = 0o077;
+    const SHARED: u32 = 0o1000;
+
+    let there = fs::metadata(path)?;
+    let mode = there.permissions().mode();
+    if mode & OTHERS == 0 {
+        return Ok(());
+    }
+    if there.is_dir() && mode & SHARED != 0 {
+        return Err(io::Error::other("all accounts share this folder"));
+    }
+    fs::set_permissions(path, Permissions::from_mode(mode & !OTHERS & 0o7777))
 }
 
 /// Whether `name` is that of a file that a process killed in [`replace`] left behind.
@@ -112,6 +132,19 @@ mod tests {
         replace(&link, b"after").unwrap();
         assert_eq!(fs::read(&file).unwrap(), b"after");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+
+    #[test]
+    fn what_is_made_private_keeps_its_owners_rights_and_a_shared_folder_stays_shared() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("there");
+        fs::create_dir(&path).unwrap();
+        for (before, after) in [(0o755, 0o700), (0o750, 0o700), (0o500, 0o500), (0o1777, 0o1777)] {
+            fs::set_permissions(&path, Permissions::from_mode(before)).unwrap();
+            assert_eq!(make_private(&path).is_ok(), before != 0o1777);
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o7777, after);
+        }
+        assert_eq!(make_private(&folder.path().join("missing")).unwrap_err().kind(), io::ErrorKind::NotFound);
     }
 
     #[test]

@@ -14,6 +14,8 @@ mod failing_disk;
 mod finality;
 #[path = "http/live.rs"]
 mod live;
+#[path = "http/privacy.rs"]
+mod privacy;
 #[path = "http/roles.rs"]
 mod roles;
 #[path = "http/service.rs"]

@@ -2,13 +2,14 @@
 
 use std::fs;
 use std::io::Write;
-use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
 
+use crate::files::make_private;
 use crate::trial::view::Role;
 
 /// Name of the key file in the data folder.
@@ -66,7 +67,7 @@ impl Keys {
         let io = |source| KeyError::Io { path: path.clone(), source };
         match fs::read_to_string(&path) {
             Ok(text) => {
-                fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
+                make_private(&path).map_err(io)?;
                 Self::parse(&text).map_err(|reason| KeyError::Damaged { path, reason })
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -152,6 +153,8 @@ impl Keys {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
     use super::*;
 
     #[test]

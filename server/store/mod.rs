@@ -15,8 +15,9 @@ mod sets;
 pub mod telemetry;
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Write};
+use std::fs::{DirBuilder, File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,6 +31,7 @@ use tokio::sync::{Mutex, MutexGuard};
 
 use crate::autofocus::PolicyName;
 use crate::clock::Moment;
+use crate::files::make_private;
 
 pub use error::StoreError;
 pub use reader::Reader;
@@ -93,8 +95,10 @@ impl Store {
     /// When another server has the folder, the database is from a newer version, or the disk does not let itself be
     /// written.
     pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
-        std::fs::create_dir_all(folder).map_err(|error| StoreError::folder(folder, &error))?;
+        let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
+        made.map_err(|error| StoreError::folder(folder, &error))?;
         let lock = lock(folder)?;
+        keep_private(folder);
         let file = folder.join(DATABASE);
         let options = SqliteConnectOptions::new()
             .filename(&file)
@@ -235,6 +239,22 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     .execute(trial)
     .await?;
     Ok(done.last_insert_rowid())
+}
+
+/// Keeps other accounts out of the folder and its files, which tell seeds, policies and what surgeons said. Earlier versions let
+/// every account read them. What cannot be changed is no reason not to serve, but to be told of.
+fn keep_private(folder: &Path) {
+    let files = ["", "-wal", "-shm"].map(|suffix| folder.join(format!("{DATABASE}{suffix}")));
+    for path in [folder.to_owned(), folder.join(LOCK)].into_iter().chain(files) {
+        match make_private(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => tracing::warn!(
+                "other accounts of this machine may be able to read {}, which holds trial data ({error}); have its owner take their \
+                 rights away, or choose a folder of your own with --data-dir",
+                path.display()
+            ),
+            _ => {}
+        }
+    }
 }
 
 fn lock(folder: &Path) -> Result<File, StoreError> {
