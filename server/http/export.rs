@@ -1,6 +1,7 @@
 //! Exports for the researcher's browser, and the dictionary of what is in them.
 
 use askama::Template;
+use axum::body::Body;
 use axum::extract::{Path, Query, State};
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{Html, IntoResponse};
@@ -13,7 +14,7 @@ use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::roles::Researcher;
 use crate::ids::SessionId;
-use crate::store::export::{ExportError, TABLES, Table, export_zip, folder_name};
+use crate::store::export::{Export, ExportError, TABLES, TEXTS_IN_CSV, Table, ZipStream, folder_name};
 
 impl From<ExportError> for Error {
     fn from(error: ExportError) -> Self {
@@ -46,24 +47,31 @@ async fn zip(
     Path(session): Path<SessionId>,
     Query(query): Query<ExportQuery>,
 ) -> Result<impl IntoResponse, Error> {
-    let reader = app.conductor.reader().clone();
-    // It writes files, and would hold up the streams.
-    let work = move || Handle::current().block_on(export_zip(&reader, session, query.unblinded));
-    let zip = tokio::task::spawn_blocking(work).await.map_err(|_| Error::Internal)??;
-    let name = format!("attachment; filename=\"{}.zip\"", folder_name(session, query.unblinded));
-    Ok(([(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, name)], zip))
+    let name = folder_name(session, query.unblinded);
+    let export = Export::prepare(app.conductor.reader(), session, query.unblinded).await?;
+    let (zip, bytes) = ZipStream::new(name.clone());
+    // On a thread of its own: compressing would hold up the streams.
+    tokio::task::spawn_blocking(move || {
+        if let Err(error) = Handle::current().block_on(export.into_zip(zip)) {
+            tracing::warn!(%session, %error, "an export was cut off");
+        }
+    });
+    let disposition = format!("attachment; filename=\"{name}.zip\"");
+    let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
+    Ok((headers, Body::from_stream(bytes)))
 }
 
 #[derive(Template)]
 #[template(path = "dictionary.html")]
 struct Dictionary {
     tables: &'static [Table],
+    texts: &'static str,
 }
 
 /// The data dictionary: every table and column of an export, with its unit.
 #[utoipa::path(get, path = "/researcher/dictionary", tag = "researcher", responses((status = 200, description = "The page", content_type = "text/html")))]
 async fn dictionary(_: Researcher) -> Result<Html<String>, Error> {
-    Dictionary { tables: &TABLES }.render().map(Html).map_err(|_| Error::Internal)
+    Dictionary { tables: &TABLES, texts: TEXTS_IN_CSV }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 /// The routes of this file.

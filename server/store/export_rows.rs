@@ -39,7 +39,7 @@ impl Reader {
     pub(super) async fn export_telemetry<E: From<StoreError>>(
         &self,
         session: SessionId,
-        take: impl FnMut(Vec<Value>) -> Result<(), E>,
+        take: impl AsyncFnMut(Vec<Value>) -> Result<(), E>,
     ) -> Result<(), E> {
         // A hold for the policy's sake is left out: only learned ones take time to start and to think.
         let sql = "SELECT g.setting, t.run, t.frame, t.exposed_ns, t.asked, t.measured,
@@ -53,7 +53,7 @@ impl Reader {
     pub(super) async fn export_policy_steps<E: From<StoreError>>(
         &self,
         session: SessionId,
-        take: impl FnMut(Vec<Value>) -> Result<(), E>,
+        take: impl AsyncFnMut(Vec<Value>) -> Result<(), E>,
     ) -> Result<(), E> {
         let sql = "SELECT g.setting, t.run, t.frame, p.name, t.metric, t.policy_micros, t.latency_micros, t.held
              FROM segments AS g JOIN telemetry AS t ON t.segment = g.number LEFT JOIN policies AS p ON p.number = t.policy
@@ -65,7 +65,7 @@ impl Reader {
     pub(super) async fn export_weights<E: From<StoreError>>(
         &self,
         session: SessionId,
-        take: impl FnMut(Vec<Value>) -> Result<(), E>,
+        take: impl AsyncFnMut(Vec<Value>) -> Result<(), E>,
     ) -> Result<(), E> {
         let sql = "SELECT r.run, w.key AS policy, w.value AS sha256 FROM runs AS r, json_each(r.weights) AS w
              WHERE r.run IN (SELECT run FROM events WHERE session = ?1)
@@ -80,11 +80,11 @@ impl Reader {
         session: SessionId,
         sql: &'static str,
         read: fn(&SqliteRow) -> Result<Vec<Value>, StoreError>,
-        mut take: impl FnMut(Vec<Value>) -> Result<(), E>,
+        mut take: impl AsyncFnMut(Vec<Value>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut rows = sqlx::query(sql).bind(session.to_string()).fetch(self.pool());
         while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
-            take(read(&row)?)?;
+            take(read(&row)?).await?;
         }
         Ok(())
     }

@@ -5,11 +5,12 @@ use std::io::Read;
 use std::path::Path;
 use std::time::Duration;
 
+use futures_util::TryStreamExt;
 use parfocal::clock::Clock;
 use parfocal::control::{Hold, StepRecord};
 use parfocal::ids::SessionId;
 use parfocal::store::export::verify::{Check, Verdict, verify};
-use parfocal::store::export::{ExportError, export, export_zip};
+use parfocal::store::export::{Export, ExportError, ZipStream, export};
 use parfocal::store::{DeviceEvent, Reader, telemetry};
 use parfocal::trial::view::{Action, Role};
 use serde_json::Value;
@@ -223,7 +224,11 @@ async fn the_pages_zip_is_the_commands_folder() {
     let (bench, session) = with_session(data.path()).await;
     let out = data.path().join("export");
     export(bench.store.reader(), session, &out, false).await.unwrap();
-    let archive = export_zip(bench.conductor.reader(), session, false).await.unwrap();
+    let (zip, bytes) = ZipStream::new(format!("parfocal-{session}"));
+    let prepared = Export::prepare(bench.conductor.reader(), session, false).await.unwrap();
+    let (written, bytes) = tokio::join!(prepared.into_zip(zip), bytes.try_collect::<Vec<_>>());
+    written.unwrap();
+    let archive = bytes.unwrap().concat();
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(archive)).unwrap();
     assert_eq!(archive.len(), files(&out).len());
     for file in files(&out) {
@@ -231,6 +236,35 @@ async fn the_pages_zip_is_the_commands_folder() {
         archive.by_name(&format!("parfocal-{session}/{file}")).unwrap().read_to_end(&mut content).unwrap();
         assert!(content == std::fs::read(out.join(&file)).unwrap(), "{file}");
     }
+}
+
+#[tokio::test]
+async fn no_text_of_an_export_runs_as_a_formula_and_none_is_lost() {
+    let data = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(data.path()).await;
+    let session = bench.begin("paper").await;
+    let said = ["=1+1", "-3 dioptres too far", "@once", "\t=tab", "'=quoted", "sharp = good", "'quoted'"];
+    for text in said {
+        bench.say(text).await;
+    }
+    let out = data.path().join("export");
+    export(bench.store.reader(), session, &out, false).await.unwrap();
+
+    let cells: Vec<_> = rows(&out, "comments").into_iter().map(|row| row["text"].clone()).collect();
+    let expected = ["'=1+1", "'-3 dioptres too far", "'@once", "'\t=tab", "''=quoted", "sharp = good", "'quoted'"];
+    assert_eq!(cells, expected);
+    let told = json(&out, "session.json");
+    let told: Vec<_> = told["comments"].as_array().unwrap().iter().map(|comment| &comment["text"]).collect();
+    assert_eq!(told, said, "JSON has it as it was said");
+    assert!(json(&out, "datapackage.json")["description"].as_str().unwrap().contains("apostrophe"));
+    assert_eq!(failed(&verify(&out)), [""; 0]);
+
+    // As earlier versions wrote it: only the checksums tell of it.
+    let comments = std::fs::read_to_string(out.join("comments.csv")).unwrap();
+    std::fs::write(out.join("comments.csv"), comments.replace("'=1+1", "=1+1")).unwrap();
+    assert_eq!(failed(&verify(&out)), ["checksums"]);
+    std::fs::write(out.join("comments.csv"), comments.replace("'=1+1", "1+1")).unwrap();
+    assert_eq!(failed(&verify(&out)), ["checksums", "copies"]);
 }
 
 #[tokio::test]

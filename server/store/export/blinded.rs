@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::ExportError;
 use super::description::{ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS, TELEMETRY};
 use super::folder::Folder;
-use super::table::{FORMAT, Row, Table};
+use super::table::{FORMAT, Row, TEXTS_IN_CSV, Table};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
@@ -84,14 +84,14 @@ impl Blinded {
         ];
         let mut all = json!({});
         for (table, rows) in &tables {
-            folder.table(table, rows)?;
+            folder.table(table, rows).await?;
             all[table.name] = table.objects(rows);
         }
-        folder.json("session.json", &all)?;
-        folder.file("protocol.toml", self.protocol_toml.as_bytes())?;
+        folder.json("session.json", &all).await?;
+        folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
         let mut file = folder.begin(&TELEMETRY)?;
-        reader.export_telemetry(self.session(), |row| file.row(&row)).await?;
-        folder.end(&TELEMETRY, file)
+        reader.export_telemetry(self.session(), async |row| file.row(&row).await).await?;
+        file.end().await
     }
 
     /// The description of the whole, without its tables.
@@ -101,7 +101,7 @@ impl Blinded {
             "profile": "tabular-data-package",
             "name": name,
             "title": format!("Usability trial of autofocus policies: session {}", self.session()),
-            "description": "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json holds all tables but telemetry and policy_steps.",
+            "description": format!("Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json holds all tables but telemetry and policy_steps. {TEXTS_IN_CSV}"),
             "parfocal": {
                 "version": env!("CARGO_PKG_VERSION"),
                 "format": FORMAT,

@@ -1,54 +1,100 @@
-//! The folder being written: beside its place and under another name until it is whole.
+//! The files of an export as they are written: each described, with its checksum, whether they go to a folder or into a ZIP file.
 
-use std::fs::File;
-use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-use tempfile::TempDir;
 
 use super::ExportError;
-use super::table::{Row, Table, csv_cell};
-use crate::files::{sync_folder_of, write_through};
+use super::destination::{Destination, NewFolder, ZipStream};
+use super::table::{Column, Row, Table};
 
 /// Name of the file of checksums, in the form of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
 
-/// A folder being written.
+/// Bytes of a table that are gathered before they go on.
+const BLOCK: usize = 64 * 1024;
+
+/// An export being written.
 pub struct Folder {
-    temporary: TempDir,
-    files: Vec<String>,
+    destination: Destination,
+    /// Each file's name and SHA-256.
+    files: Vec<(String, String)>,
     resources: Vec<Value>,
 }
 
+/// A file that was written.
+struct Written {
+    sha256: String,
+    bytes: usize,
+}
+
 impl Folder {
-    /// A folder that is to be `out`, which must be new or empty.
+    /// An export to the folder `out`, which must be new or empty.
     pub fn beside(out: &Path) -> Result<Self, ExportError> {
-        let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
-        if out.is_dir() && std::fs::read_dir(out).map_err(unwritable)?.next().is_some() || out.is_file() {
-            return Err(ExportError::Exists(out.to_owned()));
-        }
-        let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        std::fs::create_dir_all(parent).map_err(unwritable)?;
-        let temporary = tempfile::Builder::new().prefix(".parfocal-export-").tempdir_in(parent).map_err(unwritable)?;
-        Ok(Self { temporary, files: Vec::new(), resources: Vec::new() })
+        Ok(Self::to(Destination::Folder(NewFolder::beside(out)?)))
+    }
+
+    /// An export into the ZIP file `zip`.
+    pub fn zipped(zip: ZipStream) -> Self {
+        Self::to(Destination::Zip(zip))
+    }
+
+    const fn to(destination: Destination) -> Self {
+        Self { destination, files: Vec::new(), resources: Vec::new() }
     }
 
     /// Begins the CSV file of `table`.
-    pub fn begin(&self, table: &Table) -> Result<CsvFile, ExportError> {
-        let path = self.path(&table.file());
-        let file = File::create(&path).map_err(|error| ExportError::Unwritable { path: path.clone(), error })?;
-        let mut file = CsvFile { path, writer: csv::Writer::from_writer(BufWriter::new(file)) };
-        file.record(table.header().map(str::to_owned))?;
+    pub fn begin<'a>(&'a mut self, table: &'a Table) -> Result<CsvFile<'a>, ExportError> {
+        let name = table.file();
+        self.destination.begin(&name)?;
+        let header: Vec<_> = table.header().map(str::to_owned).collect();
+        let mut file =
+            CsvFile { folder: self, table, name, csv: new_block(), sha256: Sha256::new(), bytes: 0, gathered: 0 };
+        file.record(&header)?;
         Ok(file)
     }
 
-    /// Ends the CSV file of `table`.
-    pub fn end(&mut self, table: &Table, file: CsvFile) -> Result<(), ExportError> {
-        file.end()?;
-        self.files.push(table.file());
-        let (hash, bytes) = self.hash(&table.file())?;
+    /// Writes `table` whole.
+    pub async fn table(&mut self, table: &Table, rows: &[Row]) -> Result<(), ExportError> {
+        let mut file = self.begin(table)?;
+        for row in rows {
+            file.row(row).await?;
+        }
+        file.end().await
+    }
+
+    /// Writes `content` as file `name`.
+    pub async fn file(&mut self, name: &str, content: &[u8]) -> Result<(), ExportError> {
+        self.destination.begin(name)?;
+        self.destination.write(name, content).await?;
+        self.destination.end(name)?;
+        self.files.push((name.to_owned(), hex::encode(Sha256::digest(content))));
+        Ok(())
+    }
+
+    /// Writes `value` as JSON file `name`.
+    pub async fn json(&mut self, name: &str, value: &Value) -> Result<(), ExportError> {
+        self.file(name, format!("{value:#}\n").as_bytes()).await
+    }
+
+    /// Writes the Frictionless description: `package` with the tables written so far.
+    pub async fn describe(&mut self, package: &Value) -> Result<(), ExportError> {
+        let mut package = package.clone();
+        package["resources"] = Value::Array(std::mem::take(&mut self.resources));
+        self.json("datapackage.json", &package).await
+    }
+
+    /// Writes the checksums and ends the whole. Its files come back.
+    pub async fn finish(mut self) -> Result<Vec<String>, ExportError> {
+        self.files.sort();
+        let sums: String = self.files.iter().map(|(file, sha256)| format!("{sha256}  {file}\n")).collect();
+        self.file(SUMS, sums.as_bytes()).await?;
+        self.destination.finish().await?;
+        Ok(self.files.into_iter().map(|(file, _)| file).collect())
+    }
+
+    fn tabulated(&mut self, table: &Table, file: Written) {
         self.resources.push(json!({
             "name": table.name,
             "description": table.description,
@@ -57,90 +103,68 @@ impl Folder {
             "format": "csv",
             "mediatype": "text/csv",
             "encoding": "utf-8",
-            "bytes": bytes,
-            "hash": format!("sha256:{hash}"),
+            "bytes": file.bytes,
+            "hash": format!("sha256:{}", file.sha256),
             "schema": table.schema(),
         }));
-        Ok(())
-    }
-
-    /// Writes `table` whole.
-    pub fn table(&mut self, table: &Table, rows: &[Row]) -> Result<(), ExportError> {
-        let mut file = self.begin(table)?;
-        for row in rows {
-            file.row(row)?;
-        }
-        self.end(table, file)
-    }
-
-    /// Writes `content` as file `name`.
-    pub fn file(&mut self, name: &str, content: &[u8]) -> Result<(), ExportError> {
-        let path = self.path(name);
-        write_through(&path, content).map_err(|error| ExportError::Unwritable { path, error })?;
-        self.files.push(name.to_owned());
-        Ok(())
-    }
-
-    /// Writes `value` as JSON file `name`.
-    pub fn json(&mut self, name: &str, value: &Value) -> Result<(), ExportError> {
-        self.file(name, format!("{value:#}\n").as_bytes())
-    }
-
-    /// Writes the Frictionless description: `package` with the tables written so far.
-    pub fn describe(&mut self, package: &Value) -> Result<(), ExportError> {
-        let mut package = package.clone();
-        package["resources"] = Value::Array(std::mem::take(&mut self.resources));
-        self.json("datapackage.json", &package)
-    }
-
-    /// Writes the checksums and puts the folder in its place. Its files come back.
-    pub fn finish(mut self, out: &Path) -> Result<Vec<String>, ExportError> {
-        self.files.sort();
-        let line = |file: &String| Ok(format!("{}  {file}\n", self.hash(file)?.0));
-        let sums = self.files.iter().map(line).collect::<Result<String, ExportError>>()?;
-        self.file(SUMS, sums.as_bytes())?;
-        sync_folder_of(&self.path(SUMS));
-        let whole = self.temporary.keep();
-        std::fs::rename(&whole, out).map_err(|error| {
-            // It is all that is left to do for it.
-            let _ = std::fs::remove_dir_all(&whole);
-            ExportError::Unwritable { path: out.to_owned(), error }
-        })?;
-        sync_folder_of(out);
-        Ok(self.files)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.temporary.path().join(name)
-    }
-
-    fn hash(&self, name: &str) -> Result<(String, usize), ExportError> {
-        let path = self.path(name);
-        let content = std::fs::read(&path).map_err(|error| ExportError::Unwritable { path, error })?;
-        Ok((hex::encode(Sha256::digest(&content)), content.len()))
+        self.files.push((table.file(), file.sha256));
     }
 }
 
 /// A CSV file being written.
-pub struct CsvFile {
-    path: PathBuf,
-    writer: csv::Writer<BufWriter<File>>,
+pub struct CsvFile<'a> {
+    folder: &'a mut Folder,
+    table: &'a Table,
+    name: String,
+    /// Rows that have not gone on yet.
+    csv: csv::Writer<Vec<u8>>,
+    /// At least the bytes in them.
+    gathered: usize,
+    sha256: Sha256,
+    bytes: usize,
 }
 
-impl CsvFile {
+impl CsvFile<'_> {
     /// Writes a row.
-    pub fn row(&mut self, row: &Row) -> Result<(), ExportError> {
-        self.record(row.iter().map(csv_cell))
+    pub async fn row(&mut self, row: &Row) -> Result<(), ExportError> {
+        let cells: Vec<_> =
+            self.table.columns.iter().zip(row).map(|(column, cell)| Column::csv(column, cell)).collect();
+        self.record(&cells)?;
+        if self.gathered >= BLOCK {
+            self.pass_on().await?;
+        }
+        Ok(())
     }
 
-    /// Waits until the disk has it.
-    fn end(mut self) -> Result<(), ExportError> {
-        let kept = self.writer.flush().and_then(|()| File::open(&self.path)).and_then(|file| file.sync_data());
-        kept.map_err(|error| ExportError::Unwritable { path: self.path, error })
+    /// Waits until all of it has gone on.
+    pub async fn end(mut self) -> Result<(), ExportError> {
+        self.pass_on().await?;
+        self.folder.destination.end(&self.name)?;
+        let written = Written { sha256: hex::encode(self.sha256.finalize()), bytes: self.bytes };
+        self.folder.tabulated(self.table, written);
+        Ok(())
     }
 
-    fn record(&mut self, cells: impl Iterator<Item = String>) -> Result<(), ExportError> {
-        let unwritable = |error: csv::Error| ExportError::Unwritable { path: self.path.clone(), error: error.into() };
-        self.writer.write_record(cells.collect::<Vec<_>>()).map_err(unwritable)
+    fn record(&mut self, cells: &[String]) -> Result<(), ExportError> {
+        let path = || Path::new(&self.name).to_owned();
+        let unwritable = |error: csv::Error| ExportError::Unwritable { path: path(), error: error.into() };
+        self.csv.write_record(cells).map_err(unwritable)?;
+        self.gathered += cells.iter().map(|cell| cell.len() + 1).sum::<usize>();
+        Ok(())
     }
+
+    async fn pass_on(&mut self) -> Result<(), ExportError> {
+        let block = std::mem::replace(&mut self.csv, new_block()).into_inner().map_err(|error| {
+            let error = std::io::Error::other(error.to_string());
+            ExportError::Unwritable { path: Path::new(&self.name).to_owned(), error }
+        })?;
+        self.gathered = 0;
+        self.sha256.update(&block);
+        self.bytes += block.len();
+        self.folder.destination.write(&self.name, &block).await
+    }
+}
+
+fn new_block() -> csv::Writer<Vec<u8>> {
+    csv::Writer::from_writer(Vec::with_capacity(BLOCK))
 }

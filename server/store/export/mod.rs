@@ -3,19 +3,20 @@
 
 mod blinded;
 mod description;
+mod destination;
 mod folder;
 mod table;
 mod unblinded;
 pub mod verify;
 mod verify_allocation;
 
-use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 pub use self::description::ALL as TABLES;
-pub use self::table::{Column, Table, Type};
+pub use self::destination::ZipStream;
+pub use self::table::{Column, TEXTS_IN_CSV, Table, Type};
 
 use self::blinded::Blinded;
 use self::folder::Folder;
@@ -68,19 +69,71 @@ pub enum ExportError {
     Store(#[from] StoreError),
 }
 
-/// Exports `session` into the folder `out`, which must be new or empty. The folder appears whole or not at all.
-///
-/// # Errors
-/// When there is no such session, it is asked for unblinded before it was, or `out` cannot be written.
-pub async fn export(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
-    // A session may be under way: what is said meanwhile is in all of the files or in none.
-    let snapshot = reader.snapshot().await?;
-    let outcome = write(&snapshot, session, out, unblinded).await;
-    snapshot.close().await;
-    outcome
+/// An export about to be written: a session as it stands at one moment.
+pub struct Export {
+    session: SessionId,
+    /// The database at that moment.
+    snapshot: Reader,
+    blinded: Blinded,
+    telling: Option<Unblinded>,
 }
 
-async fn write(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
+impl Export {
+    /// Reads what is exported of `session`, all but its telemetry.
+    ///
+    /// # Errors
+    /// When there is no such session, or it is asked for unblinded before it was.
+    pub async fn prepare(reader: &Reader, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
+        // A session may be under way: what is said meanwhile is in all of the files or in none.
+        let snapshot = reader.snapshot().await?;
+        match read(&snapshot, session, unblinded).await {
+            Ok((blinded, telling)) => Ok(Self { session, snapshot, blinded, telling }),
+            Err(error) => {
+                snapshot.close().await;
+                Err(error)
+            }
+        }
+    }
+
+    /// Writes the folder `out`, which must be new or empty. It appears whole or not at all.
+    ///
+    /// # Errors
+    /// When `out` cannot be written or the database fails.
+    pub async fn into_folder(self, out: &Path) -> Result<Summary, ExportError> {
+        let outcome = match Folder::beside(out) {
+            Ok(folder) => self.write(folder).await,
+            Err(error) => Err(error),
+        };
+        self.snapshot.close().await;
+        let (unblinded, practice) = (self.telling.is_some(), self.blinded.practice());
+        Ok(Summary { session: self.session, folder: out.to_owned(), unblinded, practice, files: outcome? })
+    }
+
+    /// Sends the same files into `zip`, no faster than they are taken, so that nothing gathers anywhere.
+    ///
+    /// # Errors
+    /// When they are no longer taken or the database fails; then the ZIP file is cut off.
+    pub async fn into_zip(self, zip: ZipStream) -> Result<(), ExportError> {
+        let outcome = self.write(Folder::zipped(zip)).await;
+        self.snapshot.close().await;
+        outcome.map(|_| ())
+    }
+
+    async fn write(&self, mut folder: Folder) -> Result<Vec<String>, ExportError> {
+        self.blinded.write(&self.snapshot, &mut folder).await?;
+        if let Some(telling) = &self.telling {
+            telling.write(&self.snapshot, &mut folder).await?;
+        }
+        folder.describe(&self.blinded.package(self.telling.is_some())).await?;
+        folder.finish().await
+    }
+}
+
+async fn read(
+    reader: &Reader,
+    session: SessionId,
+    unblinded: bool,
+) -> Result<(Blinded, Option<Unblinded>), ExportError> {
     let Some(stored) = reader.session(session).await? else {
         return Err(ExportError::NoSession { session, known: known_sessions(reader).await? });
     };
@@ -91,37 +144,15 @@ async fn write(reader: &Reader, session: SessionId, out: &Path, unblinded: bool)
         Some(Some(telling)) => Some(telling),
         None => None,
     };
-    let blinded = Blinded::of(reader, stored).await?;
-    let mut folder = Folder::beside(out)?;
-    blinded.write(reader, &mut folder).await?;
-    if let Some(telling) = &telling {
-        telling.write(reader, &mut folder).await?;
-    }
-    folder.describe(&blinded.package(telling.is_some()))?;
-    let files = folder.finish(out)?;
-    Ok(Summary { session, folder: out.to_owned(), unblinded, practice: blinded.practice(), files })
+    Ok((Blinded::of(reader, stored).await?, telling))
 }
 
-/// The same folder as one ZIP file, in memory; its files stand in a folder named after the session.
+/// Exports `session` into the folder `out`, which must be new or empty. The folder appears whole or not at all.
 ///
 /// # Errors
-/// As [`export`].
-pub async fn export_zip(reader: &Reader, session: SessionId, unblinded: bool) -> Result<Vec<u8>, ExportError> {
-    let unwritable = |error| ExportError::Unwritable { path: std::env::temp_dir(), error };
-    let temporary = tempfile::tempdir().map_err(unwritable)?;
-    let out = temporary.path().join("export");
-    let summary = export(reader, session, &out, unblinded).await?;
-    zip(&summary).map_err(|error| ExportError::Unwritable { path: out, error })
-}
-
-fn zip(summary: &Summary) -> std::io::Result<Vec<u8>> {
-    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
-    for file in &summary.files {
-        archive.start_file(format!("{}/{file}", folder_name(summary.session, summary.unblinded)), options)?;
-        archive.write_all(&std::fs::read(summary.folder.join(file))?)?;
-    }
-    Ok(archive.finish()?.into_inner())
+/// When there is no such session, it is asked for unblinded before it was, or `out` cannot be written.
+pub async fn export(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
+    Export::prepare(reader, session, unblinded).await?.into_folder(out).await
 }
 
 /// Name for an export of `session`, without an ending.

@@ -122,11 +122,74 @@ impl Column {
     }
 }
 
-/// A cell as CSV has it.
-pub fn csv_cell(cell: &Value) -> String {
+/// How texts stand in the CSV files, for the data dictionary.
+pub const TEXTS_IN_CSV: &str = "In the CSV files a text that a spreadsheet would run as a formula, one that begins with =, +, -, @, \
+    their full-width forms, a tab or a line break, has an apostrophe before it; so has one that begins with apostrophes and goes on like \
+    that. Take away one apostrophe to read it. session.json has every text as it is.";
+
+/// What a spreadsheet takes for the beginning of a formula, in itself or once it has dropped it (OWASP, "CSV Injection").
+const FORMULA: [char; 11] = ['=', '+', '-', '@', '＝', '＋', '－', '＠', '\t', '\r', '\n'];
+
+impl Column {
+    /// `cell` as the CSV files have it.
+    #[must_use]
+    pub fn csv(&self, cell: &Value) -> String {
+        match cell {
+            Value::String(text) if self.kind == Type::String && is_formula(text) => format!("'{text}"),
+            other => plain(other),
+        }
+    }
+
+    /// Whether a CSV file that has `csv` in this column tells of `cell`. Earlier versions left texts as they were.
+    #[must_use]
+    pub fn tells(&self, csv: &str, cell: &Value) -> bool {
+        csv == self.csv(cell) || csv == plain(cell)
+    }
+}
+
+/// Also one behind apostrophes: otherwise nobody could tell which of them were said.
+fn is_formula(text: &str) -> bool {
+    text.trim_start_matches('\'').starts_with(FORMULA)
+}
+
+fn plain(cell: &Value) -> String {
     match cell {
         Value::Null => String::new(),
         Value::String(text) => text.clone(),
         other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(kind: Type) -> Column {
+        Column { name: "text", kind, unit: "", description: "" }
+    }
+
+    #[test]
+    fn a_text_that_a_spreadsheet_would_run_gets_an_apostrophe() {
+        let text = column(Type::String);
+        for formula in ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1+1", "'=1", "''-"] {
+            assert_eq!(text.csv(&json!(formula)), format!("'{formula}"));
+        }
+        for harmless in ["", "sharp = good", "'quoted'", "1-2", " =1", "\"=1\""] {
+            assert_eq!(text.csv(&json!(harmless)), harmless);
+        }
+    }
+
+    #[test]
+    fn a_number_stays_a_number() {
+        assert_eq!(column(Type::Number).csv(&json!(-0.5)), "-0.5");
+        assert_eq!(column(Type::Integer).csv(&json!(-3)), "-3");
+        assert_eq!(column(Type::Number).csv(&Value::Null), "");
+    }
+
+    #[test]
+    fn cells_of_earlier_versions_are_known() {
+        let text = column(Type::String);
+        assert!(text.tells("'=1+1", &json!("=1+1")) && text.tells("=1+1", &json!("=1+1")));
+        assert!(!text.tells("'1+1", &json!("1+1")) && !text.tells("'=1+1", &json!("'=1+1 ")));
     }
 }

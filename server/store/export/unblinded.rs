@@ -32,14 +32,17 @@ impl Unblinded {
 
     /// Writes its files.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
-        folder.table(&ALLOCATION, &self.rows())?;
+        folder.table(&ALLOCATION, &self.rows()).await?;
+
         let mut file = folder.begin(&WEIGHTS)?;
-        reader.export_weights(self.made.session, |row| file.row(&row)).await?;
-        folder.end(&WEIGHTS, file)?;
+        reader.export_weights(self.made.session, async |row| file.row(&row).await).await?;
+        file.end().await?;
+
         let mut file = folder.begin(&POLICY_STEPS)?;
-        reader.export_policy_steps(self.made.session, |row| file.row(&row)).await?;
-        folder.end(&POLICY_STEPS, file)?;
-        folder.json("allocation.json", &self.json())
+        reader.export_policy_steps(self.made.session, async |row| file.row(&row).await).await?;
+        file.end().await?;
+
+        folder.json("allocation.json", &self.json()).await
     }
 
     fn rows(&self) -> Vec<Row> {

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::description::{ALL, ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS};
 use super::folder::SUMS;
-use super::table::{FORMAT, csv_cell};
+use super::table::FORMAT;
 use super::verify_allocation::{commitment, schedule};
 
 /// One thing checked.
@@ -178,7 +178,9 @@ fn copies(folder: &Path) -> Outcome {
         let mut reader = csv(folder, &file)?;
         let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(|error| format!("{file}: {error}"))?;
         let same = |object: &Value, row: &csv::StringRecord| {
-            table.columns_of(format).map(|column| csv_cell(&object[column.name])).eq(row.iter().map(str::to_owned))
+            let columns: Vec<_> = table.columns_of(format).collect();
+            row.len() == columns.len()
+                && columns.iter().zip(row).all(|(column, cell)| column.tells(cell, &object[column.name]))
         };
         if rows.len() != objects.len() || !objects.iter().zip(&rows).all(|(object, row)| same(object, row)) {
             return Err(differs());
