@@ -8,6 +8,8 @@ mod support;
 
 #[path = "http/blinding.rs"]
 mod blinding;
+#[path = "http/crowd.rs"]
+mod crowd;
 #[path = "http/disk.rs"]
 mod failing_disk;
 #[path = "http/finality.rs"]

@@ -51,6 +51,9 @@ pub enum Error {
         "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, start it with --bind 0.0.0.0:8080."
     )]
     WrongHost,
+    /// Members have no place left.
+    #[error("Too many pages are open at once. Close some of them, then try again.")]
+    Busy,
     /// Disk or database failed; nothing was acknowledged.
     #[error("Could not be saved: {0}")]
     Storage(String),
@@ -81,6 +84,7 @@ impl Error {
                 StatusCode::FORBIDDEN
             }
             Self::WrongHost => StatusCode::MISDIRECTED_REQUEST,
+            Self::Busy => StatusCode::SERVICE_UNAVAILABLE,
             Self::Storage(_) => StatusCode::INSUFFICIENT_STORAGE,
             Self::Unreadable(_) | Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
         }

@@ -15,6 +15,7 @@ mod metrics;
 mod mjpeg;
 mod openapi;
 mod operator;
+mod places;
 mod researcher;
 pub mod roles;
 pub mod security;

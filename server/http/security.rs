@@ -2,6 +2,7 @@
 //! that are not ours.
 
 use std::net::IpAddr;
+use std::sync::Arc;
 
 use axum::extract::{FromRequestParts, Request, State};
 use axum::http::header::{
@@ -15,6 +16,7 @@ use axum::response::{IntoResponse, Response};
 
 use super::AppState;
 use super::error::Error;
+use super::places::Place;
 
 /// The nonce that inline scripts and styles of this response must carry.
 #[derive(Debug, Clone)]
@@ -56,13 +58,17 @@ fn content_security_policy(nonce: &str) -> String {
     )
 }
 
-/// Turns away what another site asks for, and, on a loopback server, names that are not this machine's own: a site whose
+/// Gives the connection of a request that shows a key a member's place. Turns away what another site asks for, and, on a loopback server, names that are not this machine's own: a site whose
 /// name is made to point here (DNS rebinding) has no role's cookie, and gets not even a page that says so.
 pub async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
     if app.loopback_only && !is_loopback_name(host) {
         return Error::WrongHost.into_response();
+    }
+    let place = request.extensions().get::<Arc<Place>>();
+    if place.is_some_and(|place| place.admit(headers, &app.keys).is_err()) {
+        return Error::Busy.into_response();
     }
     let changes = !matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
     if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host) {

@@ -1,0 +1,202 @@
+//! Places: how many connections there may be, of one host and in all, and who gives way.
+//!
+//! A connection is a stranger until one of its requests shows a role's key or cookie; from then on it is a member's. Strangers
+//! and members have places of their own, so that no number of strangers takes a member's. Where strangers have no place left,
+//! the newest gets that of the oldest: who has a key shows it at once, who only wants to fill the places waits.
+
+use std::collections::BTreeMap;
+use std::net::{IpAddr, Ipv6Addr};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use axum::http::HeaderMap;
+use tokio::sync::oneshot;
+
+use super::keys::{Keys, ROLES};
+use super::roles::holds;
+
+/// How many connections there may be of a kind.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    /// Of one host.
+    host: usize,
+    /// In all.
+    all: usize,
+}
+
+/// A browser opens up to six connections, and several may stand behind one address.
+const STRANGERS: Room = Room { host: 32, all: 128 };
+
+/// Some fifteen pages of one host: each holds a WebSocket, and up to six more connections while it loads. With the strangers' and
+/// what the server itself has open, well below the 1,024 files that a process may usually have.
+const MEMBERS: Room = Room { host: 128, all: 512 };
+
+/// All places.
+#[derive(Clone, Default)]
+pub struct Places(Arc<Mutex<Taken>>);
+
+#[derive(Default)]
+struct Taken {
+    /// By number: the oldest comes first.
+    connections: BTreeMap<u64, Connection>,
+    next: u64,
+}
+
+struct Connection {
+    host: IpAddr,
+    member: bool,
+    /// Dropped to ask it to give way.
+    _stay: oneshot::Sender<()>,
+}
+
+/// A connection's place, given back when dropped.
+pub struct Place {
+    number: u64,
+    places: Places,
+}
+
+/// There is no place left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Full;
+
+impl Places {
+    /// A stranger's place for a connection from `address`. What comes with it ends when the connection must give way.
+    pub fn take(&self, address: IpAddr) -> (Place, oneshot::Receiver<()>) {
+        let host = host(address);
+        let mut taken = self.taken();
+        if taken.count(false, Some(host)) >= STRANGERS.host {
+            taken.remove_oldest_stranger(Some(host));
+        } else if taken.count(false, None) >= STRANGERS.all {
+            taken.remove_oldest_stranger(None);
+        }
+
+        let number = taken.next;
+        taken.next += 1;
+        let (stay, give_way) = oneshot::channel();
+        taken.connections.insert(number, Connection { host, member: false, _stay: stay });
+        (Place { number, places: self.clone() }, give_way)
+    }
+
+    fn taken(&self) -> MutexGuard<'_, Taken> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Taken {
+    fn count(&self, member: bool, host: Option<IpAddr>) -> usize {
+        let counts = |there: &&Connection| there.member == member && host.is_none_or(|host| there.host == host);
+        self.connections.values().filter(counts).count()
+    }
+
+    fn remove_oldest_stranger(&mut self, host: Option<IpAddr>) {
+        let gives_way = |there: &Connection| !there.member && host.is_none_or(|host| there.host == host);
+        let oldest = self.connections.iter().find(|(_, there)| gives_way(there)).map(|(number, _)| *number);
+        if let Some(oldest) = oldest {
+            self.connections.remove(&oldest);
+        }
+    }
+}
+
+impl Place {
+    /// Makes it a member's, if a request with `headers` shows one of `keys`.
+    ///
+    /// # Errors
+    /// When members have no place left.
+    pub fn admit(&self, headers: &HeaderMap, keys: &Keys) -> Result<(), Full> {
+        if self.is_members() || !ROLES.into_iter().any(|role| holds(headers, keys, role)) {
+            return Ok(());
+        }
+        self.make_members()
+    }
+
+    fn is_members(&self) -> bool {
+        self.places.taken().connections.get(&self.number).is_some_and(|there| there.member)
+    }
+
+    fn make_members(&self) -> Result<(), Full> {
+        let mut taken = self.places.taken();
+        let Some(there) = taken.connections.get(&self.number) else {
+            // It gave way in this moment.
+            return Err(Full);
+        };
+        if there.member {
+            return Ok(());
+        }
+        if taken.count(true, Some(there.host)) >= MEMBERS.host || taken.count(true, None) >= MEMBERS.all {
+            return Err(Full);
+        }
+        if let Some(there) = taken.connections.get_mut(&self.number) {
+            there.member = true;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.places.taken().connections.remove(&self.number);
+    }
+}
+
+/// Who counts as one: an address, or all of an IPv6 network, whose every address is one machine's for the asking.
+fn host(address: IpAddr) -> IpAddr {
+    const NETWORK: u128 = !0 << 64;
+    match address.to_canonical() {
+        IpAddr::V6(address) => IpAddr::V6(Ipv6Addr::from_bits(address.to_bits() & NETWORK)),
+        address @ IpAddr::V4(_) => address,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOST: IpAddr = IpAddr::V4(std::net::Ipv4Addr::new(192, 0, 2, 1));
+
+    fn gave_way(place: &mut (Place, oneshot::Receiver<()>)) -> bool {
+        place.1.try_recv() == Err(oneshot::error::TryRecvError::Closed)
+    }
+
+    #[test]
+    fn the_oldest_stranger_of_a_host_gives_way_and_a_member_never() {
+        let places = Places::default();
+        let mut member = places.take(HOST);
+        member.0.make_members().unwrap();
+        let mut strangers: Vec<_> = (0..=STRANGERS.host).map(|_| places.take(HOST)).collect();
+        assert!(gave_way(&mut strangers[0]) && !gave_way(&mut strangers[1]) && !gave_way(&mut member));
+        // One that left made room.
+        strangers.pop();
+        let _another = places.take(HOST);
+        assert!(!gave_way(&mut strangers[1]));
+    }
+
+    #[test]
+    fn strangers_of_many_hosts_have_room_for_so_many_in_all() {
+        let places = Places::default();
+        let host = |number: usize| IpAddr::from([10, 0, 0, u8::try_from(number / 30).unwrap()]);
+        let mut strangers: Vec<_> = (0..=STRANGERS.all).map(|number| places.take(host(number))).collect();
+        assert!(gave_way(&mut strangers[0]) && !gave_way(&mut strangers[1]));
+    }
+
+    #[test]
+    fn members_have_places_up_to_a_number() {
+        let places = Places::default();
+        let member = |_| {
+            let taken = places.take(HOST);
+            taken.0.make_members().unwrap();
+            taken
+        };
+        let _members: Vec<_> = (0..MEMBERS.host).map(member).collect();
+        let (one_more, _stay) = places.take(HOST);
+        assert_eq!(one_more.make_members(), Err(Full));
+        let (elsewhere, _stay_too) = places.take("198.51.100.7".parse().unwrap());
+        assert_eq!(elsewhere.make_members(), Ok(()));
+    }
+
+    #[test]
+    fn an_ipv6_network_counts_as_one_host_and_an_embedded_address_as_itself() {
+        let counts_as = |address: &str| host(address.parse().unwrap());
+        assert_eq!(counts_as("2001:db8::1"), counts_as("2001:db8::ffff:1"));
+        assert_ne!(counts_as("2001:db8::1"), counts_as("2001:db8:0:1::1"));
+        assert_eq!(counts_as("::ffff:192.0.2.1"), HOST);
+    }
+}
