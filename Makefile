@@ -8,7 +8,7 @@ ARGS ?=
 # GigE Vision and USB3 Vision are checked wherever their library is. Every check is built once, with it or without; `make run` needs neither.
 FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
 
-.PHONY: run test check lint unit readme bench fuzz
+.PHONY: run test check lint unit interface readme bench fuzz
 
 run:
 	@.ci/setup build
@@ -20,7 +20,7 @@ test:
 	@$(MAKE) --no-print-directory check
 
 # The checks alone, on a machine that is already set up.
-check: lint unit readme
+check: lint unit interface readme
 
 lint:
 	cargo fmt --check
@@ -29,6 +29,10 @@ lint:
 
 unit:
 	cargo test --locked $(FEATURES)
+
+# What HTTP answers, against its own description, as each role.
+interface:
+	.ci/schemathesis $(FEATURES)
 
 readme:
 	.ci/readme

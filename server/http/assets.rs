@@ -77,7 +77,7 @@ pub fn url(name: &str) -> String {
 /// A static file: a script, a style sheet, an icon.
 #[utoipa::path(get, path = "/static/{version}/{name}", tag = "assets",
     params(("version" = String, Path, description = "hash of all static files"), ("name" = String, Path, description = "file name")),
-    responses((status = 200, description = "The file"), (status = 404, description = "No such file", body = super::error::ErrorBody)))]
+    responses((status = 200, description = "The file"), (status = 304, description = "It is as the browser has it"), (status = 404, description = "No such file", body = super::error::ErrorBody)))]
 async fn asset(Path((version, name)): Path<(String, String)>, headers: HeaderMap) -> Result<Response, Error> {
     let asset = ASSETS
         .iter()

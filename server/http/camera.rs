@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
 use super::roles::Operator;
 use super::{App, AppState};
 use crate::camera::{CameraOffer, ControlError, Setting};
@@ -34,7 +35,11 @@ struct Change {
     (status = 409, description = "The camera does not offer this setting now", body = ErrorBody),
     (status = 422, description = "Outside the camera's bounds", body = ErrorBody),
     (status = 507, description = "The camera was asked, but the log could not be written", body = ErrorBody)))]
-async fn change(_: Operator, State(app): State<AppState>, Json(change): Json<Change>) -> Result<StatusCode, Error> {
+async fn change(
+    _: Operator,
+    State(app): State<AppState>,
+    JsonBody(change): JsonBody<Change>,
+) -> Result<StatusCode, Error> {
     let Change { setting, value } = change;
     let asked = app.control.camera.as_ref().map_or(Err(ControlError::NotOffered), |camera| camera.ask(setting, value));
     asked.map_err(|error| match error {

@@ -6,6 +6,7 @@ mod connections;
 pub mod error;
 mod export;
 mod health;
+mod json;
 pub mod keys;
 mod links;
 mod live;
@@ -65,7 +66,7 @@ pub fn router(app: AppState) -> Router {
         .merge(assets::routes())
         .merge(openapi::routes())
         .split_for_parts();
-    let _ = document.set(api.to_json().unwrap_or_default());
+    let _ = document.set(openapi::document(api).unwrap_or_default());
     // From the outside in.
     let layers = ServiceBuilder::new()
         .layer(TraceLayer::new_for_http().make_span_with(span))

@@ -6,23 +6,145 @@ use axum::Extension;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use utoipa::OpenApi;
+use utoipa::openapi::path::Operation;
+use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityRequirement, SecurityScheme};
+use utoipa::openapi::{Components, Content, Ref, RefOr, Response, ResponseBuilder};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::error::Error;
-use super::roles::Roles;
+use super::error::{Error, ErrorBody, role_name};
+use super::keys::ROLES;
+use super::roles::{Roles, cookie_name};
 
 /// What the document says of the server as a whole.
 #[derive(OpenApi)]
-#[openapi(info(
-    title = "parfocal",
-    description = "Live view, autofocus control and blinded usability trials of a hyperspectral video exoscope. A role \
+#[openapi(
+    info(
+        title = "parfocal",
+        description = "Live view, autofocus control and blinded usability trials of a hyperspectral video exoscope. A role \
                    is shown by the cookie that /enter gives, or by its key as a bearer token."
-))]
+    ),
+    components(schemas(ErrorBody))
+)]
 pub struct Document;
 
 /// The finished document, filled in once every route is known.
 pub type Finished = Arc<OnceLock<String>>;
+
+/// What answers without a key.
+const OPEN: [&str; 3] = ["/enter", "/healthz", "/static/{version}/{name}"];
+
+/// What any request may be answered, whoever asks for what.
+const ALWAYS: [(&str, &str); 5] = [
+    ("400", "The request cannot be read"),
+    ("408", "It took too long"),
+    ("421", "The server listens on a loopback address and was asked for by another name"),
+    ("500", "The server failed; its log says more"),
+    ("503", "Too many pages are open at once"),
+];
+
+/// What a request with a body may be answered.
+const WITH_BODY: [(&str, &str); 3] = [
+    ("413", "The body is too long"),
+    ("415", "The body is not said to be application/json"),
+    ("422", "The body is JSON, but not as described"),
+];
+
+/// The scheme of a key that a program sends.
+const KEY: &str = "key";
+
+/// Limits that a derived schema cannot state: where, which, what.
+const LIMITS: [(&str, &str, Limit); 8] = [
+    ("Focus/oneOf/0", "additionalProperties", Limit::None),
+    ("Focus/oneOf/1", "additionalProperties", Limit::None),
+    ("Focus/oneOf/0/properties/focal_power", "minimum", Limit::Number(0)),
+    ("Focus/oneOf/0/properties/focal_power", "maximum", Limit::Number(1)),
+    ("Said/oneOf/0/properties/text", "pattern", Limit::Text(NOT_BLANK)),
+    ("Said/oneOf/1/properties/text", "pattern", Limit::Text(NOT_BLANK)),
+    ("AnswerValue/oneOf/0", "maximum", Limit::Number(u8::MAX)),
+    ("AnswerValue/oneOf/1/items", "maximum", Limit::Number(u8::MAX)),
+];
+
+/// A text that is more than blanks.
+const NOT_BLANK: &str = r"\S";
+
+/// What a limit is.
+enum Limit {
+    /// There are no others.
+    None,
+    Number(u8),
+    Text(&'static str),
+}
+
+/// The whole document.
+pub fn document(mut api: utoipa::openapi::OpenApi) -> serde_json::Result<String> {
+    complete(&mut api);
+    let mut document = serde_json::to_value(api)?;
+    for (schema, name, limit) in &LIMITS {
+        if let Some(schema) = document.pointer_mut(&format!("/components/schemas/{schema}")) {
+            schema[*name] = match limit {
+                Limit::None => false.into(),
+                Limit::Number(number) => (*number).into(),
+                Limit::Text(text) => (*text).into(),
+            };
+        }
+    }
+    serde_json::to_string(&document)
+}
+
+/// Adds to every operation what its handler does not decide, and so does not describe: what the layers around it may answer, and
+/// how a role is shown.
+fn complete(api: &mut utoipa::openapi::OpenApi) {
+    for (path, item) in &mut api.paths.paths {
+        for operation in [&mut item.get, &mut item.post].into_iter().flatten() {
+            for (status, words) in around(path, operation) {
+                let responses = &mut operation.responses.responses;
+                responses.entry(status.to_owned()).or_insert_with(|| RefOr::T(failure(words)));
+            }
+            if !OPEN.contains(&path.as_str()) {
+                operation.security = Some(shown_by(operation));
+            }
+        }
+    }
+
+    let components = api.components.get_or_insert_with(Components::new);
+    components.add_security_scheme(KEY, SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer)));
+    for role in ROLES {
+        let cookie = ApiKey::Cookie(ApiKeyValue::new(cookie_name(role)));
+        components.add_security_scheme(role_name(role), SecurityScheme::ApiKey(cookie));
+    }
+}
+
+/// What the layers around the handler of `operation` may answer.
+fn around(path: &str, operation: &Operation) -> Vec<(&'static str, &'static str)> {
+    let mut statuses = ALWAYS.to_vec();
+    if !OPEN.contains(&path) {
+        statuses.push(("403", "The role is not held, or another site made the request"));
+    }
+    if operation.request_body.is_some() {
+        statuses.extend(WITH_BODY);
+    }
+    if path.contains("researcher") || path.starts_with("/api/operator") || path.starts_with("/api/surgeon") {
+        statuses.push(("507", "The disk or the database failed; nothing was changed"));
+    }
+    statuses
+}
+
+/// A failure, as a program gets it and as a browser on its way to a page does.
+fn failure(words: &str) -> Response {
+    let json = Content::new(Some(Ref::from_schema_name("ErrorBody")));
+    let page = Content::default();
+    ResponseBuilder::new().description(words).content("application/json", json).content("text/html", page).build()
+}
+
+/// The ways to show a role that may ask for `operation`: that of its tag, or any.
+fn shown_by(operation: &Operation) -> Vec<SecurityRequirement> {
+    let tags = operation.tags.iter().flatten();
+    let its_own = ROLES.into_iter().find(|role| tags.clone().any(|tag| tag == role_name(*role)));
+    let roles = its_own.map_or_else(|| ROLES.to_vec(), |role| vec![role]);
+    let schemes = std::iter::once(KEY).chain(roles.into_iter().map(role_name));
+    schemes.map(|scheme| SecurityRequirement::new(scheme, [] as [&str; 0])).collect()
+}
 
 /// This document.
 #[utoipa::path(get, path = "/api/openapi.json", tag = "service", responses((status = 200, description = "OpenAPI 3.1")))]

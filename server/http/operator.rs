@@ -12,6 +12,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
 use super::roles::{Operator, Roles};
 use super::security::Nonce;
 use super::surgeon::Act;
@@ -103,9 +104,13 @@ enum Focus {
 /// Lets a policy focus, or sets the focal power by hand. Not while a session is under way.
 #[utoipa::path(post, path = "/api/operator/focus", tag = "operator", request_body = Focus, responses(
     (status = 204, description = "Done"),
-    (status = 409, description = "A session is under way, or the policy cannot run", body = ErrorBody),
-    (status = 422, description = "No such focal power or policy", body = ErrorBody)))]
-async fn focus(_: Operator, State(app): State<AppState>, Json(focus): Json<Focus>) -> Result<StatusCode, Error> {
+    (status = 404, description = "No such policy", body = ErrorBody),
+    (status = 409, description = "A session is under way, or the policy cannot run", body = ErrorBody)))]
+async fn focus(
+    _: Operator,
+    State(app): State<AppState>,
+    JsonBody(focus): JsonBody<Focus>,
+) -> Result<StatusCode, Error> {
     if app.blinded() {
         return Err(Error::Conflict("A session is under way: it decides who focuses until it is closed.".into()));
     }
@@ -124,7 +129,7 @@ fn policy(app: &App, name: &str) -> Result<Drive, Error> {
     let name = PolicyName::new(name);
     match app.registry.build(&name) {
         Ok(_) => Ok(Drive::Policy { name, start: None }),
-        Err(error @ PolicyError::Unknown { .. }) => Err(Error::Invalid(error.to_string())),
+        Err(error @ PolicyError::Unknown { .. }) => Err(Error::NotFound(error.to_string())),
         Err(error) => Err(Error::Conflict(error.to_string())),
     }
 }
@@ -133,6 +138,7 @@ fn policy(app: &App, name: &str) -> Result<Drive, Error> {
 #[derive(Debug, Deserialize, ToSchema)]
 struct NewParticipant {
     /// 2 to 16 capital letters, digits and dashes; never a name.
+    #[schema(pattern = r"^[A-Z0-9\-]{2,16}$")]
     code: String,
 }
 
@@ -142,7 +148,7 @@ struct NewParticipant {
 async fn add_participant(
     _: Operator,
     State(app): State<AppState>,
-    Json(new): Json<NewParticipant>,
+    JsonBody(new): JsonBody<NewParticipant>,
 ) -> Result<Json<Vec<String>>, Error> {
     app.conductor.add_participant(Role::Operator, &new.code).await?;
     codes(&app).await.map(Json)
@@ -170,7 +176,7 @@ async fn session(_: Operator, State(app): State<AppState>) -> View {
     (status = 200, body = Option<OperatorView>),
     (status = 404, description = "No such participant or protocol", body = ErrorBody),
     (status = 409, description = "A session is under way", body = ErrorBody)))]
-async fn create(_: Operator, State(app): State<AppState>, Json(new): Json<NewSession>) -> Result<View, Error> {
+async fn create(_: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewSession>) -> Result<View, Error> {
     app.conductor.create(Role::Operator, &new.participant, &new.protocol).await?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
@@ -182,7 +188,7 @@ async fn create(_: Operator, State(app): State<AppState>, Json(new): Json<NewSes
     (status = 404, description = "No such session or segment", body = ErrorBody),
     (status = 422, description = "No reason was given", body = ErrorBody),
     (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
-async fn act(_: Operator, State(app): State<AppState>, Json(act): Json<Act>) -> Result<View, Error> {
+async fn act(_: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
     app.conductor.act(Role::Operator, act.session, act.action).await?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
@@ -197,7 +203,7 @@ struct Dismissal {
 /// Takes an ended session off the screens, so that the next can be prepared.
 #[utoipa::path(post, path = "/api/operator/dismissals", tag = "operator", request_body = Dismissal, responses(
     (status = 200, body = Option<OperatorView>), (status = 409, description = "It is under way", body = ErrorBody)))]
-async fn dismiss(_: Operator, State(app): State<AppState>, Json(gone): Json<Dismissal>) -> Result<View, Error> {
+async fn dismiss(_: Operator, State(app): State<AppState>, JsonBody(gone): JsonBody<Dismissal>) -> Result<View, Error> {
     app.conductor.dismiss(Role::Operator, gone.session).await?;
     Ok(Json(app.operator_view.borrow().clone()))
 }

@@ -15,6 +15,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
 use super::roles::Researcher;
 use super::security::Nonce;
 use crate::autofocus::PolicyName;
@@ -188,6 +189,7 @@ async fn timeline(
 #[derive(Debug, Deserialize, ToSchema)]
 struct Unblind {
     /// Kept in the audit trail.
+    #[schema(pattern = r"\S")]
     reason: String,
     /// Whether to do it though something may be outstanding, which would then not count any more.
     #[serde(default)]
@@ -205,7 +207,7 @@ async fn unblind(
     _: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
-    Json(Unblind { reason, despite_outstanding }): Json<Unblind>,
+    JsonBody(Unblind { reason, despite_outstanding }): JsonBody<Unblind>,
 ) -> Result<StatusCode, Error> {
     app.conductor.act(Role::Researcher, id, Action::Unblind { reason, despite_outstanding }).await?;
     Ok(StatusCode::NO_CONTENT)

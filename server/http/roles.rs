@@ -88,7 +88,8 @@ pub(super) fn holds(headers: &HeaderMap, keys: &Keys, role: Role) -> bool {
         || bearer(headers).is_some_and(|key| keys.role_of(key) == Some(role))
 }
 
-const fn cookie_name(role: Role) -> &'static str {
+/// The cookie that shows `role`.
+pub(super) const fn cookie_name(role: Role) -> &'static str {
     match role {
         Role::Surgeon => "parfocal-surgeon",
         Role::Operator => "parfocal-operator",

@@ -13,6 +13,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
 use super::roles::Surgeon;
 use super::security::Nonce;
 use crate::ids::SessionId;
@@ -54,7 +55,7 @@ pub(super) struct Act {
     (status = 403, description = "Another role does this", body = ErrorBody),
     (status = 404, description = "No such session or segment", body = ErrorBody),
     (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
-async fn act(_: Surgeon, State(app): State<AppState>, Json(act): Json<Act>) -> Result<View, Error> {
+async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
     app.conductor.act(Role::Surgeon, act.session, act.action).await?;
     Ok(Json(app.surgeon_view.borrow().clone()))
 }
@@ -69,7 +70,7 @@ async fn act(_: Surgeon, State(app): State<AppState>, Json(act): Json<Act>) -> R
 async fn comment(
     _: Surgeon,
     State(app): State<AppState>,
-    Json(comment): Json<NewComment>,
+    JsonBody(comment): JsonBody<NewComment>,
 ) -> Result<StatusCode, Error> {
     app.conductor.comment(comment).await?;
     Ok(StatusCode::NO_CONTENT)
@@ -83,7 +84,11 @@ async fn comment(
     (status = 409, description = "It has not been asked yet, or the key stands for another answer", body = ErrorBody),
     (status = 422, description = "The value does not fit the question", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
-async fn answer(_: Surgeon, State(app): State<AppState>, Json(answer): Json<NewAnswer>) -> Result<StatusCode, Error> {
+async fn answer(
+    _: Surgeon,
+    State(app): State<AppState>,
+    JsonBody(answer): JsonBody<NewAnswer>,
+) -> Result<StatusCode, Error> {
     app.conductor.answer(answer).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -93,7 +98,11 @@ async fn answer(_: Surgeon, State(app): State<AppState>, Json(answer): Json<NewA
     (status = 204, description = "Noted"),
     (status = 404, description = "No such session", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
-async fn holding(_: Surgeon, State(app): State<AppState>, Json(holding): Json<Holding>) -> Result<StatusCode, Error> {
+async fn holding(
+    _: Surgeon,
+    State(app): State<AppState>,
+    JsonBody(holding): JsonBody<Holding>,
+) -> Result<StatusCode, Error> {
     app.conductor.holding(holding).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -258,6 +258,7 @@ pub enum Action {
     /// Operator: hold everything.
     Pause {
         /// Why.
+        #[schema(pattern = r"\S")]
         reason: String,
     },
     /// Operator, or surgeon after a restart of the server: go on.
@@ -265,11 +266,13 @@ pub enum Action {
     /// Operator: end now.
     Abort {
         /// Why.
+        #[schema(pattern = r"\S")]
         reason: String,
     },
     /// Researcher: tell which policies ran. On a session still under way this is emergency unblinding.
     Unblind {
         /// Why.
+        #[schema(pattern = r"\S")]
         reason: String,
         /// Whether to do it though what a surgeon's device still holds would then not count any more.
         #[serde(default)]

@@ -160,6 +160,47 @@ async fn every_endpoint_is_described() {
 }
 
 #[tokio::test]
+async fn what_the_layers_answer_and_what_the_server_refuses_is_described() {
+    let server = Server::start();
+    let request = server.get_as("operator", "/api/openapi.json");
+    let document: Value = request.send().await.unwrap().json().await.unwrap();
+    let post = &document["paths"]["/api/operator/participants"]["post"];
+    for status in ["200", "400", "403", "408", "413", "415", "421", "422", "500", "503", "507"] {
+        assert!(post["responses"][status]["description"].is_string(), "{status}");
+    }
+    assert_eq!(post["security"], serde_json::json!([{"key": []}, {"operator": []}]));
+    assert_eq!(document["components"]["securitySchemes"]["operator"]["name"], "parfocal-operator");
+    assert!(document["paths"]["/healthz"]["get"]["responses"]["403"].is_null());
+
+    // Each limit stands where the schema that it limits is.
+    let schemas = &document["components"]["schemas"];
+    assert_eq!(schemas["Focus"]["oneOf"][0]["properties"]["focal_power"]["type"], "number");
+    assert_eq!(schemas["Focus"]["oneOf"][0]["properties"]["focal_power"]["maximum"], 1);
+    for either in [0, 1] {
+        assert_eq!(schemas["Focus"]["oneOf"][either]["additionalProperties"], false);
+    }
+    for said in [0, 1] {
+        assert_eq!(schemas["Said"]["oneOf"][said]["properties"]["text"]["pattern"], "\\S");
+    }
+    assert_eq!(schemas["AnswerValue"]["oneOf"][0]["type"], "integer");
+    assert_eq!(schemas["AnswerValue"]["oneOf"][1]["items"]["maximum"], 255);
+}
+
+#[tokio::test]
+async fn a_whole_number_may_be_written_with_a_point() {
+    let server = Server::start();
+    let unknown = "00000000-0000-4000-8000-000000000000";
+    let send = async |frame: &str| {
+        let comment = format!(r#"{{"key": "{unknown}", "session": "{unknown}", "frame": {frame}, "kind": "mark"}}"#);
+        let request = server.post_as("surgeon", "/api/surgeon/comments").header(CONTENT_TYPE, "application/json");
+        request.body(comment).send().await.unwrap().status()
+    };
+    // There is no such session: that far it is read.
+    assert_eq!(send("7.0").await, StatusCode::NOT_FOUND);
+    assert_eq!(send("7.5").await, StatusCode::UNPROCESSABLE_ENTITY);
+}
+
+#[tokio::test]
 async fn counters_are_told_to_prometheus_without_naming_a_policy() {
     let server = Server::start();
     let response = server.get_as("operator", "/metrics").send().await.unwrap();
