@@ -14,7 +14,7 @@ use tch::{Device, Kind, Tensor, nn};
 
 use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
 use super::registration::{CHANGES, changes};
-use super::spectrum::{FEATURES, Spectrum, features, spectrum};
+use super::spectrum::{FEATURES, SHARPNESS, Spectrum, features, spectrum};
 use super::weights::{self, WeightsError};
 use super::{Decision, IN_FOCUS, Observation, Policy};
 use crate::imaging::Patch;
@@ -27,12 +27,54 @@ pub const LEAST_MOVE: f64 = 0.02;
 const ASSURANCE: f64 = 0.85;
 /// Focal power a frame that looking takes at least: enough for a change of blur to show, and not out of focus by itself.
 const LOOK: f64 = 0.06;
+/// Focal power that a test of the belief moves the lens by.
+const TEST: f64 = 0.1;
+
+/// Changes of focal power below this are no move.
+const STILL: f32 = 0.005;
 
 /// What the tracker remembers of the frame before.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
     last: Option<Box<Frame>>,
     asked: Option<f32>,
+    stand: Stand,
+}
+
+/// How sharp the picture has been since the lens last moved.
+#[derive(Debug, Clone, Copy, Default)]
+struct Stand {
+    /// Frames since then.
+    frames: u32,
+    /// The logarithm of the mean gradient magnitude, smoothed over a few frames.
+    sharpness: f32,
+    /// The greatest that has been.
+    sharpest: f32,
+}
+
+impl Stand {
+    /// Share of the smoothed sharpness that each frame brings.
+    const FRESH: f32 = 0.3;
+    /// Frames that the lens may stand still though the picture gets worse: a second at the 25 frames a second of scans.
+    const PATIENCE: u32 = 25;
+    /// How much worse, as a difference of logarithms.
+    const LOSS: f32 = 0.15;
+
+    /// Takes in a frame of `sharpness`, before which the lens `moved` or did not.
+    fn see(&mut self, sharpness: f32, moved: bool) {
+        if moved {
+            *self = Self { frames: 0, sharpness, sharpest: sharpness };
+            return;
+        }
+        self.frames += 1;
+        self.sharpness += Self::FRESH * (sharpness - self.sharpness);
+        self.sharpest = self.sharpest.max(self.sharpness);
+    }
+
+    /// Whether the lens has stood still long enough, while the picture got worse, for the belief to be put to the test.
+    fn is_doubtful(&self) -> bool {
+        self.frames >= Self::PATIENCE && self.sharpest - self.sharpness > Self::LOSS
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -51,6 +93,8 @@ impl Trace {
         let focal_power = focal_power as f32;
         let now = Box::new(Frame { patch: *patch, spectrum, features, focal_power });
         let before = self.last.as_ref().unwrap_or(&now);
+        let moved = self.last.is_none() || (focal_power - before.focal_power).abs() > STILL;
+        self.stand.see(features[SHARPNESS], moved);
         let mut input = [0.0; BELIEF_INPUT];
         let (appearance, rest) = input.split_at_mut(FEATURES);
         appearance.copy_from_slice(&features);
@@ -74,7 +118,12 @@ impl Trace {
     #[must_use]
     pub fn aim(&self, focal_power: f64, belief: &[f32]) -> f64 {
         let blind = self.last.as_ref().is_some_and(|frame| !frame.spectrum.shows_detail());
-        if blind { focal_power } else { target(focal_power, belief) }
+        if blind {
+            return focal_power;
+        }
+        let aim = target(focal_power, belief);
+        let stands = (aim - focal_power).abs() < f64::from(STILL);
+        if stands && self.stand.is_doubtful() { look_aside(focal_power, belief) } else { aim }
     }
 
     /// Notes the focal power that was asked for after the frame.
@@ -125,6 +174,20 @@ pub fn best(belief: &[f32]) -> f64 {
     }
     let top = (0..PLACES).max_by(|&a, &b| values[a].total_cmp(&values[b]));
     top.unwrap_or(PLACES / 2) as f64 / (PLACES - 1) as f64
+}
+
+/// A place [`TEST`] away from `focal_power` to test the belief at: on the side where the optimum is likelier under `belief`, or on the
+/// other where the range ends.
+fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
+    let (mut below, mut above) = (0.0, 0.0);
+    for (bin, share) in belief.iter().enumerate() {
+        let side = if (bin as f64 / (BINS - 1) as f64) < focal_power { &mut below } else { &mut above };
+        *side += f64::from(*share);
+    }
+    let fits = |up: bool| if up { focal_power + TEST <= 1.0 } else { focal_power >= TEST };
+    let likelier = above > below;
+    let up = if fits(likelier) { likelier } else { !likelier };
+    if up { focal_power + TEST } else { focal_power - TEST }
 }
 
 /// Where to go from `focal_power` under `belief` (see [`best`]): to the best place, at most [`MAX_MOVE`] a frame and not for less than
@@ -239,6 +302,25 @@ mod tests {
         assert!((target(0.5, &certain(0.9)) - 0.6).abs() < 1e-12);
         assert!((target(0.5, &certain(0.51)) - 0.5).abs() < 1e-12);
         assert!((target(0.5, &certain(0.45)) - 0.45).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_belief_is_tested_when_the_picture_gets_worse_while_the_lens_stands() {
+        let stripes =
+            |contrast: f32| Patch(std::array::from_fn(|i| 128.0 + if i % 8 < 4 { contrast } else { -contrast }));
+        let mut trace = Trace::default();
+        let mut aims = |contrast: f32, frames: usize| -> Vec<f64> {
+            let aim = |_| {
+                trace.input(&stripes(contrast), 0.5);
+                trace.aim(0.5, &certain(0.5))
+            };
+            (0..frames).map(aim).collect()
+        };
+        // As sharp as ever: it stands, for ever so long.
+        assert!(aims(40.0, 200).iter().all(|aim| (aim - 0.5).abs() < 1e-9));
+        // A third less sharp: once that shows, it looks aside.
+        let after = aims(27.0, 10);
+        assert!((after[0] - 0.5).abs() < 1e-9 && (after[9] - 0.5).abs() > 0.05, "{after:?}");
     }
 
     #[test]

@@ -22,6 +22,8 @@ use crate::imaging::{PATCH_SIDE, Patch};
 const BANDS: usize = 14;
 /// Values [`features`] gives: the bands, contrast, mean gradient magnitude, mean local ratio, brightness.
 pub const FEATURES: usize = BANDS + 4;
+/// Which of [`features`] is the logarithm of the mean gradient magnitude.
+pub const SHARPNESS: usize = BANDS + 1;
 /// Columns of the transform that a real patch needs: frequencies 0..=16; padded to whole vectors.
 const COLUMNS: usize = 24;
 const HALF: usize = PATCH_SIDE / 2;
@@ -106,7 +108,7 @@ pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
         out[band] = 0.25 * ((energy[band] / TABLES.count[band] + ROUNDING).ln() - 9.0);
     }
     out[BANDS] = 0.5 * ((spectrum.variance + 0.1).ln() - 5.0);
-    out[BANDS + 1] = ((mgm(patch) + 0.5).ln() - 3.5) as f32;
+    out[SHARPNESS] = ((mgm(patch) + 0.5).ln() - 3.5) as f32;
     out[BANDS + 2] = 0.5 * ((mlr(patch) - 1.0 + 1e-4).ln() as f32 + 3.5);
     out[BANDS + 3] = (spectrum.mean - 128.0) / 64.0;
     out

@@ -27,9 +27,9 @@ use crate::training::stack_bench::{FIRST_SEED, SEEDS, StackSource, bench};
 #[derive(Debug, clap::Args)]
 #[command(group = ArgGroup::new("destination").multiple(true))]
 pub struct Arguments {
-    /// Which scans: `simulated`, the reference benchmark; `phantom`, recorded over the phantom as an arm would; or the folder
+    /// Which scans: `simulated`, the reference benchmark; `relief`, the one over scenes with relief; `phantom`, recorded over the phantom as an arm would; or the folder
     /// of a recorded scan.
-    #[arg(long, value_name = "simulated|phantom|DIR", default_value = "simulated")]
+    #[arg(long, value_name = "simulated|relief|phantom|DIR", default_value = "simulated")]
     scans: String,
     /// What a recorded scan shows between two of its focal powers.
     #[arg(long, value_enum, default_value_t)]
@@ -248,6 +248,10 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     if !arguments.footage.is_empty() {
         return Err("--footage makes simulated scans; leave out --scans".into());
     }
+    if arguments.scans == "relief" {
+        let (seed, count) = (arguments.seed(), arguments.count.unwrap_or(COUNT));
+        return Ok(Scans { set: Box::new(Benchmark { seed, ..Benchmark::relief(count)? }), seed, between: None });
+    }
     let between = Some(arguments.between);
     let recorded = |scans| Box::new(Recorded { scans, between: arguments.between });
     if arguments.scans == "phantom" {
@@ -261,7 +265,7 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     let folder = Path::new(&arguments.scans);
     if !folder.is_dir() {
         return Err(format!(
-            "there are no scans '{0}'; use simulated, phantom or a recorded scan's folder",
+            "there are no scans '{0}'; use simulated, relief, phantom or a recorded scan's folder",
             arguments.scans
         )
         .into());

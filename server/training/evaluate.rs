@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::clip::ClipError;
 use super::pictures::{Split, reference};
+use super::planes::PlanesError;
+use super::relief;
 use super::rollout::{FocalTimeScan, NoTarget, Path, PathFigures, roll_out, roll_out_oracle};
 use super::scan::{Scan, ScanSettings, Scene};
 use super::statistics::{Method, SignedRank, bootstrap_interval, deviation, holm, mean, wilcoxon};
@@ -21,6 +23,8 @@ pub const ORACLE: &str = "oracle";
 pub const FRAMES: usize = 250;
 /// Scans of the reference benchmark.
 pub const COUNT: usize = 200;
+/// Scenes of the reference benchmark with relief: each takes up to 12 MB.
+const RELIEFS: usize = 100;
 /// Seed of the reference benchmark.
 pub const SEED: u64 = 2023;
 
@@ -74,6 +78,17 @@ impl Benchmark {
         let scenes = reference(Split::Test, count.min(COUNT) as u64)?.into_iter().map(Scene::Flat).collect();
         let conditions = Conditions::Fitting;
         Ok(Self { scenes, conditions, seed: SEED, count, frames: FRAMES })
+    }
+
+    /// The first `count` scans of the reference benchmark with relief: over scenes whose places lie at different distances, seen
+    /// through lenses whose best picture is soft.
+    ///
+    /// # Errors
+    /// None in practice: its scenes are large enough.
+    pub fn relief(count: usize) -> Result<Self, PlanesError> {
+        let scenes =
+            relief::deep_scenes(Split::Test, count.min(RELIEFS) as u64)?.into_iter().map(Scene::Stack).collect();
+        Ok(Self { scenes, conditions: Conditions::Fitting, seed: SEED, count, frames: FRAMES })
     }
 
     /// Scan `index`, at its beginning.

@@ -370,7 +370,7 @@ fn digitise(patch: &mut Patch) {
 
 /// Nearly normal, mean 0 and variance 1: the sum of four uniform bytes, good enough for camera noise and ten times as
 /// fast as an exact draw.
-fn cheap_normal(rng: &mut impl Rng) -> f32 {
+pub(super) fn cheap_normal(rng: &mut impl Rng) -> f32 {
     let sum: i32 = rng.random::<u32>().to_le_bytes().iter().map(|&byte| i32::from(byte)).sum();
     (sum - 510) as f32 * (1.0 / 147.8)
 }
@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn over_a_stack_the_patch_is_sharpest_at_the_optimum() {
-        let stack = Arc::new(crate::training::relief::scene(crate::training::pictures::Split::Training, 1).unwrap());
+        let stack = crate::training::relief::scenes(crate::training::pictures::Split::Training, 1).unwrap().remove(0);
         let mut sharper = 0;
         let mut seen = 0;
         for seed in 0..20 {
@@ -418,7 +418,8 @@ mod tests {
 
     #[test]
     fn optics_take_back_what_they_give() {
-        let stack = crate::training::relief::scene(crate::training::pictures::Split::Training, 1).unwrap();
+        let stack = crate::training::relief::scenes(crate::training::pictures::Split::Training, 1).unwrap().remove(0);
+        let stack = StackScene::clone(&stack);
         let photographed = StackScene { photographed: true, slopes: (8.0, 8.0), ..stack.clone() };
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for scene in [stack, photographed] {
