@@ -250,7 +250,8 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     }
     if arguments.scans == "relief" {
         let (seed, count) = (arguments.seed(), arguments.count.unwrap_or(COUNT));
-        return Ok(Scans { set: Box::new(Benchmark { seed, ..Benchmark::relief(count)? }), seed, between: None });
+        let set = Benchmark { seed, ..Benchmark::relief(count)? };
+        return Ok(Scans { set: Box::new(PartOf::new(set, part)), seed, count, between: None });
     }
     let between = Some(arguments.between);
     let recorded = |scans| Box::new(Recorded { scans, between: arguments.between });
