@@ -115,6 +115,39 @@ fn picture(folder: &Path, name: &str, side: u32) -> PathBuf {
 }
 
 #[test]
+fn trainings_are_compared_by_what_their_folders_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let (short, long) = (folder.path().join("short"), folder.path().join("long"));
+    let run = |updates: u64, path: &Path| begin(&small("mgm-learned", updates), path);
+    let mut complete = run(LEG, &short);
+    assert!(complete.go(&SystemClock, &|| false, &mut |_| ()).unwrap());
+    complete.report().unwrap();
+    assert!(!train(run(2 * LEG, &long), 1));
+
+    let [first, second] = [&short, &long].map(|path| path.to_str().unwrap());
+    let output = parfocal(&["train", "--compare", first, second]);
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        output.status.success() && table.starts_with("| run | policy | dqn.updates | validate_every | seed |"),
+        "{table}"
+    );
+    assert!(table.contains(&format!("| {second} | mgm-learned | 200 | 200 | 7 | 100 of 200 | – | – | – |")), "{table}");
+
+    let output = parfocal(&["train", "--compare", first, second, "--json"]);
+    let runs: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&runs[0]["seed"], &runs[0]["updates"], &runs[1]["of"]), (&7.into(), &LEG.into(), &200.into()));
+    let mae = runs[0]["benchmark"]["mae"].as_f64().unwrap();
+    let card = std::fs::read_to_string(short.join("MODEL_CARD.md")).unwrap();
+    assert!(card.contains(&format!("(seed 2023): mean absolute focal power error {mae:.4} ")), "{card}");
+
+    let nothing = parfocal(&["train", "--compare", folder.path().to_str().unwrap()]);
+    assert!(String::from_utf8_lossy(&nothing.stderr).contains("holds no training that was saved"));
+    for wrong in [["train", "parfocal"].as_slice(), &["train"], &["train", "parfocal", "--compare", first]] {
+        assert_eq!(parfocal(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+#[test]
 fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
     let folder = tempfile::tempdir().unwrap();
     let (first, other) = (picture(folder.path(), "first.png", 80), picture(folder.path(), "other.png", 90));

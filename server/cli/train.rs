@@ -11,6 +11,7 @@ use crate::autofocus::networks::compute_on_this_thread;
 use crate::clock::SystemClock;
 use crate::notices::tell;
 use crate::training::asked::Asked;
+use crate::training::comparison::{TrainedRun, markdown};
 use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
 use crate::training::run::{LEG, Progress, Run};
 
@@ -26,6 +27,20 @@ enum Compute {
 /// What to train, and where to.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
+    #[command(flatten)]
+    training: Option<Training>,
+    /// Tabulate the trainings in these run folders in place of training: recipe, seed, updates, best validation, benchmark.
+    #[arg(long, value_name = "DIR", num_args = 1.., required_unless_present = "policy", conflicts_with = "Training")]
+    compare: Vec<PathBuf>,
+    /// With --compare, print JSON.
+    #[arg(long, requires = "compare")]
+    json: bool,
+}
+
+/// One training.
+#[derive(Debug, clap::Args)]
+#[group(id = "Training")]
+struct Training {
     /// `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`; with `-paper` behind one of the first three, by the
     /// paper's recipe; `cnn-learned-refined` and `parfocal-refined`: what follows these, with `--from` their weights.
     policy: String,
@@ -61,6 +76,18 @@ pub struct Arguments {
 /// # Errors
 /// When recipe, footage, folder or checkpoint are unusable.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.training {
+        Some(training) => train(training),
+        None => compare(&arguments.compare, arguments.json),
+    }
+}
+
+fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
+    let runs = folders.iter().map(|folder| TrainedRun::read(folder)).collect::<Result<Vec<_>, _>>()?;
+    print(&if json { serde_json::to_string(&runs)? + "\n" } else { markdown(&runs) })
+}
+
+fn train(arguments: &Training) -> Result<(), Failure> {
     compute_on_this_thread();
     let device = device(arguments.device)?;
     let mut run = if arguments.resume { resume(arguments, device)? } else { begin(arguments, device)? };
@@ -122,7 +149,7 @@ fn device(compute: Compute) -> Result<tch::Device, Failure> {
     }
 }
 
-fn begin(arguments: &Arguments, device: tch::Device) -> Result<Run, Failure> {
+fn begin(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
     let unknown = || format!("nothing trains '{}'; there are recipes for {}", arguments.policy, names().join(", "));
     let mut recipe = match own_recipe(arguments)? {
         Some(recipe) => recipe,
@@ -135,7 +162,7 @@ fn begin(arguments: &Arguments, device: tch::Device) -> Result<Run, Failure> {
     Ok(Run::begin(recipe, seed, &arguments.footage, &arguments.out, from, device)?)
 }
 
-fn resume(arguments: &Arguments, device: tch::Device) -> Result<Run, Failure> {
+fn resume(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
     let asked = Asked {
         name: arguments.policy.clone(),
         recipe: own_recipe(arguments)?,
@@ -147,7 +174,7 @@ fn resume(arguments: &Arguments, device: tch::Device) -> Result<Run, Failure> {
 }
 
 /// The recipe in the file that `--config` names.
-fn own_recipe(arguments: &Arguments) -> Result<Option<Recipe>, Failure> {
+fn own_recipe(arguments: &Training) -> Result<Option<Recipe>, Failure> {
     let Some(file) = &arguments.config else { return Ok(None) };
     let text =
         std::fs::read_to_string(file).map_err(|error| format!("cannot read the recipe {}: {error}", file.display()))?;

@@ -172,6 +172,18 @@ impl Checkpoint<'static> {
     /// # Errors
     /// When the file cannot be read or is damaged.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
+        Self::open(path, true)
+    }
+
+    /// Reads the notes alone of what [`Checkpoint::write`] wrote: a replay memory is large.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is damaged.
+    pub fn read_notes(path: &Path) -> Result<Self, CheckpointError> {
+        Self::open(path, false)
+    }
+
+    fn open(path: &Path, with_arrays: bool) -> Result<Self, CheckpointError> {
         let failed = |source: io::Error| CheckpointError::File { path: path.to_owned(), source };
         let damaged = |reason: String| CheckpointError::Damaged { path: path.to_owned(), reason };
         let cut = |error: io::Error| match error.kind() {
@@ -195,7 +207,7 @@ impl Checkpoint<'static> {
             return Err(damaged("it is cut short or has something behind it".to_owned()));
         }
         let mut arrays = BTreeMap::new();
-        for name in header.offset_keys() {
+        for name in header.offset_keys().into_iter().filter(|_| with_arrays) {
             let Some(info) = header.info(&name) else { continue };
             let mut bytes = vec![0; info.data_offsets.1 - info.data_offsets.0];
             file.read_exact(&mut bytes).map_err(cut)?;
@@ -227,6 +239,8 @@ mod tests {
         let mut back = Checkpoint::read(&path).unwrap();
         assert_eq!((back.take_bytes("a").unwrap(), back.floats("b").unwrap()), (patches, vec![0.5, -2.0]));
         assert_eq!(back.number::<u64>("updates").unwrap(), 3);
+        let notes = Checkpoint::read_notes(&path).unwrap();
+        assert_eq!((notes.number::<u64>("updates").unwrap(), notes.floats("b").is_err()), (3, true));
         // Anyone may read it who may read the rest of the run folder.
         let mode =
             |path: &Path| std::os::unix::fs::PermissionsExt::mode(&std::fs::metadata(path).unwrap().permissions());
@@ -251,8 +265,10 @@ mod tests {
             &[whole.clone(), whole.clone()].concat(),
         ] {
             std::fs::write(&path, damaged).unwrap();
-            let error = Checkpoint::read(&path).unwrap_err().to_string();
-            assert!(error.contains("a.safetensors is damaged"), "{error}");
+            for read in [Checkpoint::read, Checkpoint::read_notes] {
+                let error = read(&path).unwrap_err().to_string();
+                assert!(error.contains("a.safetensors is damaged"), "{error}");
+            }
         }
         let error = checkpoint.floats("c").unwrap_err().to_string();
         assert!(error.contains("'c' is missing"), "{error}");

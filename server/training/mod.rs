@@ -4,6 +4,7 @@ pub mod asked;
 pub mod belief;
 pub mod checkpoint;
 pub mod clip;
+pub mod comparison;
 mod cover;
 mod curves;
 pub mod defocus;

@@ -9,6 +9,7 @@ use tch::Device;
 
 use super::asked::Asked;
 use super::checkpoint::Checkpoint;
+use super::comparison::{BENCHMARK, BenchmarkFigures};
 use super::curves::{self, Point};
 use super::error::TrainError;
 use super::evaluate::{Benchmark, Conditions, FRAMES, Outcome, Row, evaluate};
@@ -242,6 +243,9 @@ impl Run {
         let weights = beginning(self.design, &self.folder.path().join(self.weights_file()))?;
         let benchmark = Benchmark::reference(count).map_err(|error| TrainError::Recipe(error.to_string()))?;
         let row = self.figures(weights, &benchmark)?;
+        let figures = serde_json::to_vec_pretty(&BenchmarkFigures::new(&row, count)).unwrap_or_default();
+        self.folder.write(BENCHMARK, &figures)?;
+        // Last: a card with these figures says that all is done.
         self.folder.write(CARD, model_card::benchmarked(&card, &row, count).as_bytes())
     }
 
