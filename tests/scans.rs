@@ -6,6 +6,8 @@
 mod bench;
 #[path = "scans/evaluation.rs"]
 mod evaluation;
+#[path = "scans/from_stack.rs"]
+mod from_stack;
 #[path = "scans/import.rs"]
 mod import;
 

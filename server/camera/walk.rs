@@ -24,11 +24,11 @@ impl Walk {
     /// A walk within `low..=high` from a uniformly drawn place, at a velocity from the stationary distribution.
     pub fn new(range: (f64, f64), motion: Motion, rng: &mut impl Rng) -> Self {
         let position = range.0 + (range.1 - range.0) * rng.random::<f64>();
-        Self::starting_at(position, range, motion, rng)
+        Self::starting(position, range, motion, rng)
     }
 
-    /// A walk within `low..=high` from `position`, which lies there, at a velocity from the stationary distribution.
-    pub fn starting_at(position: f64, range: (f64, f64), motion: Motion, rng: &mut impl Rng) -> Self {
+    /// A walk within `low..=high` from `position`, at a velocity from the stationary distribution.
+    pub fn starting(position: f64, range: (f64, f64), motion: Motion, rng: &mut impl Rng) -> Self {
         Self { position, velocity: motion.speed * standard_normal(rng), range, motion }
     }
 

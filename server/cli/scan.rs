@@ -1,5 +1,6 @@
 //! `parfocal scan`: recorded focal-time scans, recorded, looked at and imported.
 
+mod from_stack;
 mod import;
 mod info;
 mod record;
@@ -23,6 +24,8 @@ enum Action {
     Info(info::Arguments),
     /// Make a scan of a folder of pictures named like `pose0001_f0.350.png`.
     Import(import::Arguments),
+    /// Make a scan of a focal stack: pictures of one still scene in order of focus.
+    FromStack(from_stack::Arguments),
 }
 
 /// Does what the arguments say.
@@ -34,6 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Action::Record(arguments) => record::run(arguments),
         Action::Info(arguments) => info::run(arguments),
         Action::Import(arguments) => import::run(arguments),
+        Action::FromStack(arguments) => from_stack::run(arguments),
     }
 }
 

@@ -176,7 +176,9 @@ pub fn levels_at(picture: &GrayImage, area: PatchArea) -> [u8; PIXELS] {
     })
 }
 
-fn as_patch(levels: &[u8; PIXELS]) -> Patch {
+/// Gray levels as a patch.
+#[must_use]
+pub fn as_patch(levels: &[u8; PIXELS]) -> Patch {
     Patch(levels.map(f32::from))
 }
 

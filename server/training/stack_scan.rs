@@ -67,7 +67,7 @@ impl StackCourse {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut walk = |range: (f64, f64), motion: Motion, start: Option<f64>| -> Vec<f64> {
             let start = start.unwrap_or_else(|| rng.random_range(range.0..=range.1));
-            let mut walk = Walk::starting_at(start, range, motion, &mut rng);
+            let mut walk = Walk::starting(start, range, motion, &mut rng);
             let step = |_| {
                 let position = walk.position();
                 walk.advance(&mut rng);

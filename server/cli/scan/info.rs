@@ -7,9 +7,14 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Failure, bar, print};
-use crate::camera::recorded::{Damage, ScanFolder, poses};
+use crate::camera::recorded::{Damage, Image, ScanFolder, poses};
 use crate::files::replace;
+use crate::training::focal_stack::{FocalStack, Plane};
 use crate::training::plot;
+use crate::training::stack_optics::Optics;
+
+/// Most poses whose focus curves are shown.
+const SHOWN: usize = 3;
 
 /// Arguments of `parfocal scan info`.
 #[derive(Debug, clap::Args)]
@@ -40,6 +45,8 @@ struct Info {
     height: usize,
     bytes: u64,
     optimum: Optimum,
+    /// What the optic does, where poses have enough focal powers to tell.
+    optics: Option<Optics>,
     deviation: Option<Deviation>,
     missing: Vec<usize>,
     damaged: Vec<String>,
@@ -108,6 +115,7 @@ fn info(scan: &ScanFolder, bytes: u64, damages: &[Damage]) -> Info {
         height: first.map_or(0, |pose| pose.height),
         bytes,
         optimum: optimum(&path(scan)),
+        optics: if damages.is_empty() { optics_of(scan) } else { None },
         deviation: deviation(scan),
         missing: scan.missing(),
         damaged: damages.iter().map(|damage| damage.file.clone()).collect(),
@@ -173,10 +181,61 @@ fn text(info: &Info) -> String {
         rows.push(("missing", poses(&info.missing)));
     }
     rows.push(("damaged", if info.damaged.is_empty() { "none".to_owned() } else { info.damaged.join(", ") }));
-    rows.into_iter().fold(String::new(), |mut text, (name, value)| {
+    let mut text = table(&rows);
+    if let Some(found) = &info.optics {
+        text.push_str(&optics(found, "focal power"));
+    }
+    text
+}
+
+fn table(rows: &[(&str, String)]) -> String {
+    rows.iter().fold(String::new(), |mut text, (name, value)| {
         let _ = writeln!(text, "{name:<14}{value}");
         text
     })
+}
+
+/// What an optic does, in lines; `unit` is what the pictures' positions are.
+pub(super) fn optics(optics: &Optics, unit: &str) -> String {
+    let mut rows = Vec::new();
+    if let Some(blur) = optics.blur_per_unit {
+        rows.push(("blur", format!("grows by {blur:.3} pixels a unit of {unit}")));
+    }
+    if let Some(softness) = optics.softness {
+        rows.push(("at its best", format!("blurred by {softness:.1} pixels")));
+    }
+    if let Some(growth) = optics.magnification {
+        rows.push(("magnification", format!("changes by {:+.2} % from the first {unit} to the last", 100.0 * growth)));
+    }
+    let mut text = table(&rows);
+    for place in &optics.places {
+        let name = format!("{},{}", place.x, place.y);
+        let _ = writeln!(text, "{name:<14}{} sharpest at {unit} {:.3}", bars(&place.sharpness), place.best);
+    }
+    text
+}
+
+/// A curve as a line of bars, from 0 to its greatest value.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "one of eight bars")]
+fn bars(curve: &[f64]) -> String {
+    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let most = curve.iter().copied().fold(1e-9, f64::max);
+    curve.iter().map(|value| BARS[((7.99 * value / most) as usize).min(7)]).collect()
+}
+
+/// What some poses show of the optic.
+fn optics_of(scan: &ScanFolder) -> Option<Optics> {
+    let poses: Vec<_> = scan.poses().values().collect();
+    let shown = poses.iter().step_by(poses.len().div_ceil(SHOWN).max(1));
+    let stacks = shown.filter_map(|pose| {
+        let plane = |image: &Image| {
+            let picture = scan.picture(pose, image).ok()?;
+            Some(Plane { name: image.file.clone(), position: image.focal_power.get(), picture })
+        };
+        FocalStack::new(pose.images.iter().map(plane).collect::<Option<_>>()?).ok()
+    });
+    let found: Vec<Optics> = stacks.map(|stack| Optics::of(&stack)).collect();
+    (!found.is_empty()).then(|| Optics::together(found))
 }
 
 /// The optimum over the poses in black, the truth behind it where it is known.

@@ -1,11 +1,13 @@
 //! Recording a focal-time scan: pose by pose, each at every focal power in random order, until all poses are stored.
 
 mod devices;
+mod from_stack;
 mod import;
 mod import_error;
 mod phantom;
 
 pub use devices::{Devices, Stepper, StepperError};
+pub use from_stack::{Cut, CutError, Window, from_stack, windows};
 pub use import::{Imported, import};
 pub use import_error::ImportError;
 pub use phantom::PhantomBench;

@@ -1,0 +1,110 @@
+//! `parfocal scan from-stack`: pictures of one still scene in order of focus as a scan.
+
+use std::path::PathBuf;
+
+use sha2::{Digest, Sha256};
+
+use super::{Failure, bar, info, print};
+use crate::camera::recorded::{LEAST_SIDE, MOST_POSES};
+use crate::notices::tell;
+use crate::training::evaluate::SEED;
+use crate::training::focal_stack::FocalStack;
+use crate::training::recording::{Cut, from_stack};
+use crate::training::stack_check::check;
+use crate::training::stack_optics::Optics;
+
+/// Poses unless it is said otherwise: 20 s at 25 a second.
+const POSES: usize = 500;
+/// Most planes that a pose sees unless it is said otherwise: as far apart as the paper's step.
+const PLANES: usize = 21;
+
+/// Arguments of `parfocal scan from-stack`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of pictures of one still scene, each at another position of focus: the one number in which their names differ,
+    /// else the order of the names.
+    folder: PathBuf,
+    /// Folder of the scan; new, or one that the same command began.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// List of the pictures and their positions, a line `name,position` each, in the place of the names' numbers.
+    #[arg(long, value_name = "FILE")]
+    list: Option<PathBuf>,
+    /// Planes that each pose sees, less than the stack has; about half of them, 21 at most, if not said.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(3..=1000))]
+    planes: Option<u16>,
+    /// Width and height in pixels of the window that drifts over the stack.
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = parse_size)]
+    size: usize,
+    /// Make the pictures smaller by means of blocks of S x S pixels.
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
+    scale: u8,
+    /// Number of poses.
+    #[arg(long, value_name = "N", default_value_t = POSES, value_parser = parse_poses)]
+    poses: usize,
+    /// Seed of the window's and the optimum's walks.
+    #[arg(long, value_name = "N", default_value_t = SEED)]
+    seed: u64,
+}
+
+/// Makes the scan.
+///
+/// # Errors
+/// When the pictures are no focal stack, or the scan cannot be stored.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let stack = FocalStack::load(&arguments.folder, arguments.list.as_deref(), arguments.scale.into())?;
+    for note in check(&stack)? {
+        tell(format_args!("note: {note}"));
+    }
+    let taken = stack.planes().len();
+    let (even, gaps) = stack.even()?;
+    if gaps > 0 {
+        tell(format_args!(
+            "note: {gaps} of {} planes were not taken and are mixed from their neighbours",
+            taken + gaps
+        ));
+    }
+
+    let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy();
+    let cut = Cut {
+        name: format!("{folder} at scale {} ({:.12})", arguments.scale, digest(&even)),
+        planes: arguments.planes.map_or((even.planes().len() / 2 + 1).min(PLANES), usize::from),
+        size: arguments.size,
+        poses: arguments.poses,
+        seed: arguments.seed,
+    };
+    let progress = bar(cut.poses, 0);
+    from_stack(&even, &cut, &arguments.out, &|| progress.inc(1))?;
+    progress.finish_and_clear();
+
+    let (width, height) = stack.size();
+    let out = arguments.out.display();
+    print(&format!(
+        "{taken} pictures of {width}x{height} pixels\n{}{} poses of {} planes in {out}; look at them with `parfocal scan info {out}`\n",
+        info::optics(&Optics::of(&stack), "position"),
+        cut.poses,
+        cut.planes,
+    ))
+}
+
+/// A checksum of what the stack shows, so that another one is not taken for it.
+fn digest(stack: &FocalStack) -> String {
+    let mut hash = Sha256::new();
+    for plane in stack.planes() {
+        hash.update(plane.position.to_le_bytes());
+        plane.picture.data.iter().for_each(|level| hash.update(level.to_le_bytes()));
+    }
+    hex::encode(hash.finalize())
+}
+
+fn parse_size(text: &str) -> Result<usize, String> {
+    text.parse()
+        .ok()
+        .filter(|size| (LEAST_SIDE..=4096).contains(size))
+        .ok_or_else(|| "must be from 64 to 4096".to_owned())
+}
+
+fn parse_poses(text: &str) -> Result<usize, String> {
+    let inside = text.parse().ok().filter(|poses| (1..=MOST_POSES).contains(poses));
+    inside.ok_or_else(|| format!("must be from 1 to {MOST_POSES}"))
+}

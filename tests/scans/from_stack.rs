@@ -1,0 +1,81 @@
+//! A focal stack made into a scan: what is no stack is refused, the scan is one that policies can be evaluated on.
+
+use parfocal::imaging::{GrayImage, gaussian_blur};
+use parfocal::training::texture::texture;
+
+use super::*;
+
+/// Saves 13 pictures of a texture, sharpest in the seventh, 5 pixels of blur over the whole range, but those in `gaps`.
+fn stack(folder: &Path, gaps: &[usize]) {
+    fs::create_dir_all(folder).unwrap();
+    let sharp = texture(8, 200);
+    for index in (0..13).filter(|index| !gaps.contains(index)) {
+        let blur = 5.0 / 12.0 * (f64::from(u8::try_from(index).unwrap()) - 6.0).abs();
+        save(&gaussian_blur(&sharp, blur), &folder.join(format!("plane {index}.png")));
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels")]
+fn save(picture: &GrayImage, path: &Path) {
+    let levels = picture.data.iter().map(|level| level.round() as u8).collect();
+    let (width, height) = (picture.width.try_into().unwrap(), picture.height.try_into().unwrap());
+    image::GrayImage::from_raw(width, height, levels).unwrap().save(path).unwrap();
+}
+
+#[test]
+fn a_focal_stack_becomes_a_scan_that_policies_can_be_evaluated_on() {
+    let folder = TempDir::new().unwrap();
+    let (pictures, out) = (folder.path().join("pictures"), folder.path().join("scan"));
+    stack(&pictures, &[3]);
+    let arguments = ["scan", "from-stack", text(&pictures), "--out", text(&out), "--size", "96", "--poses", "60"];
+    let output = parfocal(&arguments);
+    assert!(output.status.success(), "{}", complaint(&output));
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("note: 1 of 13 planes were not taken and are mixed from their neighbours"), "{told}");
+    assert!(said(&output).contains("sharpest at position 6.000"), "{}", said(&output));
+    let stored = contents(&out);
+    assert!(parfocal(&arguments).status.success());
+    assert!(contents(&out) == stored, "the same command goes on, here with nothing");
+
+    let output = parfocal(&["scan", "info", text(&out), "--json"]);
+    let info: Value = serde_json::from_str(&said(&output)).unwrap();
+    assert_eq!((&info["poses"], &info["width"], &info["simulated"]), (&60.into(), &96.into(), &false.into()));
+    assert_eq!(info["focal_powers"].as_array().unwrap().len(), 7);
+    // 7 of 13 planes are half of the range, so half of the blur.
+    let blur = info["optics"]["blur_per_unit"].as_f64().unwrap();
+    assert!((blur / 2.5 - 1.0).abs() < 0.2, "{blur}");
+    assert!(info["optimum"]["max"].as_f64().unwrap() > info["optimum"]["min"].as_f64().unwrap());
+
+    let output = parfocal(&["evaluate", "--scans", text(&out), "--policies", "mgm-hill-climber", "--json"]);
+    let report: Value = serde_json::from_str(&said(&output)).unwrap();
+    let mae = |row: usize| report["rows"][row]["mae"].as_f64().unwrap();
+    assert!(mae(0) < 0.1 && mae(1) < 0.2, "{report}");
+}
+
+#[test]
+fn what_is_no_focal_stack_is_refused_before_anything_is_written() {
+    let folder = TempDir::new().unwrap();
+    let (pictures, out) = (folder.path().join("pictures"), folder.path().join("scan"));
+    stack(&pictures, &[]);
+    let told = |more: &[&str]| {
+        let output = parfocal(&[&["scan", "from-stack", text(&pictures), "--out", text(&out)], more].concat());
+        assert!(!out.exists(), "{}", said(&output));
+        complaint(&output)
+    };
+    assert!(told(&["--planes", "13"]).contains("give --planes at most 12"));
+    assert!(told(&["--size", "256"]).contains("does not fit into pictures of 200x200"));
+    assert!(told(&["--scale", "2"]).contains("does not fit into pictures of 100x100"));
+
+    let list = folder.path().join("list.csv");
+    fs::write(&list, "name,position\nplane 0.png,0\nplane 1.png,1\n").unwrap();
+    assert!(told(&["--list", text(&list)]).contains("at least 5 pictures at different positions, and here are 2"));
+    fs::write(&list, "plane 0.png,0\nplane 1.png\n").unwrap();
+    assert!(told(&["--list", text(&list)]).contains("line 2 must be a file's name, a comma and a position"));
+    let shuffled = [6, 0, 7, 1, 8, 2, 9, 3, 10, 4, 11, 5, 12];
+    let lines = (0..).zip(shuffled).map(|(position, index)| format!("plane {index}.png,{position}\n"));
+    fs::write(&list, lines.collect::<String>()).unwrap();
+    assert!(told(&["--list", text(&list)]).contains("not in order of focus"));
+
+    save(&texture(8, 100), &pictures.join("plane 13.png"));
+    assert!(told(&[]).contains("a stack's pictures are all of one size"));
+}
