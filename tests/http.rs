@@ -18,7 +18,11 @@ mod finality;
 mod live;
 #[path = "http/privacy.rs"]
 mod privacy;
+#[path = "http/restart.rs"]
+mod restart;
 #[path = "http/roles.rs"]
 mod roles;
 #[path = "http/service.rs"]
 mod service;
+#[path = "http/stopping.rs"]
+mod stopping;

@@ -23,7 +23,7 @@ use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Library, Parts};
-use crate::control::{self, ControlLoop, Rig, Settings};
+use crate::control::{self, Command, ControlLoop, Drive, Rig, Settings};
 use crate::http::keys::Keys;
 use crate::http::{self, App};
 use crate::imaging::{Calibration, Reconstructor};
@@ -134,6 +134,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     })
     .await?;
     let conducting = tokio::spawn(conductor.clone().run());
+    let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
     let app = Arc::new(App {
         clock,
@@ -158,6 +159,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let _ = std::io::stdout().write_all(announcement.as_bytes());
     signals.any().await;
     tracing::info!("ending");
+    // At once, for viewers may take their time to leave.
+    control.send(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     let _ = end.send(true);
     let _ = timeout(GRACE, async { (server.await, end.closed().await) }).await;
     conducting.abort();
@@ -165,7 +168,11 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     if timeout(DEVICES, stopping).await.is_err() {
         tracing::error!("the control loop does not end; leaving it");
     }
-    let _ = timeout(GRACE, async { (writer.await, store.close().await) }).await;
+    let last_words = async {
+        let _ = tokio::join!(writer, ending.record_the_rest());
+        store.close().await;
+    };
+    let _ = timeout(GRACE, last_words).await;
     Ok(())
 }
 

@@ -18,24 +18,25 @@ use crate::trial::view::Role;
 impl Shared {
     pub(super) async fn create(&self, by: Role, participant: &str, protocol: &str) -> Result<SessionId, ConductError> {
         operator_only(by)?;
-        let mut live = self.live.lock().await;
-        if live.course.as_ref().is_some_and(|course| !course.state.ended()) {
+        let mut pen = self.pen.lock().await;
+        self.record_stops(&mut pen).await?;
+        if self.live().course.as_ref().is_some_and(|course| !course.state.ended()) {
             let text = "a session is under way; complete or abort it first";
             return Err(ConductError::Conflict(text.to_owned()));
         }
         self.check_participant(participant).await?;
         let protocol = self.runnable(protocol)?;
-        let (seed, set_index) = self.draw_place(&protocol, &mut live.random).await?;
-        let made = self.make(participant, &protocol, seed, set_index, &mut live.random);
+        let random = &mut pen.random;
+        let (seed, set_index) = self.draw_place(&protocol, random).await?;
+        let made = self.make(participant, &protocol, seed, set_index, random);
         let Stamp { at, wall } = made.stamp;
         let created = Event { number: 1, by, at, wall, kind: EventKind::Created };
         self.store.create_session(&made, &created).await?;
         let session = made.session;
-        let mut course = Course::new(made, protocol);
-        course.apply(created, self.time(at));
-        live.course = Some(course);
+        let mut live = self.live();
+        live.course = Some(Course::new(made, protocol, created, self.run_clock()));
         self.publish(&live);
-        self.changed.notify_one();
+        self.wake();
         Ok(session)
     }
 

@@ -1,5 +1,7 @@
-//! A session in memory: what was made, where it stands, what was said; and what it asks of the control loop.
+//! A session in memory: what was made, where it stands, what was said; what of it the disk has yet to take; and what it
+//! asks of the control loop.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
@@ -14,8 +16,8 @@ use crate::store::{Comment, NewSession, Reader, RunClocks};
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
 use crate::trial::protocol::Protocol;
-use crate::trial::session::{Plan, SessionState};
-use crate::trial::view::{CommentLine, Phase, Role};
+use crate::trial::session::{Plan, Refusal, SessionState, decide, decide_time};
+use crate::trial::view::{Action, CommentLine, Phase, Role};
 
 /// Comments and log lines that the operator sees.
 pub(super) const LATEST: usize = 30;
@@ -24,15 +26,56 @@ pub(super) const LATEST: usize = 30;
 pub(super) struct Course {
     pub made: NewSession,
     pub protocol: Protocol,
+    /// Where it stands, with what stopped it since the disk last took something.
     pub state: SessionState,
     /// Whether what is said still counts.
     pub grace: Grace,
-    /// All its events.
+    /// All its events, those that are not on the disk yet last.
     pub events: Vec<Event>,
+    /// When each of them happened, by the server's clocks over its restarts.
+    times: Vec<Timestamp>,
+    clock: RunClock,
     /// Comments in all.
     pub comments: usize,
     /// The latest comments, newest last.
     pub latest_comments: Vec<CommentLine>,
+    /// Whether the operator has closed it.
+    pub dismissed: bool,
+    /// How many events are on the disk.
+    recorded: usize,
+    /// What led to the events that are not, oldest first.
+    stops: Vec<Stop>,
+    /// Whether further events are on their way to the disk, which are in the state only once they are on it.
+    writing: bool,
+    /// Where the policy begins when it is next put in charge; none: where the lens is.
+    begin_at: Option<FocalPower>,
+    /// Where the lens was when the server ended in this session.
+    interrupted_at: Option<FocalPower>,
+}
+
+/// This run of the server and its clock, with those of the runs before.
+#[derive(Debug, Clone)]
+pub(super) struct RunClock {
+    pub clocks: Arc<RunClocks>,
+    pub run: i64,
+}
+
+impl RunClock {
+    /// `at`, a moment of this run, on the time that goes on over the server's restarts.
+    pub fn time(&self, at: Moment) -> Timestamp {
+        self.clocks.wall(self.run, at)
+    }
+}
+
+/// What stops the lens: somebody's action, or the time limit. It takes effect at once, and goes to the disk when the disk
+/// takes it.
+#[derive(Debug, Clone)]
+struct Stop {
+    by: Role,
+    /// None: the time limit.
+    action: Option<Action>,
+    at: Moment,
+    wall: Timestamp,
 }
 
 /// What a session asks of the control loop.
@@ -42,8 +85,8 @@ pub(super) enum Driving {
     AtStart(FocalPower),
     /// A policy runs from `start`, or from where the lens is.
     Policy { segment: SegmentId, name: PolicyName, start: Option<FocalPower> },
-    /// The lens holds still.
-    Hold(Option<SegmentId>),
+    /// The lens holds still, where it is or at a focal power.
+    Hold { segment: Option<SegmentId>, at: Option<FocalPower> },
 }
 
 impl Driving {
@@ -54,34 +97,55 @@ impl Driving {
             Self::Policy { segment, name, start } => {
                 (Drive::Policy { name: name.clone(), start: *start }, Some(*segment))
             }
-            Self::Hold(segment) => (Drive::Hold, *segment),
+            Self::Hold { segment, at } => (Drive::Hold { at: *at }, *segment),
         };
         Command::Drive { drive, segment }
     }
 }
 
 impl Course {
-    /// A session in which nothing has happened yet.
-    pub fn new(made: NewSession, protocol: Protocol) -> Self {
+    /// A session just made; `clock` is this run's.
+    pub fn new(made: NewSession, protocol: Protocol, created: Event, clock: RunClock) -> Self {
+        let mut course = Self::without_events(made, protocol, clock);
+        let at = course.clock.time(created.at);
+        course.replay(vec![(at, created)]);
+        course
+    }
+
+    fn without_events(made: NewSession, protocol: Protocol, clock: RunClock) -> Self {
         let segments = made.segments.iter().map(|(segment, _)| *segment).collect();
         let state = SessionState::new(Plan::new(&protocol, segments));
         let grace = Grace::new(protocol.grace);
-        Self { made, protocol, state, grace, events: Vec::new(), comments: 0, latest_comments: Vec::new() }
+        Self {
+            made,
+            protocol,
+            state,
+            grace,
+            events: Vec::new(),
+            times: Vec::new(),
+            clock,
+            comments: 0,
+            latest_comments: Vec::new(),
+            dismissed: false,
+            recorded: 0,
+            stops: Vec::new(),
+            writing: false,
+            begin_at: None,
+            interrupted_at: None,
+        }
     }
 
-    /// Session `session` as the database has it, or `None`; `clocks` are those of the server's starts.
-    pub async fn load(reader: &Reader, clocks: &RunClocks, session: SessionId) -> Result<Option<Self>, ConductError> {
+    /// Session `session` as the database has it, or `None`; `clock` is this run's, and knows those before.
+    pub async fn load(reader: &Reader, clock: &RunClock, session: SessionId) -> Result<Option<Self>, ConductError> {
         let Some(stored) = reader.session(session).await? else { return Ok(None) };
         let protocol =
             stored.protocol().map_err(|error| ConductError::Unreadable { session, reason: error.to_string() })?;
 
-        let mut course = Self::new(stored.made, protocol);
-        for (run, event) in stored.events {
-            let at = clocks.wall(run, event.at);
-            course.apply(event, at);
-        }
+        let mut course = Self::without_events(stored.made, protocol, clock.clone());
+        let at = |(run, event): (i64, Event)| (clock.clocks.wall(run, event.at), event);
+        course.replay(stored.events.into_iter().map(at).collect());
         for (run, answer) in reader.answers(session).await? {
-            course.state.keep_answer(answer.segment, &answer.question, answer.given(run, clocks));
+            course.state.keep_answer(answer.segment, &answer.question, answer.given(run, &clock.clocks));
         }
         reader.comments(session).await?.into_iter().for_each(|(_, comment)| course.heard(comment));
         Ok(Some(course))
@@ -103,10 +167,125 @@ impl Course {
         kinds.into_iter().zip(next..).map(|(kind, number)| Event { number, by, at, wall, kind }).collect()
     }
 
-    /// Takes in what happened, at `at` by the server's clocks over its restarts.
-    pub fn apply(&mut self, event: Event, at: Timestamp) {
+    /// Tells where the lens was when the server ended: the session goes on from there.
+    pub const fn was_interrupted_at(&mut self, focal_power: FocalPower) {
+        self.interrupted_at = Some(focal_power);
+    }
+
+    /// The events that `action` brings about, to be written to the disk; [`Course::written`] says what became of them.
+    ///
+    /// # Errors
+    /// When `by` may not, or the action does not fit where the session stands.
+    pub fn begin_writing(
+        &mut self,
+        by: Role,
+        action: &Action,
+        at: Moment,
+        wall: Timestamp,
+    ) -> Result<Vec<Event>, Refusal> {
+        let kinds = decide(&self.state, by, action, at)?;
+        self.writing = !kinds.is_empty();
+        Ok(self.number(by, kinds, at, wall))
+    }
+
+    /// Takes in the events that are now on the disk; none where it did not take them. What stopped the session in the
+    /// meantime comes after them and is decided anew: a pause while the session was being resumed pauses it again.
+    pub fn written(&mut self, events: Vec<Event>) {
+        self.writing = false;
+        let mut recorded: Vec<(Timestamp, Event)> =
+            std::mem::take(&mut self.times).into_iter().zip(std::mem::take(&mut self.events)).collect();
+        recorded.truncate(self.recorded);
+        recorded.extend(events.into_iter().map(|event| (self.clock.time(event.at), event)));
+        self.replay(recorded);
+
+        for stop in std::mem::take(&mut self.stops) {
+            // Refused: what it was to stop has ended meanwhile.
+            let _ = self.take(stop);
+        }
+    }
+
+    /// Stops the session or its setting at once, as `action` asks; its events wait for the disk.
+    ///
+    /// # Errors
+    /// When `by` may not, or the action does not fit where the session stands.
+    pub fn stop(&mut self, by: Role, action: Action, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
+        self.take(Stop { by, action: Some(action), at, wall })
+    }
+
+    /// Ends the setting if its time is up; its events wait for the disk. Whether it did.
+    pub fn keep_time(&mut self, at: Moment, wall: Timestamp) -> bool {
+        let before = self.events.len();
+        // Nobody is refused anything by the time.
+        let _ = self.take(Stop { by: Role::System, action: None, at, wall });
+        self.events.len() > before
+    }
+
+    fn take(&mut self, stop: Stop) -> Result<(), Refusal> {
+        let kinds = match &stop.action {
+            Some(action) => decide(&self.state, stop.by, action, stop.at)?,
+            None => decide_time(&self.state, stop.at),
+        };
+        // What changes nothing now may do so after what is being written.
+        if kinds.is_empty() && !(self.writing && stop.action.is_some()) {
+            return Ok(());
+        }
+        for event in self.number(stop.by, kinds, stop.at, stop.wall) {
+            self.apply(self.clock.time(event.at), event);
+        }
+        self.stops.push(stop);
+        Ok(())
+    }
+
+    /// The events that are not on the disk yet, and how many stops led to them.
+    pub fn unrecorded(&self) -> (&[Event], usize) {
+        (&self.events[self.recorded..], self.stops.len())
+    }
+
+    /// Notes that the first `events` of those events are on the disk, and with them the first `stops` stops.
+    pub fn recorded(&mut self, events: usize, stops: usize) {
+        self.recorded += events;
+        self.stops.drain(..stops);
+    }
+
+    /// Whether something that happened is not on the disk yet.
+    pub const fn is_unrecorded(&self) -> bool {
+        self.recorded < self.events.len()
+    }
+
+    /// Whether event number `number` is on the disk.
+    pub fn is_recorded(&self, number: u32) -> bool {
+        self.events[..self.recorded].last().is_some_and(|last| number <= last.number)
+    }
+
+    /// Whether it is closed and leaves nothing to do.
+    pub const fn is_done_with(&self) -> bool {
+        self.dismissed && !self.writing && !self.is_unrecorded()
+    }
+
+    /// Begins anew with `events`, which are on the disk, each with when it happened by the server's clocks over its restarts.
+    fn replay(&mut self, events: Vec<(Timestamp, Event)>) {
+        self.recorded = events.len();
+        self.state = self.state.replayed(&[]);
+        self.grace = Grace::new(self.protocol.grace);
+        self.begin_at = None;
+        self.events = Vec::with_capacity(events.len());
+        self.times = Vec::with_capacity(events.len());
+        for (at, event) in events {
+            self.apply(at, event);
+        }
+    }
+
+    fn apply(&mut self, at: Timestamp, event: Event) {
+        self.begin_at = match &event.kind {
+            EventKind::SegmentStarted { .. } => Some(self.protocol.start),
+            EventKind::ServerRestarted { .. } => self.interrupted_at,
+            EventKind::Paused { .. } if !self.state.running() => self.begin_at,
+            EventKind::Resumed | EventKind::Unblinded { .. } => self.begin_at,
+            _ => None,
+        };
         self.state.apply(&event);
         self.grace.apply(&event.kind, at);
+        self.times.push(at);
         self.events.push(event);
     }
 
@@ -127,22 +306,14 @@ impl Course {
             (Phase::Inspecting, Some(segment)) if self.state.running() => Some(Driving::Policy {
                 segment,
                 name: self.made.segments.iter().find(|(known, _)| *known == segment)?.1.clone(),
-                start: self.just_begun().then_some(self.protocol.start),
+                start: self.begin_at,
             }),
             (Phase::Notice, _) if self.state.paused().is_none() => Some(Driving::AtStart(self.protocol.start)),
-            (Phase::Inspecting, segment) => Some(Driving::Hold(segment)),
-            (Phase::Notice | Phase::Questions | Phase::Closing, _) => Some(Driving::Hold(None)),
+            (Phase::Inspecting, segment) => Some(Driving::Hold { segment, at: self.begin_at }),
+            (Phase::Questions, _) => Some(Driving::Hold { segment: None, at: self.begin_at }),
+            (Phase::Notice | Phase::Closing, _) => Some(Driving::Hold { segment: None, at: None }),
             (Phase::Ready | Phase::Completed | Phase::Aborted, _) => None,
         }
-    }
-
-    /// Whether the segment under way has not been interrupted since it began.
-    fn just_begun(&self) -> bool {
-        let clock_events = self.events.iter().rev().filter(|event| !matches!(event.kind, EventKind::Unblinded { .. }));
-        clock_events
-            .map(|event| &event.kind)
-            .next()
-            .is_some_and(|kind| matches!(kind, EventKind::SegmentStarted { .. }))
     }
 
     /// Time of inspection until what is shown changes, `inspected` having passed in the segment.

@@ -1,40 +1,111 @@
-//! The one way that everything goes: decide, to disk, into the state, to the screens, to the control loop.
+//! The way that everything goes. What moves a session on: decide, to disk, into the state, to the screens, to the
+//! control loop. What stops it: decide, into the state, to the control loop, and then to disk and the screens.
 
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use jiff::Timestamp;
 use tokio::sync::watch;
+use tokio::time::timeout;
 
-use super::course::Course;
-use super::{ConductError, Live, Shared, views};
+use super::course::{Course, Driving, RunClock};
+use super::{ConductError, Live, Pen, Shared, views};
 use crate::clock::Moment;
 use crate::control::{Command, Drive};
 use crate::ids::SessionId;
 use crate::store::DeviceReport;
-use crate::trial::event::EventKind;
-use crate::trial::grace::Outstanding;
-use crate::trial::session::{decide, decide_restart, decide_time};
+use crate::trial::grace::{Grace, Outstanding};
+use crate::trial::session::{decide, decide_restart};
 use crate::trial::view::{Action, Phase, Role};
 
+/// How long the screens wait for the disk to take what stopped a session before they show it as not recorded yet.
+const PROMPTLY: Duration = Duration::from_millis(300);
+
 impl Shared {
-    pub(super) async fn act(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
-        let mut live = self.live.lock().await;
-        if live.course.as_ref().is_some_and(|course| course.session() == session) {
-            self.keep_time(&mut live).await?;
+    /// What is in memory. Never held while anything is waited for.
+    pub(super) fn live(&self) -> MutexGuard<'_, Live> {
+        self.live.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) async fn act(
+        self: &Arc<Self>,
+        by: Role,
+        session: SessionId,
+        action: &Action,
+    ) -> Result<(), ConductError> {
+        let under_way = self.live().course_of(session).is_some();
+        match under_way {
+            true if action.stops_the_lens() => self.stop(by, session, action).await,
+            true => self.move_on(by, session, action).await,
+            false => self.act_on_earlier(by, session, action).await,
         }
-        if let Some(course) = live.course.as_mut().filter(|course| course.session() == session) {
-            let kinds = decide(&course.state, by, action, self.clock.now())?;
-            self.ask_first(course, action).await?;
-            self.record(course, by, kinds).await?;
-            self.publish(&live);
-            self.drive(&mut live);
-            self.changed.notify_one();
+    }
+
+    /// Does what waits for no disk: the lens is held when this returns, whatever becomes of the record.
+    async fn stop(self: &Arc<Self>, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+        let stopped = {
+            let mut live = self.live();
+            let (at, wall) = (self.clock.now(), self.clock.wall());
+            let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
+            course.keep_time(at, wall);
+            let stopped = course.stop(by, action.clone(), at, wall);
+            self.hold(&mut live);
+            stopped
+        };
+
+        // Also where this was refused: the time may have stopped something.
+        self.record_promptly().await;
+        self.show_and_drive();
+        self.wake();
+        Ok(stopped?)
+    }
+
+    /// Does what is only done once it is on the disk.
+    async fn move_on(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+        let mut pen = self.pen.lock().await;
+        let events = loop {
+            self.keep_time();
+            self.record_stops(&mut pen).await?;
+
+            let grace = {
+                let mut live = self.live();
+                let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
+                // Who may not is told that first.
+                decide(&course.state, by, action, self.clock.now())?;
+                course.grace
+            };
+            self.ask_first(session, grace, action).await?;
+
+            let mut live = self.live();
+            let (at, wall) = (self.clock.now(), self.clock.wall());
+            let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
+            // Stopped since: that comes first.
+            if !course.is_unrecorded() {
+                break course.begin_writing(by, action, at, wall)?;
+            }
+        };
+        if events.is_empty() {
             return Ok(());
         }
+
+        let written = self.store.append_events(session, &events).await;
+        let mut live = self.live();
+        if let Some(course) = live.course_of(session) {
+            course.written(if written.is_ok() { events } else { Vec::new() });
+        }
+        live.forget_what_is_done_with();
+        drop(live);
+        self.show_and_drive();
+        self.wake();
+        Ok(written?)
+    }
+
+    /// Acts on a session that is not the one in memory.
+    async fn act_on_earlier(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+        let _pen = self.pen.lock().await;
         let mut earlier = self.load(session).await?;
         let same_set = |course: &Course| !course.state.ended() && course.made.seed == earlier.made.seed;
-        if matches!(action, Action::Unblind { .. }) && live.course.as_ref().is_some_and(same_set) {
+        if matches!(action, Action::Unblind { .. }) && self.live().course.as_ref().is_some_and(same_set) {
             let text = "a session of the same balanced set is under way, and this one's order would tell its own; wait for its end";
             return Err(ConductError::Conflict(text.to_owned()));
         }
@@ -46,17 +117,18 @@ impl Shared {
             );
             return Err(ConductError::Conflict(text));
         }
-        let kinds = decide(&earlier.state, by, action, self.clock.now())?;
-        self.ask_first(&earlier, action).await?;
-        self.record(&mut earlier, by, kinds).await
+        let (at, wall) = (self.clock.now(), self.clock.wall());
+        let events = earlier.begin_writing(by, action, at, wall)?;
+        self.ask_first(session, earlier.grace, action).await?;
+        Ok(self.store.append_events(session, &events).await?)
     }
 
     /// Refuses to unblind while something may be outstanding, unless that is known.
-    async fn ask_first(&self, course: &Course, action: &Action) -> Result<(), ConductError> {
+    async fn ask_first(&self, session: SessionId, grace: Grace, action: &Action) -> Result<(), ConductError> {
         if !matches!(action, Action::Unblind { despite_outstanding: false, .. }) {
             return Ok(());
         }
-        match self.outstanding(course).await? {
+        match self.outstanding(session, grace).await? {
             None => Ok(()),
             Some(outstanding) => {
                 let text = format!("{outstanding}; to unblind all the same, confirm it (despite_outstanding)");
@@ -65,11 +137,15 @@ impl Shared {
         }
     }
 
-    /// What may still come in for `course`, which unblinding would keep from counting.
-    pub(super) async fn outstanding(&self, course: &Course) -> Result<Option<Outstanding>, ConductError> {
-        let devices = self.store.reader().surgeon_devices(course.session()).await?;
+    /// What may still come in for `session`, whose grace is `grace`, which unblinding would keep from counting.
+    pub(super) async fn outstanding(
+        &self,
+        session: SessionId,
+        grace: Grace,
+    ) -> Result<Option<Outstanding>, ConductError> {
+        let devices = self.store.reader().surgeon_devices(session).await?;
         let told = |device: &DeviceReport| device.told.map(|(holding, run, at)| (holding, self.clocks.wall(run, at)));
-        Ok(course.grace.outstanding(self.time(self.clock.now()), devices.iter().map(told)))
+        Ok(grace.outstanding(self.time(self.clock.now()), devices.iter().map(told)))
     }
 
     /// `at`, a moment of this run, on the time that goes on over the server's restarts.
@@ -77,58 +153,124 @@ impl Shared {
         self.clocks.wall(self.store.run(), at)
     }
 
+    pub(super) fn run_clock(&self) -> RunClock {
+        RunClock { clocks: Arc::clone(&self.clocks), run: self.store.run() }
+    }
+
     pub(super) async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
-        let course = Course::load(self.store.reader(), &self.clocks, session).await?;
+        let course = Course::load(self.store.reader(), &self.run_clock(), session).await?;
         course.ok_or_else(ConductError::no_session)
     }
 
-    /// Takes up the session that was under way when the server ended.
-    pub(super) async fn take_up(&self) -> Result<(), ConductError> {
-        let mut live = self.live.lock().await;
-        if let Some(course) = live.course.as_mut() {
-            let inspected = match course.state.segment() {
-                Some(segment) => self.store.reader().noted_clock(segment).await?,
-                None => Duration::ZERO,
-            };
-            let kinds = decide_restart(&course.state, inspected);
-            self.record(course, Role::System, kinds).await?;
+    /// Takes up the session that was under way when the server ended, held where it was.
+    pub(super) async fn take_up(&self, mut course: Course) -> Result<(), ConductError> {
+        let reader = self.store.reader();
+        let mut inspected = Duration::ZERO;
+        if let Some(segment) = course.state.segment() {
+            inspected = reader.noted_clock(segment).await?;
+            let place = reader.last_commanded(segment).await?;
+            course.was_interrupted_at(place.unwrap_or(course.protocol.start));
         }
-        self.publish(&live);
-        self.drive(&mut live);
-        Ok(())
-    }
-
-    pub(super) async fn keep_time(&self, live: &mut Live) -> Result<(), ConductError> {
-        let Some(course) = live.course.as_mut() else { return Ok(()) };
-        let kinds = decide_time(&course.state, self.clock.now());
-        if kinds.is_empty() {
-            return Ok(());
-        }
-        self.record(course, Role::System, kinds).await?;
-        self.publish(live);
-        self.drive(live);
-        Ok(())
-    }
-
-    /// To disk, then into the state.
-    async fn record(&self, course: &mut Course, by: Role, kinds: Vec<EventKind>) -> Result<(), ConductError> {
-        if kinds.is_empty() {
-            return Ok(());
-        }
-        let events = course.number(by, kinds, self.clock.now(), self.clock.wall());
+        let kinds = decide_restart(&course.state, inspected);
+        let events = course.number(Role::System, kinds, self.clock.now(), self.clock.wall());
         self.store.append_events(course.session(), &events).await?;
-        for event in events {
-            let at = self.time(event.at);
-            course.apply(event, at);
-        }
+        course.written(events);
+
+        self.live().course = Some(course);
+        self.show_and_drive();
         Ok(())
+    }
+
+    /// Ends the setting under way if its time is up. Whether it did.
+    pub(super) fn keep_time(&self) -> bool {
+        let mut live = self.live();
+        let (at, wall) = (self.clock.now(), self.clock.wall());
+        let ended = live.course.as_mut().is_some_and(|course| course.keep_time(at, wall));
+        if ended {
+            self.hold(&mut live);
+        }
+        ended
+    }
+
+    /// Writes down what stopped the session, waiting for the disk no longer than the screens can.
+    pub(super) async fn record_promptly(self: &Arc<Self>) {
+        let shared = Arc::clone(self);
+        // Goes on by itself where this no longer waits.
+        let recording = tokio::spawn(async move {
+            let mut pen = shared.pen.lock().await;
+            // Told on the screens, and tried again.
+            let _ = shared.record_stops(&mut pen).await;
+        });
+        let _ = timeout(PROMPTLY, recording).await;
+    }
+
+    /// Writes down what stopped the session, in order. Where the disk does not take it, it stays to be written.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub(super) async fn record_stops(&self, _pen: &mut Pen) -> Result<(), ConductError> {
+        loop {
+            let (session, events, stops) = {
+                let mut live = self.live();
+                let Some(course) = live.course.as_ref().filter(|course| course.is_unrecorded()) else {
+                    live.unrecorded_because = None;
+                    live.forget_what_is_done_with();
+                    return Ok(());
+                };
+                let (events, stops) = course.unrecorded();
+                (course.session(), events.to_vec(), stops)
+            };
+
+            let written = self.store.append_events(session, &events).await;
+            let mut live = self.live();
+            match written {
+                Ok(()) => {
+                    if let Some(course) = live.course_of(session) {
+                        course.recorded(events.len(), stops);
+                    }
+                    if live.unrecorded_because.take().is_some() {
+                        tracing::info!("what stopped the session is recorded");
+                    }
+                }
+                Err(error) => {
+                    if live.unrecorded_because.is_none() {
+                        tracing::error!("what stopped the session is not recorded yet: {error}; it is tried again");
+                    }
+                    live.unrecorded_because = Some(error.to_string());
+                    return Err(error.into());
+                }
+            }
+        }
     }
 
     pub(super) fn publish(&self, live: &Live) {
         let now = self.clock.now();
-        let (surgeon, operator) = live.course.as_ref().map(|course| views::both(course, now)).unzip();
+        let shown = live.course.as_ref().filter(|course| !course.dismissed);
+        let because = live.unrecorded_because.as_deref();
+        let (surgeon, operator) = shown.map(|course| views::both(course, because, now)).unzip();
         replace_if_changed(&self.surgeon, surgeon);
         replace_if_changed(&self.operator, operator);
+    }
+
+    /// Shows what the session has come to, and only then moves the lens for it: what covers the view comes first.
+    pub(super) fn show_and_drive(&self) {
+        let mut live = self.live();
+        self.publish(&live);
+        self.drive(&mut live);
+    }
+
+    /// Takes the lens from a policy that the session no longer asks for.
+    fn hold(&self, live: &mut Live) {
+        let wanted = live.course.as_ref().and_then(Course::driving);
+        if !matches!(live.driving, Some(Driving::Policy { .. })) || wanted == live.driving {
+            return;
+        }
+        let hold = match wanted {
+            Some(hold @ Driving::Hold { .. }) => hold,
+            _ => Driving::Hold { segment: None, at: None },
+        };
+        self.control.send(hold.command());
+        live.driving = Some(hold);
     }
 
     /// Tells the control loop what the session now asks of it, if that changed.
@@ -140,12 +282,18 @@ impl Shared {
         let drive = match (&wanted, live.course.as_ref()) {
             (Some(wanted), _) => Some(wanted.command()),
             (None, Some(course)) if course.state.phase() == Phase::Ready => None,
-            (None, _) => Some(Command::Drive { drive: Drive::Hold, segment: None }),
+            (None, _) => Some(Command::Drive { drive: Drive::Hold { at: None }, segment: None }),
         };
         live.driving = wanted;
         if let Some(command) = drive {
             self.control.send(command);
         }
+    }
+
+    /// Has both tasks of [`Conductor::run`](super::Conductor::run) look at once.
+    pub(super) fn wake(&self) {
+        self.changed.notify_one();
+        self.to_record.notify_one();
     }
 }
 

@@ -1,9 +1,12 @@
 //! The conductor: carries a session's events from the state machine through the store to the control loop, in that
-//! order, so that what happened is on disk before anyone sees it.
+//! order, so that what happened is on disk before anyone sees it. One thing waits for no disk: to stop the lens. A pause,
+//! an end and a time limit hold it first; they are recorded as soon as the disk takes them, and shown as what they are
+//! until then.
 
 mod allocate;
 mod course;
 mod flow;
+mod keeping;
 mod library;
 mod remarks;
 mod reports;
@@ -11,7 +14,6 @@ mod timeline;
 mod views;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use rand_chacha::ChaCha12Rng;
 use tokio::sync::{Mutex, Notify, watch};
@@ -27,10 +29,7 @@ use crate::ids::SessionId;
 use crate::store::{RunClocks, Store, StoreError};
 use crate::trial::session::Refusal;
 use crate::trial::view::{Action, Holding, NewAnswer, NewComment, OperatorView, Role, SurgeonView};
-use course::Course;
-
-/// Time between two sendings of the time left, and the most that a killed server forgets of a segment's clock.
-const BEAT: Duration = Duration::from_secs(1);
+use course::{Course, RunClock};
 
 /// What a conductor works with.
 pub struct Parts {
@@ -62,20 +61,43 @@ struct Shared {
     registry: Registry,
     clock: Arc<dyn Clock>,
     /// The clocks of this start of the server and of those before.
-    clocks: RunClocks,
-    /// Held from the decision to the view, so that what is decided is decided on what is on disk.
-    live: Mutex<Live>,
+    clocks: Arc<RunClocks>,
+    /// The session in memory. Held for moments and never while the disk is waited for: to stop the lens takes it.
+    live: std::sync::Mutex<Live>,
+    /// Held from the decision on something to its commit, so that what is decided is decided on what is on disk, and
+    /// written in that order.
+    pen: Mutex<Pen>,
     surgeon: watch::Sender<Option<Arc<SurgeonView>>>,
     operator: watch::Sender<Option<Arc<OperatorView>>>,
-    /// Wakes [`Conductor::run`]: the time of the next change may be another.
+    /// Wakes whoever keeps the time: that of the next change may be another.
     changed: Notify,
+    /// Wakes whoever records: there may be something.
+    to_record: Notify,
 }
 
 struct Live {
     course: Option<Course>,
-    random: ChaCha12Rng,
     /// What the control loop was told last.
     driving: Option<course::Driving>,
+    /// Why the disk did not take what stopped the session, when it was last asked to.
+    unrecorded_because: Option<String>,
+}
+
+impl Live {
+    /// The session in memory, if it is `session`.
+    fn course_of(&mut self, session: SessionId) -> Option<&mut Course> {
+        self.course.as_mut().filter(|course| course.session() == session)
+    }
+
+    /// Lets go of a session that was closed, once the disk has all of it.
+    fn forget_what_is_done_with(&mut self) {
+        self.course.take_if(|course| course.is_done_with());
+    }
+}
+
+/// The right to write a session's data, and what that takes.
+struct Pen {
+    random: ChaCha12Rng,
 }
 
 /// Why the conductor did not do something.
@@ -142,9 +164,10 @@ impl Conductor {
     pub async fn open(parts: Parts) -> Result<Self, ConductError> {
         let Parts { store, control, library, registry, clock, mut random } = parts;
         random.set_stream(u64::try_from(store.run()).unwrap_or_default());
-        let clocks = store.reader().run_clocks().await?;
+        let clocks = Arc::new(store.reader().run_clocks().await?);
+        let clock_of_run = RunClock { clocks: Arc::clone(&clocks), run: store.run() };
         let course = match store.reader().session_under_way().await? {
-            Some(session) => Course::load(store.reader(), &clocks, session).await?,
+            Some(session) => Course::load(store.reader(), &clock_of_run, session).await?,
             None => None,
         };
         let shared = Shared {
@@ -154,45 +177,17 @@ impl Conductor {
             registry,
             clock,
             clocks,
-            live: Mutex::new(Live { course, random, driving: None }),
+            live: std::sync::Mutex::new(Live { course: None, driving: None, unrecorded_because: None }),
+            pen: Mutex::new(Pen { random }),
             surgeon: watch::Sender::new(None),
             operator: watch::Sender::new(None),
             changed: Notify::new(),
+            to_record: Notify::new(),
         };
-        shared.take_up().await?;
+        if let Some(course) = course {
+            shared.take_up(course).await?;
+        }
         Ok(Self { shared: Arc::new(shared) })
-    }
-
-    /// Keeps time limits, prompts and the time left. Never ends; drop it to stop.
-    pub async fn run(self) {
-        loop {
-            let wait = self.tick().await;
-            tokio::select! {
-                () = tokio::time::sleep(wait) => {}
-                () = self.shared.changed.notified() => {}
-            }
-        }
-    }
-
-    /// Does what the time now asks for; says how long until it asks for more.
-    pub async fn tick(&self) -> Duration {
-        let mut live = self.shared.live.lock().await;
-        if let Err(error) = self.shared.keep_time(&mut live).await {
-            tracing::error!("a time limit {error}; it is tried again");
-            return BEAT;
-        }
-        self.shared.publish(&live);
-        let Some(course) = live.course.as_ref().filter(|course| course.state.running()) else {
-            return Duration::from_hours(1);
-        };
-        let now = self.shared.clock.now();
-        let inspected = course.state.inspected(now);
-        if let Some(segment) = course.state.segment()
-            && let Err(error) = self.shared.store.note_clock(course.session(), segment, inspected).await
-        {
-            tracing::warn!("the time inspected could not be noted: {error}");
-        }
-        course.until_next_change(inspected).min(BEAT)
     }
 
     /// The session under way (or just ended, until dismissed) as the surgeon may see it; changes as it changes.
@@ -228,16 +223,16 @@ impl Conductor {
     ///
     /// # Errors
     /// When it has not ended, or `by` is not the operator.
-    pub async fn dismiss(&self, by: Role, session: SessionId) -> Result<(), ConductError> {
+    pub fn dismiss(&self, by: Role, session: SessionId) -> Result<(), ConductError> {
         operator_only(by)?;
-        let mut live = self.shared.live.lock().await;
-        match live.course.as_ref() {
-            Some(course) if course.session() != session => {}
-            Some(course) if !course.state.ended() => {
+        let mut live = self.shared.live();
+        if let Some(course) = live.course_of(session) {
+            if !course.state.ended() {
                 return Err(ConductError::Conflict("the session is under way; abort it to end it".to_owned()));
             }
-            _ => live.course = None,
+            course.dismissed = true;
         }
+        live.forget_what_is_done_with();
         self.shared.publish(&live);
         Ok(())
     }

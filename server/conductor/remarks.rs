@@ -1,7 +1,7 @@
 //! What the surgeon says: comments and answers, kept whatever state the session is in.
 
 use super::course::Course;
-use super::{ConductError, Live, Shared};
+use super::{ConductError, Shared};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::{Answer, Comment, Kept, Stamp};
 use crate::trial::answers;
@@ -11,13 +11,13 @@ use crate::trial::view::{AnswerValue, Holding, NewAnswer, NewComment, Said};
 impl Shared {
     pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {
         check_said(&new.said)?;
-        let mut live = self.live.lock().await;
-        let current = live.course.as_ref().filter(|course| course.session() == new.session);
+        let _pen = self.pen.lock().await;
+        let current =
+            self.live().course_of(new.session).map(|course| (course.state.plan().segments.clone(), course.grace));
         let (segments, grace) = match current {
-            Some(course) => (course.state.plan().segments.clone(), course.grace),
+            Some(current) => current,
             None => self.of_earlier(new.session).await?,
         };
-        let current = current.is_some();
         let stamp = self.stamp();
         // A segment that is not this session's can only come from a broken page: what was said is kept all the same.
         let segment = new.segment.filter(|segment| segments.contains(segment));
@@ -33,9 +33,9 @@ impl Shared {
             said: new.said,
         };
         let kept = self.store.keep_comment(&comment).await?;
+        let mut live = self.live();
         if kept == Kept::New
-            && current
-            && let Some(course) = live.course.as_mut()
+            && let Some(course) = live.course_of(comment.session)
         {
             course.heard(comment);
             self.publish(&live);
@@ -44,19 +44,30 @@ impl Shared {
     }
 
     pub(super) async fn answer(&self, new: NewAnswer) -> Result<(), ConductError> {
-        let mut live = self.live.lock().await;
-        let earlier = match self.earlier(&live, new.session).await {
-            // What was asked cannot be known any more; what was answered is kept all the same.
-            Err(ConductError::Unreadable { .. }) => return self.keep_unasked(new).await,
-            earlier => earlier?,
+        let mut pen = self.pen.lock().await;
+        // What led to the question comes before its answer.
+        self.record_stops(&mut pen).await?;
+
+        let checked =
+            self.live().course_of(new.session).map(|course| check_answer(course, &new).map(|()| course.grace));
+        let grace = match checked {
+            Some(checked) => checked?,
+            None => match self.load(new.session).await {
+                // What was asked cannot be known any more; what was answered is kept all the same.
+                Err(ConductError::Unreadable { .. }) => return self.keep_unasked(new).await,
+                earlier => {
+                    let earlier = earlier?;
+                    check_answer(&earlier, &new)?;
+                    earlier.grace
+                }
+            },
         };
-        let Some(course) = earlier.as_ref().or(live.course.as_ref()) else { return Err(ConductError::no_session()) };
-        check_answer(course, &new)?;
-        let answer = self.stamped(new, course.grace);
+
+        let answer = self.stamped(new, grace);
         let kept = self.store.keep_answer(&answer).await?;
+        let mut live = self.live();
         if kept == Kept::New
-            && earlier.is_none()
-            && let Some(course) = live.course.as_mut()
+            && let Some(course) = live.course_of(answer.session)
         {
             let given = answer.given(self.store.run(), &self.clocks);
             course.state.keep_answer(answer.segment, &answer.question, given);
@@ -78,8 +89,9 @@ impl Shared {
     }
 
     pub(super) async fn holding(&self, holding: Holding) -> Result<(), ConductError> {
-        let live = self.live.lock().await;
-        if live.course.as_ref().is_none_or(|course| course.session() != holding.session) {
+        let _pen = self.pen.lock().await;
+        let under_way = self.live().course_of(holding.session).is_some();
+        if !under_way {
             self.of_earlier(holding.session).await?;
         }
         Ok(self.store.note_holding(&holding, self.stamp()).await?)
@@ -98,14 +110,6 @@ impl Shared {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
         let grace = stored.grace(&self.clocks);
         Ok((stored.made.segments.into_iter().map(|(segment, _)| segment).collect(), grace))
-    }
-
-    /// Session `session` from the database, unless it is the one in memory.
-    async fn earlier(&self, live: &Live, session: SessionId) -> Result<Option<Course>, ConductError> {
-        if live.course.as_ref().is_some_and(|course| course.session() == session) {
-            return Ok(None);
-        }
-        self.load(session).await.map(Some)
     }
 
     fn stamp(&self) -> Stamp {

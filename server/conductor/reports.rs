@@ -151,7 +151,7 @@ impl Conductor {
             settings_detail: settings(&course),
             answers: self.answer_lines(&course).await?,
             counts_until: course.grace.until(),
-            outstanding: self.shared.outstanding(&course).await?,
+            outstanding: self.shared.outstanding(course.session(), course.grace).await?,
             log: self.log(&course).await?,
             unblinding: unblinding(&course),
         })

@@ -8,13 +8,14 @@ use crate::trial::event::Event;
 use crate::trial::session::PauseCause;
 use crate::trial::view::{AnswerValue, LogLine, OperatorView, Phase, SurgeonView};
 
-/// The surgeon's and the operator's view of `course` at `now`.
-pub(super) fn both(course: &Course, now: Moment) -> (SurgeonView, OperatorView) {
+/// The surgeon's and the operator's view of `course` at `now`; `because`: why the disk did not take what stopped it.
+pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {
     let surgeon = surgeon(course, now);
     let operator = OperatorView {
         surgeon: surgeon.clone(),
         participant: course.made.participant.clone(),
         protocol: course.made.protocol.clone(),
+        unrecorded_because: because.filter(|_| course.is_unrecorded()).map(str::to_owned),
         latest_comments: course.latest_comments.iter().rev().cloned().collect(),
         log: log(course),
     };
@@ -30,6 +31,7 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         phase: state.phase(),
         paused: state.paused().is_some(),
         may_resume: state.paused() == Some(PauseCause::Restart),
+        unrecorded: course.is_unrecorded(),
         practice: course.made.practice,
         title: course.protocol.title.clone(),
         segment: state.segment(),
@@ -62,10 +64,10 @@ fn answers(course: &Course) -> BTreeMap<String, AnswerValue> {
 
 /// The latest events in words. A reason for unblinding may name a policy, so it is the researcher's alone.
 fn log(course: &Course) -> Vec<LogLine> {
-    let line = |event: &Event| LogLine {
-        at: event.wall,
-        by: event.by,
-        text: event.kind.for_the_blinded().in_words(|segment| course.setting(segment)),
+    let line = |event: &Event| {
+        let text = event.kind.for_the_blinded().in_words(|segment| course.setting(segment));
+        let unrecorded = if course.is_recorded(event.number) { "" } else { " (not recorded yet)" };
+        LogLine { at: event.wall, by: event.by, text: format!("{text}{unrecorded}") }
     };
     course.events.iter().rev().take(LATEST).map(line).collect()
 }

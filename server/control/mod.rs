@@ -44,8 +44,11 @@ pub enum Drive {
         /// Focal power to begin at.
         start: Option<FocalPower>,
     },
-    /// Whoever drives keeps still: the lens holds, the policy is not asked (a paused session).
-    Hold,
+    /// Nobody asks the policy and the lens holds still (a paused session).
+    Hold {
+        /// Focal power to go to and hold, if given; else the lens stays where it is.
+        at: Option<FocalPower>,
+    },
 }
 
 /// What the loop is told. Sending never blocks; the loop looks between two frames.

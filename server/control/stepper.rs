@@ -100,7 +100,10 @@ impl Stepper {
                 self.wanted = power;
                 (Driver::Hand, None)
             }
-            Drive::Hold => (Driver::Nobody, None),
+            Drive::Hold { at } => {
+                self.wanted = at.unwrap_or(self.asked);
+                (Driver::Nobody, None)
+            }
             Drive::Policy { name, start } => {
                 self.wanted = start.unwrap_or(self.asked);
                 (Driver::Policy { placed: false }, Some(name))

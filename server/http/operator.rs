@@ -204,7 +204,7 @@ struct Dismissal {
 #[utoipa::path(post, path = "/api/operator/dismissals", tag = "operator", request_body = Dismissal, responses(
     (status = 200, body = Option<OperatorView>), (status = 409, description = "It is under way", body = ErrorBody)))]
 async fn dismiss(_: Operator, State(app): State<AppState>, JsonBody(gone): JsonBody<Dismissal>) -> Result<View, Error> {
-    app.conductor.dismiss(Role::Operator, gone.session).await?;
+    app.conductor.dismiss(Role::Operator, gone.session)?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
 

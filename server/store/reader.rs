@@ -13,7 +13,8 @@ use super::{
     DATABASE, DeviceEvent, MIGRATOR, Participant, PathPoint, RunClocks, SessionLine, SessionStatus, Stamp, StoreError,
     moment,
 };
-use crate::ids::SessionId;
+use crate::ids::{SegmentId, SessionId};
+use crate::lens::FocalPower;
 
 /// A database open for reading. Clone freely.
 #[derive(Clone, Debug)]
@@ -171,6 +172,23 @@ impl Reader {
             Ok((row.try_get("number")?, row.try_get("run")?, DeviceEvent { wall, at, device, working, message }))
         };
         rows.iter().map(event).collect()
+    }
+
+    /// The focal power that the lens was last sent to in `segment`, as far as telemetry tells; none where no policy has
+    /// been asked there. While nobody is asked the lens may stand elsewhere: a device that is opened anew does.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn last_commanded(&self, segment: SegmentId) -> Result<Option<FocalPower>, StoreError> {
+        let asked: Option<f64> = sqlx::query_scalar(
+            "SELECT asked FROM telemetry
+             WHERE segment = (SELECT number FROM segments WHERE segment = ?) AND policy IS NOT NULL
+             ORDER BY number DESC LIMIT 1",
+        )
+        .bind(segment.to_string())
+        .fetch_optional(&self.pool)
+        .await?;
+        Ok(asked.and_then(|asked| FocalPower::new(asked).ok()))
     }
 
     /// The focal path of `session`: about `points` steps of each setting, evenly spread over its steps.

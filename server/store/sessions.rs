@@ -89,7 +89,7 @@ impl Store {
         made
     }
 
-    /// Appends `events` to `session`, all or none.
+    /// Appends `events` to `session`, all or none. The same events again change nothing.
     ///
     /// # Errors
     /// When the disk or database failed.
@@ -185,9 +185,14 @@ async fn insert_event(
     event: &Event,
 ) -> Result<(), StoreError> {
     let payload = serde_json::to_string(&event.kind).map_err(|error| StoreError::Damaged(error.to_string()))?;
+
+    // A commit that the disk reported as failed may have reached it all the same: the same event again is the same
+    // event, and another one of its number is still refused.
     sqlx::query(
         "INSERT INTO events (session, number, run, wall, monotonic_ns, role, kind, payload)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+         SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE NOT EXISTS (
+             SELECT 1 FROM events
+             WHERE session = ?1 AND number = ?2 AND run = ?3 AND monotonic_ns = ?5 AND role = ?6 AND payload = ?8)",
     )
     .bind(session.to_string())
     .bind(event.number)

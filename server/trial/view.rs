@@ -30,6 +30,7 @@ pub enum Phase {
 
 /// A session as the surgeon's browser gets it. Everything in it is the same whatever the policy.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[allow(clippy::struct_excessive_bools, reason = "facts that the page shows each by itself")]
 pub struct SurgeonView {
     /// The session; random.
     pub session: SessionId,
@@ -39,6 +40,8 @@ pub struct SurgeonView {
     pub paused: bool,
     /// Whether the surgeon may let it go on: after a restart of the server, not after a pause by the operator.
     pub may_resume: bool,
+    /// Whether what stopped the session or its setting last (a pause, an end) is not on the disk yet.
+    pub unrecorded: bool,
     /// Whether this is practice.
     pub practice: bool,
     /// The protocol's title for surgeons.
@@ -280,6 +283,14 @@ pub enum Action {
     },
 }
 
+impl Action {
+    /// Whether it stops the lens, and so is done before it is on the disk.
+    #[must_use]
+    pub const fn stops_the_lens(&self) -> bool {
+        matches!(self, Self::FinishSegment { .. } | Self::Pause { .. } | Self::Abort { .. })
+    }
+}
+
 /// Who acts; kept with every event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -323,6 +334,8 @@ pub struct OperatorView {
     pub participant: String,
     /// Protocol's name.
     pub protocol: String,
+    /// Why the disk has not taken what is `unrecorded`, as far as it has said.
+    pub unrecorded_because: Option<String>,
     /// The latest comments, newest first.
     pub latest_comments: Vec<CommentLine>,
     /// The latest events in words, newest first.

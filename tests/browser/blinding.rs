@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 42] = [
+const KEYS: [&str; 43] = [
     "age",
     "answers",
     "area",
@@ -66,6 +66,7 @@ const KEYS: [&str; 42] = [
     "text",
     "title",
     "type",
+    "unrecorded",
     "view",
     "width",
     "x",
@@ -158,7 +159,9 @@ fn json(seen: &mut Seen, text: &str) {
     }
     if view["phase"] == "inspecting" {
         let mut form = view.clone();
-        for changing in ["setting", "segment", "remaining_seconds", "comments", "prompt", "paused", "may_resume"] {
+        for changing in
+            ["setting", "segment", "remaining_seconds", "comments", "prompt", "paused", "may_resume", "unrecorded"]
+        {
             form[changing] = Value::Null;
         }
         seen.inspecting.entry(session).or_default().insert(form.to_string());

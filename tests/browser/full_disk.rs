@@ -1,9 +1,10 @@
-//! A disk that fills up while the surgeon speaks: the page says what is not saved yet, keeps it, and saves it when there is
-//! room again.
+//! A database that cannot be written: the pages say what is not saved or recorded yet, and when it is.
 
 use std::sync::Arc;
 
 use serde_json::json;
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{ConnectOptions, Connection};
 
 use crate::disk::SmallDisk;
 use crate::screenshots::shoot;
@@ -48,5 +49,41 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     let kept: Vec<String> =
         sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
     assert_eq!(kept, said, "each once, in the order said");
+    pool.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
+    let driver = Driver::start().await;
+    let theatre = Theatre::open(&driver).await;
+    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    theatre.begin("S-07", "short").await;
+    theatre.tap_notice(1).await;
+    let file = SqliteConnectOptions::new().filename(theatre.server.data.path().join("parfocal.db"));
+    let mut other_program = file.connect().await.unwrap();
+    sqlx::query("BEGIN IMMEDIATE").execute(&mut other_program).await.unwrap();
+
+    operator.sees("#session-actions", "Pause").await;
+    let pause = "[...document.querySelectorAll('#session-actions button')]
+                 .find((button) => button.textContent.startsWith('Pause')).click()";
+    operator.run(pause, json!([])).await;
+    theatre.give_reason("The phone").await;
+    operator.sees("#session-badges", "Paused").await;
+    surgeon.sees("#panel h2", "Paused").await;
+    surgeon.sees("#unrecorded", "not recorded yet").await;
+    operator.sees("#unrecorded", "The lens is held, but this is not recorded yet").await;
+    operator.sees("#unrecorded", "another program has locked the database").await;
+    operator.sees("#log", "Paused: The phone (not recorded yet)").await;
+    shoot(operator, "operator-11-not-recorded").await;
+    shoot(surgeon, "surgeon-14-not-recorded").await;
+
+    other_program.close().await.unwrap();
+    operator.sees_no("#unrecorded").await;
+    surgeon.sees_no("#unrecorded").await;
+    assert!(!operator.text("#log").await.contains("not recorded"));
+    let pool = crate::theatre::database(theatre.server.data.path()).await;
+    let paused = "SELECT payload ->> 'reason' FROM events WHERE kind = 'paused'";
+    let reasons: Vec<String> = sqlx::query_scalar(paused).fetch_all(&pool).await.unwrap();
+    assert_eq!(reasons, ["The phone"]);
     pool.close().await;
 }

@@ -194,10 +194,22 @@ fn a_pause_holds_and_asks_no_policy() {
     let mut bench = Bench::new(PATIENT);
     bench.stepper.obey(drive("scripted", None));
     bench.step();
-    bench.stepper.obey(Command::Drive { drive: Drive::Hold, segment: None });
+    bench.stepper.obey(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     bench.script.set(Deed::GoTo(0.1));
     let record = bench.step();
     assert_eq!((record.asked, record.held, record.policy), (power(0.6), Some(Hold::Paused), None));
+}
+
+#[test]
+fn a_pause_at_a_focal_power_goes_there_as_soon_as_the_lens_listens_and_stays() {
+    let mut bench = Bench::new(PATIENT);
+    bench.lens.fail(Some(LensError::Gone("unplugged".into())));
+    bench.stepper.obey(Command::Drive { drive: Drive::Hold { at: Some(power(0.8)) }, segment: None });
+    bench.step();
+    bench.lens.fail(None);
+    let record = bench.step();
+    assert_eq!((record.asked, record.held, record.policy), (power(0.8), Some(Hold::Paused), None));
+    assert_eq!(bench.lens.position(), power(0.8));
 }
 
 #[test]

@@ -108,7 +108,7 @@ fn a_slow_start_after_a_long_pause_is_not_a_long_hold() {
     let clock = SystemClock;
     stage.handle.send(drive("scripted", None));
     stage.shoot_until(|record| record.asked == power(0.6));
-    stage.handle.send(Command::Drive { drive: Drive::Hold, segment: None });
+    stage.handle.send(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     while stage.handle.status.borrow().held_for < Duration::from_millis(300) {
         stage.shoot();
     }

@@ -94,10 +94,10 @@ async fn the_control_loop_is_told_each_policy_from_the_same_start_and_to_hold_in
         expected.push(Command::Drive { drive: Drive::Manual(start), segment: None });
         let drive = Drive::Policy { name: policy.clone(), start: Some(start) };
         expected.push(Command::Drive { drive, segment: Some(setting.segment) });
-        expected.push(Command::Drive { drive: Drive::Hold, segment: None });
+        expected.push(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     }
     // After the last setting the lens holds through the closing questions, and is told so again at the end.
-    expected.push(Command::Drive { drive: Drive::Hold, segment: None });
+    expected.push(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     assert_eq!(bench.commanded(), expected);
 }
 
@@ -138,10 +138,14 @@ async fn a_restarted_server_goes_on_at_the_same_place_and_forgets_at_most_a_seco
     assert_eq!((view.session, view.segment, view.phase), (session, Some(segment), Phase::Inspecting));
     assert_eq!((view.paused, view.may_resume, view.setting, view.comments), (true, true, 2, 2));
     assert_eq!(view.remaining_seconds, Some(90.0));
-    assert_eq!(bench.commanded(), [Command::Drive { drive: Drive::Hold, segment: Some(segment) }]);
+    // No step of a policy was recorded on this bench: the lens waits where the setting began.
+    let start = Some(FocalPower::MIDDLE);
+    assert_eq!(bench.commanded(), [Command::Drive { drive: Drive::Hold { at: start }, segment: Some(segment) }]);
     bench.surgeon(Action::Resume).await;
     let resumed = bench.commanded();
-    assert!(matches!(&resumed[..], [Command::Drive { drive: Drive::Policy { start: None, .. }, .. }]), "{resumed:?}");
+    let goes_on =
+        matches!(&resumed[..], [Command::Drive { drive: Drive::Policy { start: at, .. }, .. }] if *at == start);
+    assert!(goes_on, "{resumed:?}");
     bench.wait(Duration::from_secs(90)).await;
     assert_eq!(bench.view().phase, Phase::Questions);
     while bench.view().phase != Phase::Completed {
@@ -170,11 +174,11 @@ async fn one_session_at_a_time_and_only_with_known_codes_and_protocols() {
     assert!(unknown.to_string().contains("paper, practice"), "{unknown}");
     let session = bench.begin("paper").await;
     assert!(matches!(create(Role::Operator, PARTICIPANT, "paper").await, Err(ConductError::Conflict(_))));
-    assert!(matches!(bench.conductor.dismiss(Role::Operator, session).await, Err(ConductError::Conflict(_))));
+    assert!(matches!(bench.conductor.dismiss(Role::Operator, session), Err(ConductError::Conflict(_))));
     let name = bench.conductor.add_participant(Role::Operator, "Dr Smith").await.unwrap_err();
     assert!(matches!(&name, ConductError::Invalid(text) if text.contains("never a name")), "{name}");
     bench.conductor.act(Role::Operator, session, Action::Abort { reason: "test".to_owned() }).await.unwrap();
-    bench.conductor.dismiss(Role::Operator, session).await.unwrap();
+    bench.conductor.dismiss(Role::Operator, session).unwrap();
     assert_eq!(bench.conductor.surgeon_view().borrow().as_deref(), None);
     create(Role::Operator, PARTICIPANT, "paper").await.unwrap();
 }
@@ -208,4 +212,68 @@ async fn a_handler_that_is_dropped_midway_leaves_memory_and_disk_the_same() {
     assert_eq!(bench.store.reader().events(session).await.unwrap().len(), 3);
     bench.surgeon(Action::FinishSegment { segment }).await;
     assert_eq!(bench.view().phase, Phase::Questions);
+}
+
+#[tokio::test]
+async fn a_pause_asked_for_while_the_session_is_being_resumed_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let session = bench.begin("paper").await;
+    let segment = bench.view().segment.unwrap();
+    bench.surgeon(Action::Acknowledge { segment }).await;
+    let pause = |reason: &str| Action::Pause { reason: reason.to_owned() };
+    bench.conductor.act(Role::Operator, session, pause("a question")).await.unwrap();
+    bench.commanded();
+
+    // Another program keeps the database, so that the resumption is on its way to the disk for a while.
+    let database = crate::storage::raw(folder.path()).await;
+    let other_program = database.begin_with("BEGIN IMMEDIATE").await.unwrap();
+    let conductor = bench.conductor.clone();
+    let resuming = tokio::spawn(async move { conductor.act(Role::Operator, session, Action::Resume).await });
+    for _ in 0..20 {
+        tokio::task::yield_now().await;
+    }
+    bench.conductor.act(Role::Operator, session, pause("not yet")).await.unwrap();
+    other_program.rollback().await.unwrap();
+    resuming.await.unwrap().unwrap();
+    bench.conductor.tick().await;
+
+    assert!(bench.view().paused && !bench.view().unrecorded);
+    assert_eq!(bench.commanded(), [], "the lens is not let go in between");
+    let events = bench.store.reader().events(session).await.unwrap();
+    let kinds: Vec<&str> = events.iter().map(|(_, event)| event.kind.name()).collect();
+    assert_eq!(kinds[3..], ["paused", "resumed", "paused"]);
+}
+
+#[tokio::test]
+async fn a_stop_that_the_disk_does_not_take_is_done_all_the_same_and_recorded_once_it_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = Bench::start(folder.path()).await;
+    let session = bench.begin("paper").await;
+    let segment = bench.view().segment.unwrap();
+    bench.surgeon(Action::Acknowledge { segment }).await;
+    bench.commanded();
+    let database = crate::storage::raw(folder.path()).await;
+    let broken = "CREATE TRIGGER broken BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'broken'); END";
+    sqlx::query(broken).execute(&database).await.unwrap();
+
+    bench.wait(Duration::from_mins(2)).await;
+    assert_eq!(bench.commanded(), [Command::Drive { drive: Drive::Hold { at: None }, segment: None }]);
+    assert!(bench.view().unrecorded && bench.view().phase == Phase::Questions);
+    assert!(bench.operator_view().unrecorded_because.is_some_and(|why| why.contains("broken")));
+    // Nothing is said to be done that is not on the disk, but for what stops.
+    let answer = bench.answer("sharpness", parfocal::trial::view::AnswerValue::Point(4)).await;
+    assert!(matches!(answer, Err(ConductError::Storage(_))), "{answer:?}");
+    let finish = Action::FinishQuestions { segment: Some(segment) };
+    assert!(matches!(bench.conductor.act(Role::Surgeon, session, finish).await, Err(ConductError::Storage(_))));
+    bench.say("a comment is kept: its table is sound").await;
+
+    sqlx::query("DROP TRIGGER broken").execute(&database).await.unwrap();
+    bench.conductor.tick().await;
+    assert!(!bench.view().unrecorded);
+    assert_eq!(bench.operator_view().unrecorded_because, None);
+    let events = bench.store.reader().events(session).await.unwrap();
+    let kinds: Vec<&str> = events.iter().map(|(_, event)| event.kind.name()).collect();
+    assert_eq!(kinds, ["created", "started", "segment-started", "segment-finished"]);
+    bench.answer_all().await;
 }

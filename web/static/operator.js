@@ -53,6 +53,7 @@ function followSession(next) {
   drawBadges();
   if (!session) return;
   setText(byId("phase"), PHASES[session.phase](session));
+  drawUnrecorded();
   byId("steps").replaceChildren(...Array.from({ length: session.settings }, (_, index) => make("li", { className: stepClass(index + 1) })));
   drawActions();
   drawFeed();
@@ -69,6 +70,16 @@ function drawBadges() {
     ? [make("span", { className: "badge" }, session.participant), session.practice && make("span", { className: "badge warn" }, "Practice"), session.paused && make("span", { className: "badge warn" }, "Paused")]
     : [];
   redraw(byId("session-badges"), badges.filter(Boolean));
+}
+
+/** Says that the lens was stopped before that could be written down, and what comes of it. */
+function drawUnrecorded() {
+  const { unrecorded, unrecorded_because: because } = session;
+  byId("unrecorded").hidden = !unrecorded;
+  if (!unrecorded) return setText(byId("unrecorded"), "");
+  const why = because ?? "the disk has not answered";
+  const then = "The server goes on trying. If it ends before it can, the session is paused when it starts again.";
+  setText(byId("unrecorded"), `The lens is held, but this is not recorded yet: ${why}. ${then}`);
 }
 
 function drawTime() {

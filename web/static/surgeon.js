@@ -86,6 +86,7 @@ function drawBar() {
   byId("finish").hidden = !inspecting;
   byId("finish").disabled = !inspecting || state.paused;
   if (byId("finish").disabled) finishUntapped();
+  setText(byId("unrecorded"), state?.unrecorded ? "This step is not recorded yet: the server cannot write to its disk. Tell the operator." : "");
   setText(byId("prompt"), inspecting && !state.paused ? (state.prompt ?? "") : "");
   drawTime();
 }

@@ -108,6 +108,17 @@ impl SessionState {
         }
     }
 
+    /// Where `events`, all from the first, lead to; with the answers kept so far.
+    #[must_use]
+    pub fn replayed(&self, events: &[Event]) -> Self {
+        let mut state = Self::new(self.plan.clone());
+        state.answers.clone_from(&self.answers);
+        for event in events {
+            state.apply(event);
+        }
+        state
+    }
+
     /// Its plan.
     #[must_use]
     pub const fn plan(&self) -> &Plan {

@@ -1,0 +1,92 @@
+//! What goes on by itself while the server runs: the time is kept, and what waits for the disk is recorded.
+
+use std::time::Duration;
+
+use tokio::time::sleep;
+
+use super::Conductor;
+use super::course::Course;
+
+/// Time between two sendings of the time left, and the most that a killed server forgets of a segment's clock.
+const BEAT: Duration = Duration::from_secs(1);
+
+impl Conductor {
+    /// Keeps time limits, prompts and the time left, and records what waits for the disk. Never ends; drop it to stop.
+    pub async fn run(self) {
+        let keeping_time = async {
+            loop {
+                let wait = self.keep_time().await;
+                tokio::select! {
+                    () = sleep(wait) => {}
+                    () = self.shared.changed.notified() => {}
+                }
+            }
+        };
+        // Apart, because it waits for the disk, and the time does not.
+        let recording = async {
+            loop {
+                if self.record().await {
+                    sleep(BEAT).await;
+                } else {
+                    self.shared.to_record.notified().await;
+                }
+            }
+        };
+        tokio::join!(keeping_time, recording);
+    }
+
+    /// Does what the time now asks for, and records what there is to record.
+    pub async fn tick(&self) {
+        self.keep_time().await;
+        self.record().await;
+    }
+
+    /// Records what the disk has not taken yet: the last chance before the server ends.
+    pub async fn record_the_rest(&self) {
+        let mut pen = self.shared.pen.lock().await;
+        if let Err(error) = self.shared.record_stops(&mut pen).await {
+            tracing::error!("what stopped the session is lost: {error}; after the next start the session is paused");
+        }
+    }
+
+    /// Ends the setting under way at its limit and shows what the time changes; says how long until it changes more.
+    async fn keep_time(&self) -> Duration {
+        if self.shared.keep_time() {
+            self.shared.record_promptly().await;
+            self.shared.to_record.notify_one();
+        }
+        self.shared.show_and_drive();
+
+        let live = self.shared.live();
+        let Some(course) = live.course.as_ref().filter(|course| course.state.running()) else {
+            return Duration::from_hours(1);
+        };
+        let inspected = course.state.inspected(self.shared.clock.now());
+        course.until_next_change(inspected).min(BEAT)
+    }
+
+    /// Records what stopped the session, and how far its clock has come. Whether there will be more to record soon.
+    async fn record(&self) -> bool {
+        {
+            let mut pen = self.shared.pen.lock().await;
+            // Told on the screens, and tried again.
+            let _ = self.shared.record_stops(&mut pen).await;
+        }
+
+        let (clock, unrecorded) = {
+            self.shared.show_and_drive();
+            let live = self.shared.live();
+            let now = self.shared.clock.now();
+            let running = live.course.as_ref().filter(|course| course.state.running());
+            let clock = running
+                .and_then(|course| Some((course.session(), course.state.segment()?, course.state.inspected(now))));
+            (clock, live.course.as_ref().is_some_and(Course::is_unrecorded))
+        };
+        if let Some((session, segment, inspected)) = clock
+            && let Err(error) = self.shared.store.note_clock(session, segment, inspected).await
+        {
+            tracing::warn!("the time inspected could not be noted: {error}");
+        }
+        clock.is_some() || unrecorded
+    }
+}
