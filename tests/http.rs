@@ -22,6 +22,8 @@ mod privacy;
 mod restart;
 #[path = "http/roles.rs"]
 mod roles;
+#[path = "http/seed.rs"]
+mod seed;
 #[path = "http/service.rs"]
 mod service;
 #[path = "http/stopping.rs"]

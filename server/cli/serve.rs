@@ -49,7 +49,8 @@ pub struct Arguments {
     /// Frames a second to ask of the camera.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
-    /// Seed of everything random, so that a trial can be replayed; without it, a fresh one.
+    /// Seed of simulated devices and practice sessions, so that they can be repeated; without it, a fresh one. Real sessions
+    /// always draw order and ids from the system's random source.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Folder of trial protocols beside those that ship; `trial-protocols`, if it is there, unless another is named.
@@ -112,10 +113,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let registry = registry(arguments)?;
     let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
     let keys = Keys::load_or_create(&arguments.data_dir)?;
-    let mut random = random(arguments)?;
+    let mut seeded = seeded(arguments)?;
     let library = protocols(arguments, &registry)?;
     let reconstructor = Reconstructor::new(&calibration);
-    let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), random.random())?;
+    let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), seeded.random())?;
     calibration::check_camera(&calibration, rig.camera.mosaic_size())?;
     let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
@@ -130,7 +131,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         library,
         registry: registry.clone(),
         clock: Arc::clone(&clock),
-        random,
+        random: ChaCha12Rng::try_from_rng(&mut SysRng)?,
+        practice_random: seeded,
     })
     .await?;
     let conducting = tokio::spawn(conductor.clone().run());
@@ -207,7 +209,8 @@ async fn open_store(
     Ok(Store::open(&arguments.data_dir, &run).await?)
 }
 
-fn random(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
+/// What may be foreseen: nothing of a real session is drawn from it.
+fn seeded(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
     Ok(match arguments.seed {
         Some(seed) => ChaCha12Rng::seed_from_u64(seed),
         None => ChaCha12Rng::try_from_rng(&mut SysRng)?,

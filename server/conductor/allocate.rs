@@ -26,7 +26,8 @@ impl Shared {
         }
         self.check_participant(participant).await?;
         let protocol = self.runnable(protocol)?;
-        let random = &mut pen.random;
+        let pen = &mut *pen;
+        let random = if protocol.practice { &mut pen.practice_random } else { &mut pen.random };
         let (seed, set_index) = self.draw_place(&protocol, random).await?;
         let made = self.make(participant, &protocol, seed, set_index, random);
         let Stamp { at, wall } = made.stamp;

@@ -43,9 +43,12 @@ pub struct Parts {
     pub registry: Registry,
     /// Both clocks.
     pub clock: Arc<dyn Clock>,
-    /// Where ids and seeds come from. The conductor gives each start of the server a stream of its own, so that a
-    /// fixed seed does not make the same ids twice in one database.
+    /// Where the orders and ids of real sessions come from. Nobody may be able to foresee it: the server seeds it from
+    /// the system's random source.
     pub random: ChaCha12Rng,
+    /// Where those of practice sessions come from, which may be foreseen. The conductor gives each start of the server
+    /// a stream of its own, so that a fixed seed does not make the same ids twice in one database.
+    pub practice_random: ChaCha12Rng,
 }
 
 /// Runs at most one session at a time. Clone freely.
@@ -97,7 +100,10 @@ impl Live {
 
 /// The right to write a session's data, and what that takes.
 struct Pen {
+    /// For real sessions.
     random: ChaCha12Rng,
+    /// For practice.
+    practice_random: ChaCha12Rng,
 }
 
 /// Why the conductor did not do something.
@@ -162,8 +168,8 @@ impl Conductor {
     /// # Errors
     /// When the disk or database failed.
     pub async fn open(parts: Parts) -> Result<Self, ConductError> {
-        let Parts { store, control, library, registry, clock, mut random } = parts;
-        random.set_stream(u64::try_from(store.run()).unwrap_or_default());
+        let Parts { store, control, library, registry, clock, random, mut practice_random } = parts;
+        practice_random.set_stream(u64::try_from(store.run()).unwrap_or_default());
         let clocks = Arc::new(store.reader().run_clocks().await?);
         let clock_of_run = RunClock { clocks: Arc::clone(&clocks), run: store.run() };
         let course = match store.reader().session_under_way().await? {
@@ -178,7 +184,7 @@ impl Conductor {
             clock,
             clocks,
             live: std::sync::Mutex::new(Live { course: None, driving: None, unrecorded_because: None }),
-            pen: Mutex::new(Pen { random }),
+            pen: Mutex::new(Pen { random, practice_random }),
             surgeon: watch::Sender::new(None),
             operator: watch::Sender::new(None),
             changed: Notify::new(),

@@ -120,14 +120,14 @@ async fn an_aborted_session_does_not_unblind_the_one_in_its_place() {
 }
 
 #[tokio::test]
-async fn a_fixed_seed_makes_other_ids_and_seeds_after_a_restart() {
+async fn a_fixed_seed_makes_other_practice_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let bench = Bench::start(folder.path()).await;
-    let first = bench.begin("paper").await;
+    let first = bench.begin("practice").await;
     bench.conductor.act(Role::Operator, first, Action::Abort { reason: "restart".to_owned() }).await.unwrap();
     drop(bench);
     let bench = Bench::start(folder.path()).await;
-    let second = bench.begin("paper").await;
+    let second = bench.begin("practice").await;
     assert_ne!(first, second);
     assert!(made(&bench, first).await.seed != made(&bench, second).await.seed);
 }

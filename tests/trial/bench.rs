@@ -71,7 +71,8 @@ impl Bench {
             library: Library::load(protocols, &known()).unwrap(),
             registry: Registry::standard(),
             clock: clock.clone(),
-            random: ChaCha12Rng::seed_from_u64(seed),
+            random: ChaCha12Rng::seed_from_u64(seed + u64::try_from(store.run()).unwrap() * 1000),
+            practice_random: ChaCha12Rng::seed_from_u64(seed),
         })
         .await
         .unwrap();
