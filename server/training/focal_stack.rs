@@ -1,5 +1,10 @@
 //! A focal stack: pictures of one still scene in order of focus, read from a folder and checked.
-#![allow(clippy::cast_precision_loss, reason = "counts of pictures and pixels")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "counts of pictures and pixels"
+)]
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -211,7 +216,6 @@ fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
     reduced(&GrayImage { width: width * scale, height: height * scale, data }, width, height)
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "a share")]
 fn mixed(low: &Plane, high: &Plane, part: f64) -> Plane {
     let levels = low.picture.data.iter().zip(&high.picture.data);
     let data = levels.map(|(low, high)| low + part as f32 * (high - low)).collect();

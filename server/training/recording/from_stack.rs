@@ -2,6 +2,7 @@
 //! simulation lets it walk. Every picture shown was really taken.
 #![allow(
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
     reason = "pixels and planes of a stack"
