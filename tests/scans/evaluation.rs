@@ -117,8 +117,8 @@ fn gravel(path: &Path, side: u32) {
         (state >> 8) % below
     };
     for _ in 0..side * 8 {
-        let (left, top, size, level) = (draw(side), draw(side), 4 + draw(20), draw(256));
-        for (x, y) in (top..top + size).flat_map(|y| (left..left + size).map(move |x| (x, y))) {
+        let (left, top, length, level) = (draw(side), draw(side), 4 + draw(20), draw(256));
+        for (x, y) in (top..top + length).flat_map(|y| (left..left + length).map(move |x| (x, y))) {
             if x < side && y < side {
                 picture.put_pixel(x, y, image::Luma([u8::try_from(level).unwrap()]));
             }
