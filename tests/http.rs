@@ -18,6 +18,8 @@ mod finality;
 mod live;
 #[path = "http/privacy.rs"]
 mod privacy;
+#[path = "http/real_time.rs"]
+mod real_time;
 #[path = "http/restart.rs"]
 mod restart;
 #[path = "http/roles.rs"]

@@ -47,6 +47,12 @@ pub trait Camera: Send {
         None
     }
 
+    /// Whether [`Camera::next_frame`] computes the picture, as simulations do, instead of taking it from a device. Then
+    /// its thread is no part of the way from camera to lens, and gets no priority over other programs.
+    fn computes(&self) -> bool {
+        false
+    }
+
     /// Its settings, where an operator can change any.
     fn controls(&self) -> Option<Controls> {
         None

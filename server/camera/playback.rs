@@ -58,6 +58,10 @@ impl<V: View> Camera for Playback<V> {
         })
     }
 
+    fn computes(&self) -> bool {
+        true
+    }
+
     fn health(&self) -> CameraHealth {
         CameraHealth {
             name: Arc::clone(&self.name),

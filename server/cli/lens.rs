@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::{Failure, print};
+use super::{Failure, interrupt, print};
 use crate::clock::SystemClock;
 use crate::lens::{self, FocalPower, Lens, LensInfo};
 
@@ -57,7 +57,12 @@ struct Which {
 
 impl Which {
     fn open(&self) -> Result<Box<dyn Lens>, Failure> {
+        interrupt::let_lenses_go_first()?;
         Ok(lens::open(&self.lens, Arc::new(SystemClock))?)
+    }
+
+    fn open_to_stay(&self) -> Result<Box<dyn Lens>, Failure> {
+        Ok(lens::open_to_stay(&self.lens, Arc::new(SystemClock))?)
     }
 }
 
@@ -92,14 +97,13 @@ fn info(which: &Which) -> Result<(), Failure> {
     let status = if info.status.is_empty() { "all well".into() } else { info.status.join("; ") };
     print(&format!(
         "driver       {}\nfirmware     {}\nserial       {}\nrange        {:.2} to {:.2} dpt\ntemperature  {temperature}\n\
-         mode         {}\nstatus       {status}\n",
-        info.driver, info.firmware, info.serial, info.min_dioptre, info.max_dioptre, info.mode
+         mode         {}\nstatus       {status}\nline errors  {}\n",
+        info.driver, info.firmware, info.serial, info.min_dioptre, info.max_dioptre, info.mode, info.line_errors
     ))
 }
 
 fn set(target: FocalPower, which: &Which) -> Result<(), Failure> {
-    let mut lens = which.open()?;
-    lens.keep_on_close();
+    let mut lens = which.open_to_stay()?;
     let position = go(lens.as_mut(), target)?;
     if which.json {
         return print(&(serde_json::to_string(&position)? + "\n"));

@@ -48,6 +48,7 @@ enum Command {
     /// Record focal-time scans, look at them, and import them.
     Scan(scan::Arguments),
     /// Start the server: the live view, the control loop and the trial.
+    #[command(after_help = serve::REAL_TIME)]
     Serve(serve::Arguments),
     /// Make a learned policy from nothing.
     Train(train::Arguments),
@@ -62,7 +63,10 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    match run(arguments.command) {
+    let outcome = run(arguments.command);
+    // A thread that hangs may still hold one.
+    crate::lens::let_go_of_all();
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             tell(format_args!("parfocal: {failure}"));

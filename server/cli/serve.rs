@@ -29,7 +29,7 @@ use crate::http::{self, App};
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
 use crate::store::{self, Store, telemetry};
-use crate::{lens, live};
+use crate::{lens, live, priority};
 
 /// Arguments of `parfocal serve`.
 #[derive(Debug, Args)]
@@ -73,6 +73,17 @@ pub struct Arguments {
 /// Telemetry that may wait for the disk: a quarter of a minute at 50 frames a second.
 const TELEMETRY_CAPACITY: usize = 750;
 
+/// What `--help` says at its end.
+pub const REAL_TIME: &str = "\
+Real-time priority:
+  Where the system allows it, the threads from camera to lens go before all other programs and their memory stays in
+  place, so that a busy machine does not delay the focus. The operator's page tells whether that is so. Root may; to
+  allow it to another USER, write into /etc/security/limits.d/parfocal.conf, and log in again:
+    USER  -  rtprio   40
+    USER  -  memlock  unlimited
+  For a service of systemd the same are LimitRTPRIO=40 and LimitMEMLOCK=infinity; in a container, the capabilities
+  SYS_NICE and IPC_LOCK.";
+
 /// Open connections get this long to end by themselves, and then the disk as long to take what is left.
 const GRACE: Duration = Duration::from_millis(700);
 
@@ -105,6 +116,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let mut signals = Signals::new()?;
+    bound_real_time()?;
+    if !priority::lock_memory() {
+        tracing::debug!("memory is not locked: `parfocal serve --help` says how to allow it");
+    }
     // First of all: what cannot be reached need not be set up, and early visitors wait in its queue.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
     let address = listener.local_addr()?;
@@ -175,6 +190,21 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         store.close().await;
     };
     let _ = timeout(GRACE, last_words).await;
+    Ok(())
+}
+
+/// Sees to it that a thread at real-time priority that never pauses does not keep the machine from answering.
+fn bound_real_time() -> std::io::Result<()> {
+    let mut overrun = signal(SignalKind::from_raw(priority::OVERRUN))?;
+    priority::bound_runs();
+    tokio::spawn(async move {
+        while overrun.recv().await.is_some() {
+            priority::withdraw();
+            tracing::error!(
+                "a thread kept a processor for seconds; real-time priority is given up until the next start"
+            );
+        }
+    });
     Ok(())
 }
 
@@ -263,12 +293,13 @@ fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
     }
 }
 
-/// Ctrl-C, the end that a service manager asks for, or that of the terminal, after which a lens must not keep its current.
-/// Made before anything is announced, so that no signal is missed.
+/// Ctrl-C or Ctrl-\, the end that a service manager asks for, or that of the terminal, after which a lens must not keep
+/// its current. Made before anything is announced, so that no signal is missed.
 struct Signals {
     interrupt: Signal,
     terminate: Signal,
     hangup: Signal,
+    quit: Signal,
 }
 
 impl Signals {
@@ -277,6 +308,7 @@ impl Signals {
             interrupt: signal(SignalKind::interrupt())?,
             terminate: signal(SignalKind::terminate())?,
             hangup: signal(SignalKind::hangup())?,
+            quit: signal(SignalKind::quit())?,
         })
     }
 
@@ -285,6 +317,7 @@ impl Signals {
             _ = self.interrupt.recv() => {}
             _ = self.terminate.recv() => {}
             _ = self.hangup.recv() => {}
+            _ = self.quit.recv() => {}
         }
     }
 }

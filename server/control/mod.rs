@@ -31,6 +31,7 @@ use crate::camera::{CameraHealth, CameraOffer, Controls, Frame};
 use crate::clock::Moment;
 use crate::imaging::{ContentArea, PatchArea};
 use crate::lens::{FocalPower, LensHealth};
+use crate::priority::Standing;
 
 /// Who drives the lens.
 #[derive(Debug, Clone, PartialEq)]
@@ -180,6 +181,8 @@ pub struct ControlStatus {
     pub latency_p50_micros: u32,
     /// 99th percentile of the same.
     pub latency_p99_micros: u32,
+    /// How the loop stands to other programs.
+    pub priority: Standing,
 }
 
 /// What the rest of the server holds of the loop.

@@ -3,15 +3,18 @@
 use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::Duration;
+
+use rustix::thread::{Pid, gettid};
 
 use crate::autofocus::{Decision, Observation, Policy, PolicyError, PolicyName, Registry, networks};
 use crate::clock::{Clock, Moment};
 use crate::imaging::Patch;
 use crate::lens::FocalPower;
+use crate::priority::{self, Place};
 
 /// An observation of the thread's own.
 #[derive(Debug)]
@@ -43,6 +46,10 @@ pub struct Runner {
     questions: SyncSender<Question>,
     answers: Receiver<Answer>,
     thread: JoinHandle<()>,
+    /// The thread's number, once it runs.
+    id: Arc<OnceLock<Pid>>,
+    /// Whether the thread is at real-time priority.
+    urgent: bool,
     asked_at: Option<Moment>,
     /// Whether the instance has answered once. Until then it may be loading.
     pub proven: bool,
@@ -59,16 +66,20 @@ impl Runner {
     pub fn start(registry: Arc<Registry>, name: PolicyName, clock: Arc<dyn Clock>) -> io::Result<Self> {
         let (questions, questions_in) = sync_channel(1);
         let (answers_out, answers) = sync_channel(1);
+        let id = Arc::new(OnceLock::new());
+        let id_of_thread = id.clone();
         let thread = std::thread::Builder::new().name(THREAD.into()).spawn(move || {
-            crate::priority::raise();
+            let _ = id_of_thread.set(gettid());
+            priority::prefer();
             networks::compute_on_this_thread();
             serve(&registry, &name, &*clock, &questions_in, &answers_out);
         })?;
-        Ok(Self { questions, answers, thread, asked_at: None, proven: false })
+        Ok(Self { questions, answers, thread, id, urgent: false, asked_at: None, proven: false })
     }
 
-    /// Asks; does not wait.
+    /// Asks; does not wait. Until [`Self::answer`] stops waiting the thread is at real-time priority.
     pub fn ask(&mut self, now: Moment, seen: &Observation<'_>) {
+        self.hurry();
         self.asked_at = Some(now);
         // A thread that has ended leaves its reason among the answers.
         let _ = self.questions.try_send(Question { patch: *seen.patch, focal_power: seen.focal_power });
@@ -83,7 +94,10 @@ impl Runner {
     pub fn answer(&mut self, timeout: Duration) -> Option<Answer> {
         let answer = match self.answers.recv_timeout(timeout) {
             Ok(answer) => answer,
-            Err(RecvTimeoutError::Timeout) => return None,
+            Err(RecvTimeoutError::Timeout) => {
+                self.take_time();
+                return None;
+            }
             Err(RecvTimeoutError::Disconnected) => Answer::Panicked("its thread ended".into()),
         };
         self.asked_at = None;
@@ -91,9 +105,38 @@ impl Runner {
         Some(answer)
     }
 
-    /// Gives the thread up; it ends when the policy's step returns, if ever.
+    /// Gives the thread up; it ends when the policy's step returns, if ever. One that owes an answer may be spinning, and
+    /// goes behind all others; one that does not ends at once.
     pub fn abandon(self) -> JoinHandle<()> {
+        if self.asked_at.is_some()
+            && let Some(thread) = self.running()
+        {
+            priority::abandon_thread(thread);
+        }
         self.thread
+    }
+
+    /// Lets the policy go before everything but the loop and the devices. It stays so between frames, while it waits.
+    fn hurry(&mut self) {
+        if !self.urgent
+            && let Some(thread) = self.running()
+        {
+            self.urgent = priority::raise_thread(thread, Place::Policy);
+        }
+    }
+
+    /// A policy that the loop no longer waits for, since it is late or spins, has no claim on a processor.
+    fn take_time(&mut self) {
+        if std::mem::take(&mut self.urgent)
+            && let Some(thread) = self.running()
+        {
+            priority::lower_thread(thread);
+        }
+    }
+
+    /// The thread's number while it has not ended: later the number may be another thread's.
+    fn running(&self) -> Option<Pid> {
+        self.id.get().copied().filter(|_| !self.thread.is_finished())
     }
 }
 

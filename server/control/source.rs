@@ -11,6 +11,7 @@ use arc_swap::ArcSwap;
 use super::LatestSlot;
 use super::runner::guarded;
 use crate::camera::{Camera, CameraError, CameraHealth, Frame};
+use crate::priority::{self, Place};
 
 /// How long the camera is waited for before it is asked again.
 const TIMEOUT: Duration = Duration::from_millis(200);
@@ -64,6 +65,9 @@ struct Feed {
 
 impl Feed {
     fn run(self, mut camera: Box<dyn Camera>) {
+        if !camera.computes() {
+            priority::raise(Place::Wire);
+        }
         let mut failing = false;
         while !self.stop.load(Ordering::Relaxed) {
             let outcome = guarded(|| camera.next_frame(TIMEOUT));

@@ -20,6 +20,7 @@ use crate::camera::{Camera, CameraOffer, Controls, Frame};
 use crate::clock::{Clock, Moment};
 use crate::imaging::Reconstructor;
 use crate::lens::{Lens, LensDynamics};
+use crate::priority::{self, Place, Standing};
 
 /// Longest wait for a frame before commands are looked at.
 const TICK: Duration = Duration::from_millis(20);
@@ -55,7 +56,8 @@ pub struct Settings {
     pub dynamics: Option<LensDynamics>,
 }
 
-/// The running loop. Dropping it ends the loop without waiting.
+/// The running loop. Dropping it ends the loop and its camera, and waits for both: the lens is let go first; a camera
+/// that hangs is waited for a second at most.
 pub struct ControlLoop {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -85,21 +87,23 @@ impl ControlLoop {
         let thread = thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &stopping))?;
         Ok((Self { stop, thread: Some(thread) }, handle, telemetry_out))
     }
+}
 
-    /// Ends the loop and its camera, and waits for both; for a camera that hangs, a second at most.
-    pub fn stop(mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
-            tracing::error!("the control loop ended by a panic");
-        }
+impl ControlLoop {
+    /// Ends the loop, as dropping it does.
+    pub fn stop(self) {
+        drop(self);
     }
 }
 
 impl Drop for ControlLoop {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the control loop ended by a panic");
+        }
     }
 }
 
@@ -122,6 +126,8 @@ struct Worker {
     window: LatencyWindow,
     steps: u64,
     telemetry_dropped: u64,
+    /// How the thread stands to others.
+    priority: Standing,
 }
 
 impl Worker {
@@ -148,6 +154,7 @@ impl Worker {
             telemetry_dropped: 0,
             latency_p50_micros: 0,
             latency_p99_micros: 0,
+            priority: Standing::Ordinary,
         };
         Self {
             stepper,
@@ -164,11 +171,12 @@ impl Worker {
             window: LatencyWindow::default(),
             steps: 0,
             telemetry_dropped: 0,
+            priority: Standing::Ordinary,
         }
     }
 
     fn run(mut self, mut commands: mpsc::UnboundedReceiver<Command>, stop: &AtomicBool) {
-        crate::priority::raise();
+        self.priority = priority::raise(Place::Loop);
         while !stop.load(Ordering::Relaxed) {
             let frame = self.source.frames.take(TICK);
             while let Ok(command) = commands.try_recv() {
@@ -179,8 +187,11 @@ impl Worker {
                 tracing::error!(panic, "a step of the control loop failed");
             }
         }
-        self.frames.close();
-        if !self.source.stop(FAREWELL) {
+        let Self { stepper, source, frames, .. } = self;
+        // First of all: a camera that hangs must not keep the lens under current.
+        drop(stepper);
+        frames.close();
+        if !source.stop(FAREWELL) {
             tracing::warn!("the camera hangs; its thread is left behind");
         }
     }
@@ -252,6 +263,7 @@ impl Worker {
             telemetry_dropped: self.telemetry_dropped,
             latency_p50_micros: figures.p50,
             latency_p99_micros: figures.p99,
+            priority: if priority::withdrawn() { Standing::Withdrawn } else { self.priority },
         }));
     }
 }

@@ -1,5 +1,7 @@
 //! `/healthz`: whether the server runs, for whoever watches it. Says nothing that a surgeon must not know.
 
+use std::sync::Arc;
+
 use axum::Json;
 use axum::extract::State;
 use serde::Serialize;
@@ -26,7 +28,7 @@ struct Health {
 /// Whether the server, its camera and its lens work.
 #[utoipa::path(get, path = "/healthz", tag = "service", responses((status = 200, body = Health)))]
 async fn healthz(State(app): State<AppState>) -> Json<Health> {
-    let status = app.control.status.borrow();
+    let status = Arc::clone(&app.control.status.borrow());
     Json(Health {
         status: "ok",
         version: env!("CARGO_PKG_VERSION"),

@@ -16,6 +16,7 @@ use crate::camera::{CameraHealth, CameraOffer};
 use crate::control::{ControlStatus, Hold};
 use crate::lens::{FocalPower, LensHealth};
 use crate::live::{EncodedFrame, Insight};
+use crate::priority::Standing;
 use crate::trial::view::OperatorView;
 
 /// An operator's or researcher's page.
@@ -78,6 +79,15 @@ pub(super) struct OperatorStatus {
     latency_p50_micros: Option<u32>,
     /// 99th percentile of the same.
     latency_p99_micros: Option<u32>,
+    /// How the loop stands to other programs on the machine.
+    priority: Priority,
+}
+
+/// A [`Standing`], and what it means and what to do in words.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Priority {
+    standing: Standing,
+    message: &'static str,
 }
 
 impl OperatorStatus {
@@ -99,6 +109,7 @@ impl OperatorStatus {
             telemetry_dropped: status.telemetry_dropped,
             latency_p50_micros: (!blinded).then_some(status.latency_p50_micros),
             latency_p99_micros: (!blinded).then_some(status.latency_p99_micros),
+            priority: Priority { standing: status.priority, message: status.priority.words() },
         }
     }
 }

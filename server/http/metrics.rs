@@ -1,6 +1,7 @@
 //! `/metrics`: counters for Prometheus. For operator and researcher; nothing in it is told apart by policy, and the loop's
 //! latency, from which one may be guessed, is left out while a session is under way.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use axum::extract::State;
@@ -15,6 +16,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::error::Error;
 use super::roles::Roles;
 use super::{App, AppState};
+use crate::priority::Standing;
 use crate::trial::view::Role;
 
 /// What HTTP itself counts.
@@ -38,13 +40,19 @@ async fn metrics(State(app): State<AppState>, roles: Roles) -> Result<impl IntoR
 }
 
 fn collect(app: &App) -> Registry {
-    let status = app.control.status.borrow();
+    // Not borrowed for long: the loop waits for the borrowing to end.
+    let status = Arc::clone(&app.control.status.borrow());
     let counts = app.live.counts();
     let telemetry = app.store.telemetry_counts();
     let mut registry = Registry::with_prefix("parfocal");
     let counters = [
         ("steps", "Steps of the control loop", status.steps),
         ("frames_lost", "Frames that the camera lost", status.camera.lost),
+        (
+            "lens_line_errors",
+            "Errors on the line to the lens: replies damaged, late or missing, and noise",
+            status.lens.line_errors,
+        ),
         ("frames_skipped", "Frames that the imaging thread had no time for", app.control.frames.overwritten()),
         ("frames_encoded", "Frames made into JPEG", counts.encoded()),
         ("telemetry_dropped", "Telemetry records dropped because the writer fell behind", status.telemetry_dropped),
@@ -71,6 +79,11 @@ fn collect(app: &App) -> Registry {
         ("camera_fps", "Frames a second from the camera", status.camera.fps),
         ("camera_working", "Whether the camera delivers frames", f64::from(u8::from(status.camera.working))),
         ("lens_working", "Whether the lens takes commands", f64::from(u8::from(status.lens.working))),
+        (
+            "real_time",
+            "Whether the control loop runs at real-time priority",
+            f64::from(u8::from(status.priority == Standing::RealTime)),
+        ),
     ];
     for (name, help, value) in gauges {
         registry.register(name, help, ConstGauge::new(value));

@@ -11,9 +11,10 @@ mod spec;
 
 pub use dynamics::MeasuredDynamics;
 pub use focal_power::{FocalPower, OutOfRange};
+pub use optotune::let_go_of_all;
 pub use response::Response;
 pub use simulated::{SimulatedFault, SimulatedFaults, SimulatedLens};
-pub use spec::open;
+pub use spec::{open, open_to_stay};
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,9 +64,6 @@ pub trait Lens: Send {
         self.measured().ok_or_else(|| LensError::Gone(self.health().message.to_string()))
     }
 
-    /// Makes the lens stay where it is when this is dropped, instead of being put to rest.
-    fn keep_on_close(&mut self) {}
-
     /// The switch for its faults, if the lens is a simulated one.
     fn faults(&self) -> Option<SimulatedFaults> {
         None
@@ -91,6 +89,8 @@ pub struct LensHealth {
     pub caution: bool,
     /// One sentence: what is the case and, if it is bad, what to do.
     pub message: Arc<str>,
+    /// Errors on its line since it was opened: replies that were damaged, late or missing, and noise.
+    pub line_errors: u64,
 }
 
 /// What a lens says of itself (`parfocal lens info --json`; see docs/scripting.md).
@@ -112,6 +112,8 @@ pub struct LensInfo {
     pub mode: String,
     /// Status conditions in words; empty when all is well.
     pub status: Vec<String>,
+    /// Errors on its line since it was opened: replies that were damaged, late or missing, and noise.
+    pub line_errors: u64,
 }
 
 /// How a lens answers a step.

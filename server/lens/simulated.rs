@@ -167,7 +167,7 @@ impl Lens for SimulatedLens {
             (None, _) => "follows commands; no real glass moves".into(),
         };
         let (name, working) = (self.name.clone(), failure.is_none());
-        LensHealth { name, simulated: true, working, caution: false, message: message.into() }
+        LensHealth { name, simulated: true, working, caution: false, message: message.into(), line_errors: 0 }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {
@@ -182,6 +182,7 @@ impl Lens for SimulatedLens {
                 temperature_celsius: None,
                 mode: "focal power".into(),
                 status: failure.iter().map(ToString::to_string).collect(),
+                line_errors: 0,
             }),
         }
     }

@@ -17,11 +17,23 @@ use crate::options::Options;
 /// # Errors
 /// When the specification makes no sense, or its device cannot be used; says what to do.
 pub fn open(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
+    opened(spec, false, clock)
+}
+
+/// The same for moving a lens by hand: it is taken as it stands, and stays where it was put once it is dropped.
+///
+/// # Errors
+/// As of [`open`].
+pub fn open_to_stay(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
+    opened(spec, true, clock)
+}
+
+fn opened(spec: &str, keep: bool, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
     let (device, options) = Options::split(spec)?;
     match device.split_once(':') {
         None if device == "simulated" => Ok(Box::new(SimulatedLens::open(options, clock)?)),
         None if device == "emulated" => Ok(Box::new(EmulatedLens::open(options, clock)?)),
-        Some(("optotune", port)) if !port.is_empty() => Ok(Box::new(OptotuneLens::open(port, options, clock)?)),
+        Some(("optotune", port)) if !port.is_empty() => Ok(Box::new(OptotuneLens::open(port, options, keep, clock)?)),
         _ => Err(LensError::BadSpec(format!(
             "there is no lens '{spec}': use 'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"
         ))),

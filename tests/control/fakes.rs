@@ -12,6 +12,7 @@ use parfocal::control::{Command, Drive};
 use parfocal::ids::SegmentId;
 use parfocal::imaging::{Calibration, Reconstructor, RgbImage};
 use parfocal::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
+use rustix::thread::{Pid, gettid};
 
 pub fn power(value: f64) -> FocalPower {
     FocalPower::new(value).unwrap()
@@ -33,6 +34,8 @@ pub enum Deed {
     GoTo(f64),
     Panic,
     Hang,
+    /// As [`Deed::Hang`], but on a processor.
+    Spin,
 }
 
 /// The script, and what came of it.
@@ -44,6 +47,7 @@ struct ScriptState {
     changed: Condvar,
     instances: AtomicUsize,
     seen: Mutex<Vec<f64>>,
+    threads: Mutex<Vec<Pid>>,
 }
 
 impl Script {
@@ -53,6 +57,7 @@ impl Script {
             changed: Condvar::new(),
             instances: AtomicUsize::new(0),
             seen: Mutex::default(),
+            threads: Mutex::default(),
         }))
     }
 
@@ -65,6 +70,11 @@ impl Script {
     /// Instances made so far.
     pub fn instances(&self) -> usize {
         self.0.instances.load(Ordering::SeqCst)
+    }
+
+    /// The threads that its instances ran on, the latest last.
+    pub fn threads(&self) -> Vec<Pid> {
+        self.0.threads.lock().unwrap().clone()
     }
 
     /// Focal powers that the policy was shown.
@@ -86,6 +96,11 @@ struct Scripted(Arc<ScriptState>);
 impl Policy for Scripted {
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         self.0.seen.lock().unwrap().push(seen.focal_power.get());
+        let mut threads = self.0.threads.lock().unwrap();
+        if !threads.contains(&gettid()) {
+            threads.push(gettid());
+        }
+        drop(threads);
         let deed = *self.0.deed.lock().unwrap();
         match deed {
             Deed::GoTo(target) => Decision { target, metric: Some(target), belief: Some([0.5, f32::NAN].into()) },
@@ -93,6 +108,12 @@ impl Policy for Scripted {
             Deed::Hang => {
                 let deed = self.0.deed.lock().unwrap();
                 drop(self.0.changed.wait_while(deed, |deed| matches!(deed, Deed::Hang)).unwrap());
+                Decision { target: 0.99, ..Decision::default() }
+            }
+            Deed::Spin => {
+                while matches!(*self.0.deed.lock().unwrap(), Deed::Spin) {
+                    std::hint::spin_loop();
+                }
                 Decision { target: 0.99, ..Decision::default() }
             }
         }
@@ -164,6 +185,7 @@ impl Lens for FakeLens {
             working,
             caution: false,
             message: "as the test says".into(),
+            line_errors: 0,
         }
     }
 

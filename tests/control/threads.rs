@@ -9,6 +9,7 @@ use parfocal::clock::{Clock, SystemClock};
 use parfocal::control::{
     Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, Hold, Rig, Settings, StepRecord,
 };
+use rustix::thread::Pid;
 use tokio::sync::mpsc;
 
 use super::fakes::{Deed, FakeCamera, FakeLens, Script, Shot, drive, power, reconstructor};
@@ -99,6 +100,39 @@ fn a_hanging_policy_does_not_stop_the_view() {
     }
     stage.script.set(Deed::GoTo(0.7));
     stage.shoot_until(|record| record.held.is_none());
+    stage.control.stop();
+}
+
+/// A thread's scheduling policy, as the kernel counts them, and its niceness.
+fn scheduling(thread: Pid) -> (i32, i32) {
+    let stat = std::fs::read_to_string(format!("/proc/self/task/{}/stat", thread.as_raw_pid())).unwrap();
+    let after_name = stat.rsplit_once(')').unwrap().1;
+    let fields: Vec<_> = after_name.split_whitespace().collect();
+    // Fields 41 and 19 of proc(5); the name is the second.
+    (fields[38].parse().unwrap(), fields[16].parse().unwrap())
+}
+
+#[test]
+fn a_policy_that_spins_has_real_time_priority_for_a_frame_and_then_goes_behind_all_others() {
+    const OTHER: i32 = 0;
+    const FIFO: i32 = 1;
+    let allowed = std::process::Command::new("chrt").args(["--fifo", "30", "true"]).status().unwrap().success();
+    let in_charge = if allowed { FIFO } else { OTHER };
+    let stage = Stage::new(16);
+    stage.handle.send(drive("scripted", None));
+    stage.shoot_until(|record| record.policy.is_some() && record.held.is_none());
+    let first = stage.script.threads()[0];
+    stage.shoot_until(|_| scheduling(first).0 == in_charge);
+
+    stage.script.set(Deed::Spin);
+    stage.shoot_until(|record| record.held == Some(Hold::PolicySlow));
+    assert_eq!(scheduling(first).0, OTHER, "it is late");
+    stage.shoot_until(|_| scheduling(first) == (OTHER, 19));
+
+    stage.script.set(Deed::GoTo(0.7));
+    stage.shoot_until(|record| record.held.is_none());
+    let latest = stage.script.threads().last().copied().unwrap();
+    stage.shoot_until(|_| scheduling(latest).0 == in_charge);
     stage.control.stop();
 }
 

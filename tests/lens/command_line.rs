@@ -28,6 +28,7 @@ fn the_command_line_speaks_the_promised_json() {
     let expected = serde_json::json!({
         "driver": "Optotune Lens Driver 4", "firmware": "type A, version 1.8.3.1", "serial": "EMUL0001",
         "min_dioptre": 5.0, "max_dioptre": 10.0, "temperature_celsius": 25.5, "mode": "focal power", "status": [],
+        "line_errors": 0,
     });
     assert_eq!(info, expected);
     assert_eq!(

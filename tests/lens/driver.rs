@@ -21,6 +21,7 @@ fn says_what_it_is_and_goes_where_it_is_sent() {
         temperature_celsius: Some(25.5),
         mode: "focal power".into(),
         status: Vec::new(),
+        line_errors: 0,
     };
     assert_eq!(lens.info(), Ok(expected));
 

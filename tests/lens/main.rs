@@ -1,9 +1,11 @@
 //! The Optotune driver against an emulated Lens Driver 4 behind a pseudo-terminal.
 
+mod closing;
 mod command_line;
 mod driver;
 mod dynamics;
 mod faults;
+mod line;
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -81,10 +81,19 @@ impl Server {
         client().post(self.url(path)).bearer_auth(self.key(role))
     }
 
+    /// Its process.
+    pub fn pid(&self) -> rustix::process::Pid {
+        rustix::process::Pid::from_child(&self.process)
+    }
+
+    /// The number of its process.
+    pub fn id(&self) -> u32 {
+        self.process.id()
+    }
+
     /// Ends the server as Ctrl-C or a service manager would, and waits: whether it ended well.
     pub fn end(&mut self, signal: rustix::process::Signal) -> bool {
-        let id = rustix::process::Pid::from_child(&self.process);
-        rustix::process::kill_process(id, signal).unwrap();
+        rustix::process::kill_process(self.pid(), signal).unwrap();
         self.process.wait().unwrap().success()
     }
 }

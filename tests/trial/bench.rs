@@ -209,6 +209,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
             working: true,
             caution: false,
             message: "none".into(),
+            line_errors: 0,
         },
         policy: None,
         focal_power: FocalPower::MIDDLE,
@@ -220,6 +221,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         telemetry_dropped: 0,
         latency_p50_micros: 0,
         latency_p99_micros: 0,
+        priority: parfocal::priority::Standing::Ordinary,
     };
     let (commands, received) = mpsc::unbounded_channel();
     let status = watch::channel(Arc::new(status)).1;

@@ -14,10 +14,11 @@ export function drawDevices(list, status) {
   ]);
 }
 
-/** What camera and lens say of themselves, into the list of terms `list`. */
-export function drawDeviceWords(list, { camera, lens }) {
+/** What camera, lens and loop say of themselves, into the list of terms `list`. */
+export function drawDeviceWords(list, { camera, lens, priority }) {
   const one = (term, { name, message }) => [make("dt", {}, term), make("dd", {}, make("span", {}, `${name}: `), make("span", { className: "muted" }, message))];
-  redraw(list, [...one("Camera", camera), ...one("Lens", lens)]);
+  const loop = [make("dt", {}, "Focus loop"), make("dd", { className: "muted" }, priority.message)];
+  redraw(list, [...one("Camera", camera), ...one("Lens", lens), ...loop]);
 }
 
 const milliseconds = (micros) => (micros / 1000).toFixed(2);

@@ -20,6 +20,7 @@ use self::device::{Device, Wanted};
 use self::worker::Shared;
 use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
 use crate::clock::Moment;
+use crate::priority::Place;
 
 /// A machine vision camera.
 pub struct GigeCamera {
@@ -44,8 +45,8 @@ impl GigeCamera {
         let thread = std::thread::Builder::new()
             .name("gige".into())
             .spawn(move || {
-                crate::priority::raise();
                 // Opened here, so that Aravis's thread that receives packets inherits the priority.
+                crate::priority::raise_with_children(Place::Wire);
                 match Device::open(&wanted) {
                     Ok(device) => {
                         let shared = Arc::new(Shared::new(settings.clock, &device));

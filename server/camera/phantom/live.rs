@@ -124,6 +124,10 @@ impl Camera for PhantomCamera {
         Some((SENSOR_WIDTH, SENSOR_HEIGHT))
     }
 
+    fn computes(&self) -> bool {
+        true
+    }
+
     fn health(&self) -> CameraHealth {
         CameraHealth {
             name: Arc::from("brain phantom (simulated)"),

@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 
 use super::{Failure, print};
 use crate::clock::{Clock, SystemClock};
-use crate::lens::emulator::{Emulator, Fault, LENS_DIOPTRES, Model};
+use crate::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};
 use crate::lens::{LensDynamics, Optics};
 use crate::notices::tell;
 
@@ -18,7 +18,9 @@ const HELP: &str = "type what shall befall it, then Enter:
   lens out | lens in               the lens's own cable
   temperature CELSIUS              of the lens
   latency MS                       until it answers a request
-  fault NAME                       none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands, stranger
+  fault NAME                       none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands, stranger,
+                                   noisy-line
+  glitch NAME [N]                  befalls the next reply, or N of them: noise, checksum, late
   glass                            tells the focal power of the glass now, which no driver can read
 Ctrl-C ends it";
 
@@ -46,7 +48,8 @@ pub struct Arguments {
     /// Temperature of the lens in °C.
     #[arg(long, value_name = "CELSIUS", default_value = "25.5", value_parser = parse_temperature, allow_negative_numbers = true)]
     temperature: f64,
-    /// What is wrong with it from the start: none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands or stranger.
+    /// What is wrong with it from the start: none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands,
+    /// stranger or noisy-line.
     #[arg(long, value_name = "NAME", default_value = "none")]
     fault: Fault,
 }
@@ -114,6 +117,8 @@ fn befall(emulator: &mut Emulator, line: &str) -> Result<String, String> {
         ["temperature", celsius] => emulator.set_temperature(parse_temperature(celsius)?),
         ["latency", millis] => emulator.set_latency(parse_millis(millis)?),
         ["fault", name] => emulator.set_fault(name.parse::<Fault>()?),
+        ["glitch", name] => emulator.glitch(name.parse::<Glitch>()?, 0, 1),
+        ["glitch", name, replies] => emulator.glitch(name.parse::<Glitch>()?, 0, parse_replies(replies)?),
         ["glass"] => return Ok(glass(emulator)),
         _ => return Err(HELP.into()),
     }
@@ -151,6 +156,11 @@ fn parse_millis(text: &str) -> Result<Duration, String> {
 fn parse_play(text: &str) -> Result<f64, String> {
     let play = text.parse().ok().and_then(Model::play_of);
     play.ok_or_else(|| format!("must be a number from 0 to {}", LENS_DIOPTRES.1 - LENS_DIOPTRES.0))
+}
+
+fn parse_replies(text: &str) -> Result<usize, String> {
+    let replies = text.parse().ok().filter(|replies| (1..=1000).contains(replies));
+    replies.ok_or_else(|| format!("must be a number of replies from 1 to 1000, not '{text}'"))
 }
 
 fn parse_temperature(text: &str) -> Result<f64, String> {

@@ -13,7 +13,7 @@ use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
 use crate::camera::{self, CameraSettings};
 use crate::cli::calibration;
-use crate::cli::interrupt::Interrupt;
+use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::clock::SystemClock;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens;
@@ -104,6 +104,7 @@ fn devices(
 ) -> Result<(Box<dyn Bench>, Header), Failure> {
     let calibration = arguments.calibration.as_deref().map(calibration::read).transpose()?;
     let clock = Arc::new(SystemClock);
+    let_lenses_go_first_beside_an_interrupt()?;
     let lens = lens::open(lens, Arc::clone(&clock) as _)?;
     let settings = CameraSettings {
         fps: arguments.fps.into(),

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::unit::{Fault, LENS_DIOPTRES, Model};
+use super::unit::{Fault, Glitch, LENS_DIOPTRES, Model};
 use super::wire::{REQUESTS, checksum_of, framed};
 use crate::clock::Moment;
 use crate::lens::{FocalPower, Response};
@@ -18,6 +18,32 @@ const IMAX_HUNDREDTHS: u16 = 29_284;
 const PATIENCE: Duration = Duration::from_millis(50);
 /// Focal power commands remembered for whoever wants to look.
 const REMEMBERED: usize = 8192;
+/// How much later than usual a [`Glitch::Late`] reply comes: later than a driver waits.
+const LATE: Duration = Duration::from_millis(200);
+/// What [`Glitch::Noise`] puts before a reply.
+const NOISE: [u8; 3] = [0xFF, 0x00, 0x7E];
+
+/// A reply on its way.
+#[derive(Debug)]
+pub struct Answer {
+    /// What goes over the wire.
+    pub bytes: Vec<u8>,
+    /// Time that it takes.
+    pub takes: Duration,
+}
+
+/// Something that the driver was told to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Control by current.
+    CurrentMode,
+    /// Go to a current, in counts.
+    Current(i16),
+    /// Control by focal power.
+    FocalPowerMode,
+    /// Go to a focal power, in the driver's units.
+    FocalPower(i16),
+}
 
 /// A driver with its lens.
 pub struct Firmware {
@@ -31,6 +57,14 @@ pub struct Firmware {
     pub lens_present: bool,
     /// Focal power commands carried out, in the driver's units, and when they were read.
     pub commands: VecDeque<(Moment, i16)>,
+    /// Everything that the driver was told to do, carried out or not.
+    pub orders: VecDeque<Order>,
+    /// Whole requests that have arrived.
+    pub requests: u64,
+    /// What befalls the next replies, one by one.
+    pub glitches: VecDeque<Option<Glitch>>,
+    /// Replies made on a [`Fault::NoisyLine`].
+    noisy_replies: usize,
     glass: Arc<Response>,
     mode: u8,
     /// In 1/16 °C: upper, lower.
@@ -52,6 +86,10 @@ impl Firmware {
             temperature: 25.5,
             lens_present: true,
             commands: VecDeque::new(),
+            orders: VecDeque::new(),
+            requests: 0,
+            glitches: VecDeque::new(),
+            noisy_replies: 0,
             mode: 1,
             limits: None,
             focal_power: 0,
@@ -81,7 +119,7 @@ impl Firmware {
     }
 
     /// The driver's answers to `bytes`, one a request.
-    pub fn receive(&mut self, bytes: &[u8], now: Moment) -> Vec<Vec<u8>> {
+    pub fn receive(&mut self, bytes: &[u8], now: Moment) -> Vec<Answer> {
         if now.since(self.last_byte) > PATIENCE {
             self.buffer.clear();
         }
@@ -92,11 +130,14 @@ impl Firmware {
             Fault::Silent => self.buffer.clear(),
             Fault::Stranger => {
                 self.buffer.clear();
-                answers.push(b"ok T:21.4 B:60.0\r\n".to_vec());
+                answers.push(Answer { bytes: b"ok T:21.4 B:60.0\r\n".to_vec(), takes: self.model.latency });
             }
             _ => {
                 while let Some(answer) = self.next(now) {
-                    answers.extend((!answer.is_empty()).then(|| self.damaged(answer)));
+                    self.requests += 1;
+                    if !answer.is_empty() {
+                        answers.push(self.sent(answer));
+                    }
                 }
             }
         }
@@ -135,11 +176,29 @@ impl Firmware {
         Some(self.answer(name, payload.get(name.len()..).unwrap_or_default(), now))
     }
 
+    fn remember(&mut self, order: Order) {
+        if self.orders.len() == REMEMBERED {
+            self.orders.pop_front();
+        }
+        self.orders.push_back(order);
+    }
+
     fn answer(&mut self, name: &[u8], values: &[u8], now: Moment) -> Vec<u8> {
         let value = |index: usize| match values.get(2 * index..2 * index + 2) {
             Some(&[high, low]) => i16::from_be_bytes([high, low]),
             _ => 0,
         };
+        let order = match name {
+            b"Aw" => Some(Order::Current(value(0))),
+            b"MwDA" => Some(Order::CurrentMode),
+            b"MwCA" => Some(Order::FocalPowerMode),
+            b"PwDA" => Some(Order::FocalPower(value(0))),
+            _ => None,
+        };
+        if let Some(order) = order {
+            self.remember(order);
+        }
+
         match name {
             b"H" => framed(&[b'H', self.model.firmware]),
             b"V" => framed(&[b'V', 1, 8, 0, 3, 0, 1]),
@@ -236,6 +295,29 @@ impl Firmware {
         framed(&[b'E', if self.model.ascii_errors { b'0' + number } else { number }])
     }
 
+    /// `answer` as it goes over the wire.
+    fn sent(&mut self, answer: Vec<u8>) -> Answer {
+        let mut sent = Answer { bytes: self.damaged(answer), takes: self.model.latency };
+        let glitch = self.glitches.pop_front().unwrap_or_else(|| self.noise_of_the_line());
+        match glitch {
+            Some(Glitch::Noise) => sent.bytes.splice(..0, NOISE).for_each(drop),
+            Some(Glitch::Checksum) => spoil_checksum(&mut sent.bytes),
+            Some(Glitch::Late) => sent.takes += LATE,
+            None => {}
+        }
+        sent
+    }
+
+    /// What befalls the next reply for the line's sake.
+    fn noise_of_the_line(&mut self) -> Option<Glitch> {
+        if self.fault != Fault::NoisyLine {
+            return None;
+        }
+        self.noisy_replies += 1;
+        let struck = self.noisy_replies.is_multiple_of(3);
+        struck.then(|| Glitch::ALL[self.noisy_replies / 3 % Glitch::ALL.len()])
+    }
+
     fn damaged(&self, mut answer: Vec<u8>) -> Vec<u8> {
         match self.fault {
             Fault::Garbage => answer.iter_mut().for_each(|byte| *byte = byte.wrapping_mul(31) ^ 0x5A),
@@ -263,15 +345,19 @@ fn sixteenths(celsius: f64) -> i16 {
 mod tests {
     use super::*;
 
+    fn answers(firmware: &mut Firmware, request: &[u8]) -> Vec<u8> {
+        let answers = firmware.receive(request, Moment::default());
+        answers.into_iter().flat_map(|answer| answer.bytes).collect()
+    }
+
     fn talk(firmware: &mut Firmware, request: &str) -> String {
-        let answers = firmware.receive(&hex::decode(request).unwrap(), Moment::default());
-        hex::encode_upper(answers.concat())
+        hex::encode_upper(answers(firmware, &hex::decode(request).unwrap()))
     }
 
     #[test]
     fn answers_the_published_requests_with_the_published_replies() {
         let mut firmware = Firmware::new(Model::default());
-        assert_eq!(firmware.receive(b"Start", Moment::default()).concat(), b"Ready\r\n");
+        assert_eq!(answers(&mut firmware, b"Start"), b"Ready\r\n");
         assert_eq!(talk(&mut firmware, "544341B0D0"), "544341019874660D0A", "25.5 °C");
         assert_eq!(talk(&mut firmware, "43724D4100007180"), "434D41726427FC0D0A", "292.84 mA");
         assert!(!talk(&mut firmware, "507754410280014033D0").is_empty(), "temperature limits");

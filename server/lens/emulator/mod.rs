@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-pub use unit::{Fault, LENS_DIOPTRES, Model};
+pub use firmware::Order;
+pub use unit::{Fault, Glitch, LENS_DIOPTRES, Model};
 
 use super::Response;
 use crate::clock::{Clock, Moment};
@@ -88,6 +89,12 @@ impl Emulator {
         self.firmware().fault = fault;
     }
 
+    /// Lets `glitch` befall `replies` replies, after the next `spared` ones and all for which glitches are already due.
+    pub fn glitch(&self, glitch: Glitch, spared: usize, replies: usize) {
+        let befalls = std::iter::repeat_n(None, spared).chain(std::iter::repeat_n(Some(glitch), replies));
+        self.firmware().glitches.extend(befalls);
+    }
+
     /// Lets the unit take `latency` to answer a request, from the next one on.
     pub fn set_latency(&self, latency: Duration) {
         self.firmware().model.latency = latency;
@@ -107,6 +114,18 @@ impl Emulator {
     #[must_use]
     pub fn commands(&self) -> Vec<(Moment, i16)> {
         self.firmware().commands.iter().copied().collect()
+    }
+
+    /// Everything that the unit was told to do so far, carried out or not.
+    #[must_use]
+    pub fn orders(&self) -> Vec<Order> {
+        self.firmware().orders.iter().copied().collect()
+    }
+
+    /// Whole requests that have arrived so far; the reply to the latest may still be on its way.
+    #[must_use]
+    pub fn requests(&self) -> u64 {
+        self.firmware().requests
     }
 
     /// Mode of control, as the unit counts them, and the current in counts.

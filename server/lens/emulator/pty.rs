@@ -16,6 +16,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::firmware::Firmware;
 use crate::clock::Clock;
+use crate::priority::{self, Place};
 
 /// While nobody has the port open there is nothing to wait for; look again this often.
 const UNOPENED: Duration = Duration::from_millis(5);
@@ -43,7 +44,7 @@ impl Pty {
         let server = Server { port: File::from(driver), stop: stop.clone(), firmware, clock };
         let thread = std::thread::Builder::new().name("lens-emulator".into()).spawn(move || {
             // A real unit has a processor to itself.
-            crate::priority::raise();
+            priority::raise(Place::Wire);
             server.run();
         })?;
         Ok(Self { path, stop, thread: Some(thread) })
@@ -83,16 +84,16 @@ impl Server {
             }
             let Ok(read) = self.port.read(&mut bytes) else { continue };
             let received = bytes.get(..read).unwrap_or_default();
-            let (answers, latency) = {
+            let answers = {
                 let mut firmware = self.firmware.lock().unwrap_or_else(PoisonError::into_inner);
-                (firmware.receive(received, self.clock.now()), firmware.model.latency)
+                firmware.receive(received, self.clock.now())
             };
             for answer in answers {
-                if self.stopped_within(latency) {
+                if self.stopped_within(answer.takes) {
                     return;
                 }
                 // Nobody may be listening any more.
-                let _ = self.port.write_all(&answer);
+                let _ = self.port.write_all(&answer.bytes);
             }
         }
     }

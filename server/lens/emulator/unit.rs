@@ -31,11 +31,49 @@ pub enum Fault {
     DropsCommands,
     /// Some other device that says what it likes.
     Stranger,
+    /// Every third reply meets with a [`Glitch`], each kind in turn.
+    NoisyLine,
+}
+
+/// What can happen to a single reply on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Glitch {
+    /// A few bytes of noise arrive before it.
+    Noise,
+    /// Its checksum is wrong.
+    Checksum,
+    /// It comes 200 ms late.
+    Late,
+}
+
+impl Glitch {
+    /// Every kind.
+    pub(super) const ALL: [Self; 3] = [Self::Noise, Self::Checksum, Self::Late];
+
+    /// Name on the command line.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Noise => "noise",
+            Self::Checksum => "checksum",
+            Self::Late => "late",
+        }
+    }
+}
+
+impl FromStr for Glitch {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|glitch| glitch.name() == name).ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|glitch| glitch.name()).collect();
+            format!("there is no glitch '{name}': choose from {}", names.join(", "))
+        })
+    }
 }
 
 impl Fault {
     /// Every state.
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::None,
         Self::Garbage,
         Self::WrongChecksum,
@@ -44,6 +82,7 @@ impl Fault {
         Self::Errors,
         Self::DropsCommands,
         Self::Stranger,
+        Self::NoisyLine,
     ];
 
     /// Name on the command line.
@@ -57,6 +96,7 @@ impl Fault {
             Self::Errors => "errors",
             Self::DropsCommands => "drops-commands",
             Self::Stranger => "stranger",
+            Self::NoisyLine => "noisy-line",
         }
     }
 }

@@ -19,18 +19,24 @@ pub struct Settings {
     pub max_dioptre: Option<f64>,
     /// Lens temperatures, in °C, between which focal power is to be held. A wider span narrows the dioptre range.
     pub temperatures: (f64, f64),
+    /// Whether the lens is taken as it stands and left where it is put, instead of being without current before and
+    /// after.
+    pub keep: bool,
 }
 
 impl Default for Settings {
     /// The whole of the range, from room temperature to a lens warmed by its own coil.
     fn default() -> Self {
-        Self { min_dioptre: None, max_dioptre: None, temperatures: (20.0, 40.0) }
+        Self { min_dioptre: None, max_dioptre: None, temperatures: (20.0, 40.0), keep: false }
     }
 }
 
 /// Makes the device behind `link` ready for commands.
 pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Device, Trouble> {
     greet(link, path)?;
+    if !settings.keep && !link.is_known() {
+        let_go_first(link)?;
+    }
     let Reply::FirmwareType(letter) = link.ask(Request::FirmwareType)? else { return Err(confused()) };
     let version = match link.ask(Request::FirmwareVersion)? {
         Reply::FirmwareVersion(major, minor, build, revision) => format!("{major}.{minor}.{build}.{revision}"),
@@ -61,32 +67,36 @@ pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Devi
     })
 }
 
-/// Tries twice, because the first greeting may end a request that someone else left half sent.
 fn greet(link: &mut Link, path: &Path) -> Result<(), Trouble> {
-    let known = link.is_known();
-    let stranger = || {
-        if known {
-            return LensError::Gone("its replies are unreadable: check its USB cable".into());
+    match link.greet() {
+        Ok(true) => Ok(()),
+        Ok(false) if link.is_known() => {
+            Err(LensError::Gone("its replies are unreadable: check its USB cable".into()).into())
         }
-        LensError::Refused(format!(
+        Ok(false) => Err(LensError::Refused(format!(
             "{} answers, but not as an Optotune Lens Driver 4: is this the right port?",
             path.display()
         ))
-    };
-    match link.greet() {
-        Ok(true) => return Ok(()),
-        Ok(false) | Err(LinkError::Silent) => {}
-        Err(error) => return Err(error.into()),
-    }
-    match link.greet() {
-        Ok(true) => Ok(()),
-        Ok(false) => Err(stranger().into()),
+        .into()),
         Err(LinkError::Silent) => Err(LensError::Gone(format!(
             "nothing answers at {}: is it an Optotune Lens Driver 4, and is it powered?",
             path.display()
         ))
         .into()),
         Err(error) => Err(error.into()),
+    }
+}
+
+/// A process that was killed may have left the lens under current. What the driver says to this is no matter: if it
+/// cannot be used, what follows finds out why.
+fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
+    match link.relax() {
+        Err(error @ (LinkError::Stopped | LinkError::Port(_))) => Err(error.into()),
+        Err(error) => {
+            tracing::debug!(%error, "the lens was not seen to rest before it was set up");
+            Ok(())
+        }
+        Ok(()) => Ok(()),
     }
 }
 

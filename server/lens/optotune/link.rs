@@ -13,6 +13,16 @@ use crate::clock::Moment;
 
 /// A driver answers within a few milliseconds; USB hubs add some.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(150);
+/// A command's ten bytes take so long over the wire. One that is sent sooner after another waits in the port, where a later
+/// one cannot overtake it.
+const ON_THE_WIRE: Duration = Duration::from_millis(1);
+/// Times that a request is made before its failure counts. Every request that gets a reply may be repeated: it only
+/// asks, or sets what is set already.
+const ATTEMPTS: u32 = 3;
+/// A line that has been quiet for so long has nothing more to say about an earlier request.
+const QUIET: Duration = Duration::from_millis(10);
+/// Longest wait for a line that never gets quiet.
+const DRAINING: Duration = Duration::from_millis(200);
 
 /// A port with a lens driver behind it.
 pub struct Link<'a> {
@@ -21,6 +31,10 @@ pub struct Link<'a> {
     /// Once known, commands are taken from the slot.
     range: Option<Range>,
     sent: Option<Sent>,
+    /// Whether a reply is owed: it may still come.
+    awaiting: bool,
+    /// Whether the lens is being let go: nothing stops that.
+    closing: bool,
     outgoing: Vec<u8>,
     incoming: Vec<u8>,
 }
@@ -51,10 +65,31 @@ pub enum LinkError {
     Stopped,
 }
 
+impl LinkError {
+    /// Whether the line may be at fault, so that the same request may well succeed. A driver that knows no such request
+    /// may have got it damaged.
+    const fn is_of_the_line(&self) -> bool {
+        match self {
+            Self::Silent | Self::Wire(WireError::Checksum | WireError::Garbage) => true,
+            Self::Wire(WireError::Device(error)) => matches!(error, DeviceError::Checksum | DeviceError::Unknown),
+            Self::Port(_) | Self::Stopped => false,
+        }
+    }
+}
+
 impl<'a> Link<'a> {
     /// A connection over `port`.
     pub const fn new(port: Port, shared: &'a Shared) -> Self {
-        Self { port, shared, range: None, sent: None, outgoing: Vec::new(), incoming: Vec::new() }
+        Self {
+            port,
+            shared,
+            range: None,
+            sent: None,
+            awaiting: false,
+            closing: false,
+            outgoing: Vec::new(),
+            incoming: Vec::new(),
+        }
     }
 
     /// From now on takes commands from the slot and sends them within `range`.
@@ -80,35 +115,147 @@ impl<'a> Link<'a> {
         self.sent = Some(Sent { raw, at: now });
     }
 
-    /// Greets the driver; whether it greeted back as a lens driver does.
+    /// Greets the driver, three times at most: the first greeting may end a request that someone else left half sent.
+    /// Whether it greeted back as a lens driver does.
     pub fn greet(&mut self) -> Result<bool, LinkError> {
+        let mut heard = false;
+        for _ in 0..ATTEMPTS {
+            if self.greet_once()? {
+                self.note_noise(!self.incoming.starts_with(READY));
+                self.shared.state().greeted = true;
+                return Ok(true);
+            }
+            heard |= !self.incoming.is_empty();
+            self.shared.count_line_error();
+            self.drain()?;
+        }
+        if heard { Ok(false) } else { Err(LinkError::Silent) }
+    }
+
+    fn greet_once(&mut self) -> Result<bool, LinkError> {
         self.incoming.clear();
         self.outgoing.extend(START);
         let end = self.shared.clock.now() + REPLY_TIMEOUT;
         while self.shared.clock.now() < end {
             self.pump(end)?;
-            if self.incoming.ends_with(READY) {
+            if self.incoming.windows(READY.len()).any(|bytes| bytes == READY) {
                 return Ok(true);
             }
         }
-        if self.incoming.is_empty() { Err(LinkError::Silent) } else { Ok(false) }
+        Ok(false)
     }
 
-    /// Asks `request` and waits for its reply.
+    /// Asks `request` and waits for its reply. Where the line lost or damaged it, asks again, three times in all.
     pub fn ask(&mut self, request: Request) -> Result<Reply, LinkError> {
+        let mut attempt = 1;
+        loop {
+            let error = match self.ask_once(request) {
+                Err(error) if error.is_of_the_line() => error,
+                outcome => return outcome,
+            };
+            self.shared.count_line_error();
+            if attempt == ATTEMPTS {
+                return Err(error);
+            }
+            attempt += 1;
+            self.drain()?;
+        }
+    }
+
+    fn ask_once(&mut self, request: Request) -> Result<Reply, LinkError> {
         self.receive()?;
         self.incoming.clear();
         self.outgoing.extend(request.encode());
+        self.awaiting = true;
         let end = self.shared.clock.now() + REPLY_TIMEOUT;
         loop {
             self.pump(end)?;
-            if let Some(reply) = request.reply(&self.incoming)? {
-                return Ok(reply);
+            let outcome = self.find_reply(request);
+            if matches!(outcome, Ok(_) | Err(LinkError::Wire(WireError::Device(_)))) {
+                self.awaiting = false;
+                return outcome;
             }
             if self.shared.clock.now() >= end {
-                return Err(if self.incoming.is_empty() { LinkError::Silent } else { WireError::Garbage.into() });
+                return outcome;
             }
         }
+    }
+
+    /// The reply to `request` among the bytes that came: behind noise, or behind a late reply to something else.
+    fn find_reply(&self, request: Request) -> Result<Reply, LinkError> {
+        let mut failure = if self.incoming.is_empty() { LinkError::Silent } else { WireError::Garbage.into() };
+        for start in 0..self.incoming.len() {
+            match request.reply(self.incoming.get(start..).unwrap_or_default()) {
+                Ok(Some(reply)) => {
+                    self.note_noise(start > 0);
+                    return Ok(reply);
+                }
+                Err(error) if start == 0 => failure = error.into(),
+                _ => {}
+            }
+        }
+        Err(failure)
+    }
+
+    /// Counts what came `before` a reply and was no part of it.
+    fn note_noise(&self, before: bool) {
+        if before {
+            self.shared.count_line_error();
+        }
+    }
+
+    /// Waits until the line is quiet, and forgets what came. A reply that is owed and of which nothing came yet is given
+    /// the time that a reply may take.
+    fn drain(&mut self) -> Result<(), LinkError> {
+        let begun = self.shared.clock.now();
+        let end = begun + DRAINING;
+        let late = self.awaiting && self.incoming.is_empty();
+        let mut quiet_at = begun + if late { REPLY_TIMEOUT } else { QUIET };
+        self.awaiting = false;
+        loop {
+            self.incoming.clear();
+            self.pump(quiet_at.min(end))?;
+            let now = self.shared.clock.now();
+            if !self.incoming.is_empty() {
+                quiet_at = now + QUIET;
+            }
+            if now >= quiet_at.min(end) {
+                self.incoming.clear();
+                return Ok(());
+            }
+        }
+    }
+
+    /// Leaves the lens without current: it rests, and warms nobody. The driver is told whatever it answers, and asked
+    /// whether it obeyed.
+    pub fn relax(&mut self) -> Result<(), LinkError> {
+        let mut attempt = 1;
+        loop {
+            self.drain()?;
+            let outcome = self.relax_once();
+            match outcome {
+                Err(error) if error.is_of_the_line() && attempt < ATTEMPTS => self.shared.count_line_error(),
+                outcome => return outcome,
+            }
+            attempt += 1;
+        }
+    }
+
+    fn relax_once(&mut self) -> Result<(), LinkError> {
+        let by_current = self.ask_once(Request::CurrentMode);
+        self.tell(Request::SetCurrent(0))?;
+        by_current?;
+        match self.ask_once(Request::Current)? {
+            Reply::Current(0) => Ok(()),
+            _ => Err(WireError::Garbage.into()),
+        }
+    }
+
+    /// The last that is done with the lens: no more commands are taken, and the lens is left without current.
+    pub fn close(&mut self) -> Result<(), LinkError> {
+        self.closing = true;
+        self.range = None;
+        self.relax()
     }
 
     /// Sends a request that gets no reply, or whose reply nobody needs.
@@ -121,7 +268,11 @@ impl<'a> Link<'a> {
     /// An error that the driver sent unasked, which is how it answers a command that it did not accept.
     pub fn stray_error(&mut self) -> Option<DeviceError> {
         let stray = std::mem::take(&mut self.incoming);
-        codec::error_reply(&stray)
+        let error = codec::error_reply(&stray);
+        if error == Some(DeviceError::Checksum) {
+            self.shared.count_line_error();
+        }
+        error
     }
 
     /// Sends what waits to be sent, and waits until something happens or `until`: bytes came, the slot was filled, or
@@ -129,6 +280,7 @@ impl<'a> Link<'a> {
     pub fn pump(&mut self, until: Moment) -> Result<(), LinkError> {
         self.take_command();
         self.flush()?;
+        let until = self.command_due().map_or(until, |due| due.min(until));
         let left = Timespec::try_from(until.since(self.shared.clock.now())).unwrap_or_default();
         let wanted = if self.outgoing.is_empty() { PollFlags::IN } else { PollFlags::IN | PollFlags::OUT };
         let mut watched = [PollFd::new(self.port.file(), wanted), PollFd::new(&self.shared.wake, PollFlags::IN)];
@@ -139,18 +291,28 @@ impl<'a> Link<'a> {
         let [port, wake] = watched.map(|one| one.revents());
         if wake.contains(PollFlags::IN) {
             let _ = rustix::io::read(&self.shared.wake, &mut [0; 8]);
-            if self.shared.state().ending.is_some() {
+            if !self.closing && self.shared.state().ending() {
                 return Err(LinkError::Stopped);
             }
-            self.take_command();
         }
+        self.take_command();
         self.flush()?;
         if port.intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR) { self.receive() } else { Ok(()) }
     }
 
-    /// Moves the command from the slot onto the wire, unless an older one is not even out.
+    /// When the command that waits in the slot may go out.
+    fn command_due(&self) -> Option<Moment> {
+        let free = self.range.is_some() && self.outgoing.is_empty();
+        let sent = self.sent.filter(|_| free && self.shared.has_command())?;
+        Some(sent.at + ON_THE_WIRE)
+    }
+
+    /// Moves the command from the slot onto the wire, unless an older one is still on it.
     fn take_command(&mut self) {
         let Some(range) = self.range.filter(|_| self.outgoing.is_empty()) else { return };
+        if self.command_due().is_some_and(|due| self.shared.clock.now() < due) {
+            return;
+        }
         if let Some(target) = self.shared.take_command() {
             self.send_focal_power(range, range.raw(target));
         }

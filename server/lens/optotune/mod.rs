@@ -2,7 +2,8 @@
 //!
 //! The caller's side only touches memory; a thread of its own talks to the port. When the lens is dropped, that thread
 //! puts the driver into current mode at 0 mA: the lens relaxes to its resting focal power and does not warm up (unless
-//! [`Lens::keep_on_close`] was called). A process that is killed leaves the lens at the last focal power commanded.
+//! [`Settings::keep`] is set). [`let_go_of_all`] does the same before a process ends by another way. Only
+//! `kill -9` leaves the lens at the last focal power commanded, until it is opened again.
 
 pub mod codec;
 mod handshake;
@@ -14,16 +15,17 @@ mod status;
 mod worker;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 pub use handshake::Settings;
-use shared::{Ending, Shared};
+use shared::Shared;
 
 use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
 use crate::clock::Clock;
 use crate::options::Options;
+use crate::priority::{self, Place};
 
 /// Until it is measured on the bench: see the simulated lens's figures.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
@@ -31,17 +33,37 @@ const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), s
 /// How serial numbers of emulated units begin (see [`super::emulator`]): behind those no glass moves.
 const EMULATED: &str = "EMUL";
 
-/// Longest wait for a device to say who it is, with a second attempt at greeting.
-const CONNECT: Duration = Duration::from_secs(2);
+/// Longest wait for a device to say who it is, on a line where much has to be said twice.
+const CONNECT: Duration = Duration::from_secs(4);
 /// Longest wait for an answer.
 const ANSWER: Duration = Duration::from_millis(900);
+
+/// Longest wait for the driver's thread to let the lens go: a driver that is silent is told and asked three times, twice.
+const LETTING_GO: Duration = Duration::from_secs(3);
+
+/// The lenses that are open: whatever ends the process, they must not be left under current.
+static OPEN: Mutex<Vec<Weak<Shared>>> = Mutex::new(Vec::new());
+
+/// Leaves every open lens without current, but for those that are to stay where they are, and waits until that is done.
+/// They take no commands any more.
+pub fn let_go_of_all() {
+    let open: Vec<_> = {
+        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        open.drain(..).filter_map(|shared| shared.upgrade()).collect()
+    };
+    for shared in &open {
+        shared.end();
+    }
+    for shared in &open {
+        shared.wait_ended(LETTING_GO);
+    }
+}
 
 /// A lens at a serial port.
 pub struct OptotuneLens {
     shared: Arc<Shared>,
     name: Arc<str>,
     thread: Option<JoinHandle<()>>,
-    ending: Ending,
     emulated: bool,
 }
 
@@ -55,18 +77,19 @@ impl OptotuneLens {
         let system = |error: std::io::Error| LensError::Gone(format!("the system is out of resources: {error}"));
         let shared = Arc::new(Shared::new(clock, response).map_err(system)?);
         let (theirs, path_of_thread) = (shared.clone(), path.to_owned());
+        OPEN.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::downgrade(&shared));
         let thread = std::thread::Builder::new()
             .name("lens".into())
             .spawn(move || {
-                crate::priority::raise();
+                priority::raise(Place::Wire);
                 worker::run(&theirs, &path_of_thread, &settings);
+                theirs.ended();
             })
             .map_err(system)?;
         let mut lens = Self {
             shared,
             name: format!("Optotune lens at {}", path.display()).into(),
             thread: Some(thread),
-            ending: Ending::Relaxed,
             emulated: false,
         };
         lens.emulated = lens.shared.wait_connected(CONNECT)?.serial.starts_with(EMULATED);
@@ -75,12 +98,18 @@ impl OptotuneLens {
 
     /// The lens of a specification: `device` is a path, or `auto` for the one that is plugged in; options are `min` and
     /// `max`, the dioptres to use, and `low` and `high`, the temperature limits in °C.
-    pub(super) fn open(device: &str, mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
+    pub(super) fn open(
+        device: &str,
+        mut options: Options,
+        keep: bool,
+        clock: Arc<dyn Clock>,
+    ) -> Result<Self, LensError> {
         let (low, high) = Settings::default().temperatures;
         let settings = Settings {
             min_dioptre: options.take("min")?,
             max_dioptre: options.take("max")?,
             temperatures: (options.take("low")?.unwrap_or(low), options.take("high")?.unwrap_or(high)),
+            keep,
         };
         options.finish()?;
         let path = if device == "auto" { port::find(Path::new(port::BY_ID))? } else { PathBuf::from(device) };
@@ -90,10 +119,12 @@ impl OptotuneLens {
 
 impl Drop for OptotuneLens {
     fn drop(&mut self) {
-        self.shared.end(self.ending);
+        self.shared.end();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
+        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        open.retain(|shared| !std::ptr::eq(shared.as_ptr(), Arc::as_ptr(&self.shared)));
     }
 }
 
@@ -115,7 +146,14 @@ impl Lens for OptotuneLens {
             (Ok(_), Some(refusal)) => (false, refusal.clone()),
             (Err(trouble), _) => (false, Arc::from(format!("{trouble}; trying again"))),
         };
-        LensHealth { name: self.name.clone(), simulated: self.emulated, working, caution, message }
+        LensHealth {
+            name: self.name.clone(),
+            simulated: self.emulated,
+            working,
+            caution,
+            message,
+            line_errors: self.shared.line_errors(),
+        }
     }
 
     fn info(&mut self) -> Result<LensInfo, LensError> {
@@ -129,6 +167,7 @@ impl Lens for OptotuneLens {
             temperature_celsius: Some(device.temperature),
             mode: status::mode_name(device.mode).into(),
             status: device.status.words(),
+            line_errors: self.shared.line_errors(),
         })
     }
 
@@ -138,10 +177,6 @@ impl Lens for OptotuneLens {
 
     fn optics(&self) -> Arc<dyn Optics> {
         self.shared.response.clone()
-    }
-
-    fn keep_on_close(&mut self) {
-        self.ending = Ending::AsItIs;
     }
 
     fn read_back(&mut self) -> Result<FocalPower, LensError> {

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::os::fd::OwnedFd;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -23,6 +24,7 @@ pub struct Shared {
     pub response: Arc<Response>,
     /// Readable when there is something for the thread to look at.
     pub wake: OwnedFd,
+    line_errors: AtomicU64,
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -41,21 +43,14 @@ pub struct State {
     pub message: Arc<str>,
     /// Why commands are not carried out though the device is connected.
     pub refusal: Option<Arc<str>>,
-    /// The thread is to end, and how to leave the lens.
-    pub ending: Option<Ending>,
+    /// Whether a lens driver ever greeted back here.
+    pub greeted: bool,
+    /// How far the thread is.
+    progress: Progress,
     /// Someone waits for fresh readings.
     pub refresh: bool,
     /// Counts the times that all readings were fresh.
     refreshed: u64,
-}
-
-/// How to leave the lens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
-    /// Without current.
-    Relaxed,
-    /// Where it is.
-    AsItIs,
 }
 
 /// A connected device.
@@ -77,7 +72,21 @@ pub struct Device {
     pub read_back: i16,
 }
 
+/// How far the thread is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Progress {
+    Serving,
+    /// It is to end.
+    Ending,
+    Ended,
+}
+
 impl State {
+    /// Whether the thread is to end.
+    pub fn ending(&self) -> bool {
+        self.progress != Progress::Serving
+    }
+
     /// Whether a lens driver was ever connected here.
     pub const fn was_connected(&self) -> bool {
         self.refreshed > 0
@@ -96,11 +105,13 @@ impl Shared {
             tried: false,
             message: Arc::default(),
             refusal: None,
-            ending: None,
+            greeted: false,
+            progress: Progress::Serving,
             refresh: false,
             refreshed: 0,
         };
-        Ok(Self { clock, response, wake, state: Mutex::new(state), changed: Condvar::new() })
+        let line_errors = AtomicU64::new(0);
+        Ok(Self { clock, response, wake, line_errors, state: Mutex::new(state), changed: Condvar::new() })
     }
 
     /// What is known.
@@ -133,6 +144,11 @@ impl Shared {
     /// Takes the command out of the slot.
     pub fn take_command(&self) -> Option<FocalPower> {
         self.state().wanted.take().map(|(target, _)| target)
+    }
+
+    /// Whether a command waits in the slot.
+    pub fn has_command(&self) -> bool {
+        self.state().wanted.is_some()
     }
 
     /// Makes the thread look at the slot and the requests.
@@ -202,15 +218,40 @@ impl Shared {
     pub fn stop_within(&self, time: Duration) -> bool {
         let (state, _) = self
             .changed
-            .wait_timeout_while(self.state(), time, |state| state.ending.is_none())
+            .wait_timeout_while(self.state(), time, |state| !state.ending())
             .unwrap_or_else(PoisonError::into_inner);
-        state.ending.is_some()
+        state.ending()
     }
 
-    /// Tells the thread to end, and how to leave the lens.
-    pub fn end(&self, ending: Ending) {
-        self.state().ending = Some(ending);
+    /// Tells the thread to end.
+    pub fn end(&self) {
+        let mut state = self.state();
+        if state.progress == Progress::Serving {
+            state.progress = Progress::Ending;
+        }
+        drop(state);
         self.changed.notify_all();
         self.wake();
+    }
+
+    /// Notes that the thread has ended.
+    pub fn ended(&self) {
+        self.state().progress = Progress::Ended;
+        self.changed.notify_all();
+    }
+
+    /// Waits for the thread's end, at most `timeout`.
+    pub fn wait_ended(&self, timeout: Duration) {
+        let _ = self.changed.wait_timeout_while(self.state(), timeout, |state| state.progress != Progress::Ended);
+    }
+
+    /// Counts a reply that was damaged, late or missing, or noise.
+    pub fn count_line_error(&self) {
+        self.line_errors.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// How often that was.
+    pub fn line_errors(&self) -> u64 {
+        self.line_errors.load(Ordering::Relaxed)
     }
 }

@@ -1,5 +1,6 @@
 //! The thread that talks to the driver: connects, follows commands, looks after the lens in the gaps, comes back.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,7 +9,7 @@ use super::codec::{Reply, Request, WireError};
 use super::handshake::{self, Settings};
 use super::link::{Link, LinkError, Sent};
 use super::port::Port;
-use super::shared::{Device, Ending, Shared};
+use super::shared::{Device, Shared};
 use crate::clock::Moment;
 use crate::lens::LensError;
 
@@ -27,30 +28,72 @@ const KINDS: [Request; 4] = [Request::Status, Request::Mode, Request::Temperatur
 const GAP_PATIENCE: Duration = Duration::from_millis(60);
 /// A reading made this soon after a command is in its gap.
 const GAP: Duration = Duration::from_millis(5);
-/// Failed readings of a kind in a row before the connection is given up.
-const FAILURES: u32 = 3;
 /// Times that a command is sent again before it is called refused.
 const RESENDS: u32 = 2;
 
-/// Serves the device at `path` until told to stop.
+/// Serves the device at `path` until told to stop; then lets the lens go.
 pub fn run(shared: &Shared, path: &Path, settings: &Settings) {
     let mut backoff = BACKOFF_FIRST;
     loop {
-        let trouble = match connect(shared, path, settings) {
-            Ok(mut session) => {
-                backoff = BACKOFF_FIRST;
-                session.serve()
-            }
-            Err(trouble) => trouble,
-        };
-        if let Trouble::Stopped = trouble {
-            return shared.lost(LensError::Gone("closed".into()));
-        }
+        let mut link = None;
+        let trouble = catch_unwind(AssertUnwindSafe(|| attend(shared, path, settings, &mut link, &mut backoff)))
+            .unwrap_or_else(|_| Trouble::Lens(LensError::Gone("its driver failed".into())));
         shared.lost(trouble.into());
+        // Asked for while the port was open, the end finds it open.
+        if shared.stop_within(Duration::ZERO) {
+            return let_go(shared, path, settings, link);
+        }
+        // Closed for others, and for the next attempt.
+        drop(link);
         if shared.stop_within(backoff) {
-            return;
+            return let_go(shared, path, settings, None);
         }
         backoff = (backoff * 2).min(BACKOFF_MOST);
+    }
+}
+
+/// Connects, and follows commands for as long as that goes well. The connection is left in `link`.
+fn attend<'a>(
+    shared: &'a Shared,
+    path: &Path,
+    settings: &Settings,
+    link: &mut Option<Link<'a>>,
+    backoff: &mut Duration,
+) -> Trouble {
+    let link = match Port::open(path) {
+        Ok(port) => link.insert(Link::new(port, shared)),
+        Err(error) => return error.into(),
+    };
+    match connect(shared, path, settings, link) {
+        Ok(mut session) => {
+            *backoff = BACKOFF_FIRST;
+            session.serve()
+        }
+        Err(trouble) => trouble,
+    }
+}
+
+/// The last that the driver hears of us: zero current, unless the lens is to stay where it is. `link` is the connection
+/// to it, if there is one still.
+fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>) {
+    // What is no lens driver must not be told anything.
+    if settings.keep || !shared.state().greeted {
+        return;
+    }
+    if link.is_some_and(|link| close(link).is_ok()) {
+        return;
+    }
+    // The line may be well again, and the lens still under current.
+    let afresh = Port::open(path).map_err(|error| error.to_string());
+    if let Err(error) = afresh.and_then(|port| close(Link::new(port, shared))) {
+        tracing::warn!(error, "the lens was not seen to rest on closing");
+    }
+}
+
+fn close(mut link: Link) -> Result<(), String> {
+    match catch_unwind(AssertUnwindSafe(|| link.close())) {
+        Ok(told) => told.map_err(|error| error.to_string()),
+        Err(_) => Err("its driver failed".to_owned()),
     }
 }
 
@@ -84,9 +127,13 @@ impl From<LinkError> for Trouble {
     }
 }
 
-fn connect<'a>(shared: &'a Shared, path: &Path, settings: &'a Settings) -> Result<Session<'a>, Trouble> {
-    let mut link = Link::new(Port::open(path)?, shared);
-    let mut device = handshake::perform(&mut link, settings, path)?;
+fn connect<'a, 'b>(
+    shared: &'a Shared,
+    path: &Path,
+    settings: &'b Settings,
+    link: &'b mut Link<'a>,
+) -> Result<Session<'a, 'b>, Trouble> {
+    let mut device = handshake::perform(link, settings, path)?;
     let last = shared.state().last;
     match last {
         Some(power) => {
@@ -96,41 +143,29 @@ fn connect<'a>(shared: &'a Shared, path: &Path, settings: &'a Settings) -> Resul
         None => shared.response.command(shared.clock.now(), device.range.focal_power(device.read_back)),
     }
     link.follow_commands(device.range);
-    shared.connected(device.clone(), words(&device, settings));
+    shared.connected(device.clone(), words(&device, settings, shared.line_errors()));
     let next_reading = shared.clock.now() + READING_EVERY;
-    Ok(Session { shared, settings, link, device, next_reading, turn: 0, failures: [0; KINDS.len()], unmet: 0 })
-}
-
-/// The place of `request` in [`KINDS`].
-fn kind(request: Request) -> usize {
-    KINDS.iter().position(|&kind| kind == request).unwrap_or(0)
+    Ok(Session { shared, settings, link, device, next_reading, turn: 0, unmet: 0 })
 }
 
 /// A connection that works.
-struct Session<'a> {
+struct Session<'a, 'b> {
     shared: &'a Shared,
-    settings: &'a Settings,
-    link: Link<'a>,
+    settings: &'b Settings,
+    link: &'b mut Link<'a>,
     device: Device,
     next_reading: Moment,
     turn: usize,
-    /// Failed readings in a row, by kind: one that never works must not hide among those that do.
-    failures: [u32; KINDS.len()],
     /// Times in a row that the read-back was not what was sent.
     unmet: u32,
 }
 
-impl Session<'_> {
+impl Session<'_, '_> {
     /// Follows commands until the connection ends.
     fn serve(&mut self) -> Trouble {
         loop {
-            match self.step() {
-                Ok(()) => {}
-                Err(Trouble::Stopped) => {
-                    self.relax();
-                    return Trouble::Stopped;
-                }
-                Err(trouble) => return trouble,
+            if let Err(trouble) = self.step() {
+                return trouble;
             }
         }
     }
@@ -147,34 +182,23 @@ impl Session<'_> {
         if now >= self.next_reading + GAP_PATIENCE || (now >= self.next_reading && behind_command) {
             self.next_reading = now + READING_EVERY;
             self.turn = (self.turn + 1) % READINGS.len();
-            let request = READINGS[self.turn];
-            let outcome = self.read(request);
-            self.forgive(request, outcome)?;
+            self.read(READINGS[self.turn])?;
             self.publish();
         }
         Ok(())
     }
 
     fn read_everything(&mut self) -> Result<(), Trouble> {
-        let mut complete = true;
         for request in KINDS {
-            // Asked for by someone who waits: worth a second attempt at once.
-            let outcome = match self.read(request) {
-                Err(LinkError::Wire(_) | LinkError::Silent) => self.read(request),
-                outcome => outcome,
-            };
-            complete &= outcome.is_ok();
-            self.forgive(request, outcome)?;
+            self.read(request)?;
         }
         self.publish();
-        // Else it is tried again: nothing old is handed out as new.
-        if complete {
-            self.shared.refreshed();
-        }
+        self.shared.refreshed();
         Ok(())
     }
 
-    fn read(&mut self, request: Request) -> Result<(), LinkError> {
+    /// Reads `request`. A lens that is gone, or a driver that forgot how it was set up, ends the connection.
+    fn read(&mut self, request: Request) -> Result<(), Trouble> {
         let sent = self.link.sent();
         if let Some(error) = self.link.stray_error() {
             tracing::warn!(%error, "the lens driver did not accept a command");
@@ -189,7 +213,10 @@ impl Session<'_> {
             }
             _ => {}
         }
-        self.failures[kind(request)] = 0;
+        if self.device.status.without_lens() || self.device.status.restarted() {
+            let why = "the driver lost its lens or was restarted, and is being set up again";
+            return Err(LensError::Gone(why.into()).into());
+        }
         Ok(())
     }
 
@@ -207,61 +234,33 @@ impl Session<'_> {
         }
     }
 
-    /// Lets a few failures in a row pass: one damaged reply is no reason to drop a lens that follows. A lens that is
-    /// gone, or a driver that forgot how it was set up, is.
-    fn forgive(&mut self, request: Request, outcome: Result<(), LinkError>) -> Result<(), Trouble> {
-        let failures = &mut self.failures[kind(request)];
-        match outcome {
-            Err(LinkError::Wire(_) | LinkError::Silent) if *failures + 1 < FAILURES => {
-                *failures += 1;
-                self.next_reading = self.shared.clock.now();
-            }
-            other => other?,
-        }
-        if self.device.status.without_lens() || self.device.status.restarted() {
-            let why = "the driver lost its lens or was restarted, and is being set up again";
-            return Err(LensError::Gone(why.into()).into());
-        }
-        Ok(())
-    }
-
     fn publish(&self) {
         // Without the dioptres: they would tell the operator of a blinded session how the policy moves.
         let refusal = (self.unmet > RESENDS)
             .then(|| Arc::from("it does not go where it is sent: restart the driver or check the lens"));
         let mut state = self.shared.state();
         state.device = Ok(self.device.clone());
-        state.message = words(&self.device, self.settings);
+        state.message = words(&self.device, self.settings, self.shared.line_errors());
         state.refusal = refusal;
-    }
-
-    /// Leaves the lens without current: it rests, and warms nobody. Nothing can be done about a device that fails now.
-    fn relax(&mut self) {
-        if self.shared.state().ending == Some(Ending::AsItIs) {
-            return;
-        }
-        let relaxed = self
-            .link
-            .ask(Request::CurrentMode)
-            .and_then(|_| self.link.tell(Request::SetCurrent(0)))
-            .and_then(|()| self.link.ask(Request::Current));
-        if let Err(error) = relaxed {
-            tracing::warn!(%error, "the lens could not be relaxed on closing");
-        }
     }
 }
 
 /// How a connected device does, in a sentence.
-fn words(device: &Device, settings: &Settings) -> Arc<str> {
+fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
     let Device { status, temperature, range, .. } = device;
+    let line = match line_errors {
+        0 => String::new(),
+        1 => "; 1 error on its line so far".to_owned(),
+        many => format!("; {many} errors on its line so far: if they go on, check its USB cable"),
+    };
     let (low, high) = settings.temperatures;
     if status.doubtful() {
         return Arc::from(format!(
             "follows commands, but at {temperature:.1} °C the focal power cannot be relied on ({}): let the lens get \
-             between {low:.0} and {high:.0} °C",
+             between {low:.0} and {high:.0} °C{line}",
             status.words().join("; ")
         ));
     }
     let (min, max) = (range.min_dioptre(), range.max_dioptre());
-    Arc::from(format!("follows commands between {min:.2} and {max:.2} dpt, at {temperature:.1} °C"))
+    Arc::from(format!("follows commands between {min:.2} and {max:.2} dpt, at {temperature:.1} °C{line}"))
 }
