@@ -1,7 +1,9 @@
-//! The whole system's figures: the real server in a process of its own, watched by 1 to 16 viewers and over a slow link.
+//! The whole system's figures: the real server in a process of its own, watched by 1 to 16 viewers, over a slow link, and
+//! beside four processes that keep every processor busy, with real-time priority and without.
 //!
-//! `cargo bench --bench stream`. One table; what is worth comparing is compared within one run. Ages are exact: the
-//! server's record of each frame's exposure and the viewers' clock are the same monotonic clock.
+//! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` for the rows of that name. One table; what is
+//! worth comparing is compared within one run. Ages are exact: the server's record of each frame's exposure and the
+//! viewers' clock are the same monotonic clock.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -21,7 +23,7 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use parfocal::clock::{Clock, SystemClock};
-use process::{Server, Usage};
+use process::{Busy, Server, Usage};
 use sqlx::{Connection, SqliteConnection};
 use viewer::Seen;
 
@@ -37,6 +39,18 @@ struct Scenario {
     viewers: usize,
     /// Bits a second of the viewers' link, if it is a slow one.
     link: Option<u64>,
+    /// Beside what else it runs.
+    beside: Beside,
+}
+
+/// What else runs on the machine.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Beside {
+    /// Nothing of ours.
+    Nothing,
+    /// Processes that keep every processor busy, while a policy drives the lens; and whether the server may have
+    /// real-time priority where this user may.
+    Busy { real_time: bool },
 }
 
 #[derive(Clone, Copy)]
@@ -46,14 +60,30 @@ enum Camera {
     Picture,
 }
 
-const SCENARIOS: [Scenario; 7] = [
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 0, link: None },
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 1, link: None },
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 4, link: None },
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 16, link: None },
-    Scenario { name: "picture", camera: Camera::Picture, viewers: 1, link: None },
-    Scenario { name: "picture", camera: Camera::Picture, viewers: 16, link: None },
-    Scenario { name: "picture, 4 Mbit/s", camera: Camera::Picture, viewers: 1, link: Some(4_000_000) },
+const WITHOUT: Beside = Beside::Busy { real_time: false };
+const WITH: Beside = Beside::Busy { real_time: true };
+
+/// Processes that keep the processors busy.
+const BUSY: usize = 4;
+
+const SCENARIOS: [Scenario; 11] = [
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 0, link: None, beside: Beside::Nothing },
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 1, link: None, beside: Beside::Nothing },
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 4, link: None, beside: Beside::Nothing },
+    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 16, link: None, beside: Beside::Nothing },
+    Scenario { name: "picture", camera: Camera::Picture, viewers: 1, link: None, beside: Beside::Nothing },
+    Scenario { name: "picture", camera: Camera::Picture, viewers: 16, link: None, beside: Beside::Nothing },
+    Scenario {
+        name: "picture, 4 Mbit/s",
+        camera: Camera::Picture,
+        viewers: 1,
+        link: Some(4_000_000),
+        beside: Beside::Nothing,
+    },
+    Scenario { name: "phantom, busy", camera: Camera::Phantom, viewers: 4, link: None, beside: WITHOUT },
+    Scenario { name: "the same, rt", camera: Camera::Phantom, viewers: 4, link: None, beside: WITH },
+    Scenario { name: "picture, busy", camera: Camera::Picture, viewers: 4, link: None, beside: WITHOUT },
+    Scenario { name: "the same, rt", camera: Camera::Picture, viewers: 4, link: None, beside: WITH },
 ];
 
 /// What a row says.
@@ -80,18 +110,27 @@ async fn main() {
         "{:<18} {:>7} {:>6} {:>6} {:>13} {:>13} {:>26} {:>6} {:>7}",
         "", "", "", "", "p50 / p99", "p50 / p99", "loop / imaging / serving", "MB", "ms"
     );
-    for scenario in &SCENARIOS {
+    let busy_only = std::env::args().any(|argument| argument == "busy");
+    for scenario in SCENARIOS.iter().filter(|scenario| !busy_only || scenario.beside != Beside::Nothing) {
         report(scenario, &measure(scenario).await);
     }
 }
 
 async fn measure(scenario: &Scenario) -> Row {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut server = match scenario.camera {
-        Camera::Phantom => Server::start("phantom"),
-        Camera::Picture => Server::start(&process::picture(&folder)),
+    let camera = match scenario.camera {
+        Camera::Phantom => "phantom".to_owned(),
+        Camera::Picture => process::picture(&folder),
     };
+    let mut server = Server::start(&camera, scenario.beside != WITHOUT);
     let first_answer = server.first_answer().await;
+    let busy = match scenario.beside {
+        Beside::Nothing => None,
+        Beside::Busy { .. } => {
+            server.put_in_charge("mgm-hill-climber").await;
+            Some(Busy::start(BUSY))
+        }
+    };
     let address = match scenario.link {
         Some(bits) => link::slow(server.address, bits).await,
         None => server.address,
@@ -102,6 +141,7 @@ async fn measure(scenario: &Scenario) -> Row {
     let (from, before) = (SystemClock.now().as_nanos(), server.usage());
     tokio::time::sleep(MEASURED).await;
     let (to, after) = (SystemClock.now().as_nanos(), server.usage());
+    drop(busy);
     let mut seen: Vec<Seen> = Vec::new();
     for viewer in viewers {
         seen.extend(viewer.await.expect("a viewer"));

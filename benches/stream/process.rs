@@ -21,12 +21,43 @@ pub struct Server {
     data: TempDir,
 }
 
+/// Processes that do nothing, as fast as they can; ended when dropped.
+pub struct Busy(Vec<Child>);
+
+impl Busy {
+    /// So many.
+    pub fn start(processes: usize) -> Self {
+        let start = |_| Command::new("sh").args(["-c", "while :; do :; done"]).spawn().expect("a shell");
+        Self((0..processes).map(start).collect())
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        for process in &mut self.0 {
+            let _ = process.kill();
+            let _ = process.wait();
+        }
+    }
+}
+
+/// The program; without the right to real-time priority where it is not to be `preferred` and root starts it.
+fn program(preferred: bool) -> Command {
+    let program = env!("CARGO_BIN_EXE_parfocal");
+    if preferred || !rustix::process::geteuid().is_root() {
+        return Command::new(program);
+    }
+    let mut command = Command::new("setpriv");
+    command.args(["--bounding-set=-sys_nice", program]);
+    command
+}
+
 impl Server {
-    /// A server with `camera` at 50 frames a second.
-    pub fn start(camera: &str) -> Self {
+    /// A server with `camera` at 50 frames a second, with real-time priority if it is to be `preferred`.
+    pub fn start(camera: &str, preferred: bool) -> Self {
         let data = tempfile::tempdir().expect("a folder");
         let started = SystemClock.now();
-        let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"))
+        let mut process = program(preferred)
             .args(["serve", "--bind", "127.0.0.1:0", "--fps", "50", "--seed", "1", "--camera", camera, "--data-dir"])
             .arg(data.path())
             .env("RUST_LOG", "error")
@@ -40,6 +71,14 @@ impl Server {
         let port = host.rsplit(':').next().and_then(|port| port.parse().ok()).expect("a port");
         let key = key.trim().to_owned();
         Self { process, started, address: SocketAddr::from(([127, 0, 0, 1], port)), key, data }
+    }
+
+    /// Has `policy` drive the lens.
+    pub async fn put_in_charge(&self, policy: &str) {
+        let client = reqwest::Client::builder().no_proxy().build().expect("a client");
+        let request = client.post(format!("http://{}/api/operator/focus", self.address));
+        let request = request.bearer_auth(&self.key).json(&serde_json::json!({ "policy": policy }));
+        request.send().await.and_then(reqwest::Response::error_for_status).expect("done");
     }
 
     /// From the start of the process to its first answer.

@@ -81,6 +81,7 @@ mod tests {
     use crate::imaging::GrayImage;
     use crate::training::clip::Clip;
     use crate::training::evaluate::{Benchmark, Conditions};
+    use crate::training::scan::Scene;
     use crate::training::texture::texture;
 
     const SIDE: usize = 128;

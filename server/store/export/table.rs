@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     fn column(kind: Type) -> Column {
-        Column { name: "text", kind, unit: "", description: "" }
+        Column { name: "text", kind, unit: "", description: "", since: 1 }
     }
 
     #[test]
