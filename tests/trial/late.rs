@@ -203,7 +203,7 @@ async fn unblinding_asks_while_something_may_be_outstanding_and_then_nothing_cou
     unblind(&bench, session, true).await.unwrap();
     bench.conductor.answer(late.clone()).await.unwrap();
     // The same once the session is off the screens.
-    bench.conductor.dismiss(Role::Operator, session).await.unwrap();
+    bench.conductor.dismiss(Role::Operator, session).unwrap();
     late.key = bench.key();
     bench.conductor.answer(late).await.unwrap();
     let detail = bench.conductor.session_detail(session).await.unwrap();
