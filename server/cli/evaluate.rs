@@ -197,7 +197,7 @@ impl Arguments {
 fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let (registry, policies) = registry_and_policies(arguments)?;
     let sources: Vec<StackSource> = arguments.stacks.iter().map(|text| StackSource::parse(text)).collect();
-    let bar = progress(policies.len() * sources.len() * 2 * SEEDS as usize);
+    let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
     let (report, outcomes) = bench(&registry, &policies, &sources, arguments.seed.unwrap_or(FIRST_SEED), &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);

@@ -42,7 +42,8 @@ pub struct Arguments {
 #[group(id = "Training")]
 struct Training {
     /// `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`; with `-paper` behind one of the first three, by the
-    /// paper's recipe; `cnn-learned-refined` and `parfocal-refined`: what follows these, with `--from` their weights.
+    /// paper's recipe; `cnn-learned-refined`, `parfocal-refined` and `parfocal-relief`: what follows these, with `--from` their
+    /// weights.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]

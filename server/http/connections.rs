@@ -69,14 +69,14 @@ async fn serve_one(
     let _ = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
     let (place, give_way) = places.take(peer.ip());
     let place = Arc::new(place);
-    let placed = Placed { stream, _place: Arc::clone(&place) };
+    let socket = Placed { stream, _place: Arc::clone(&place) };
     let service = router.map_request(move |mut request: axum::http::Request<Incoming>| {
         request.extensions_mut().insert(Arc::clone(&place));
         request.map(Body::new)
     });
     let mut builder = Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(BUFFER);
-    let connection = builder.serve_connection(TokioIo::new(placed), TowerToHyperService::new(service)).with_upgrades();
+    let connection = builder.serve_connection(TokioIo::new(socket), TowerToHyperService::new(service)).with_upgrades();
     let mut connection = pin!(connection);
     let outcome = tokio::select! {
         outcome = connection.as_mut() => outcome,

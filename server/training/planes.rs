@@ -64,12 +64,12 @@ impl PlaneStack {
 
         let positions: Vec<f32> = pictures.iter().map(|picture| picture.0).collect();
         let sharpness: Vec<Vec<f32>> = pictures.iter().map(|(_, picture)| sharpness(picture)).collect();
-        let places = sharpness[0].len();
+        let count = sharpness[0].len();
         let peak_at = |place: usize| {
             let curve: Vec<f32> = sharpness.iter().map(|plane| plane[place]).collect();
             peak(&positions, &curve)
         };
-        let sharpest = (0..places).map(peak_at).collect();
+        let sharpest = (0..count).map(peak_at).collect();
         let bytes = |picture: &GrayImage| picture.data.iter().map(|value| value.round() as u8).collect();
         let planes = pictures.iter().map(|(_, picture)| bytes(picture)).collect();
         Ok(Self { width, height, positions, planes, sharpest })

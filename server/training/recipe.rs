@@ -51,9 +51,9 @@ const fn whole_benchmark() -> usize {
     COUNT
 }
 
-/// The recipes that ship: ours by the policy's name, what comes after it with `-refined` behind it, the paper's
+/// The recipes that ship: ours by the policy's name, what comes after it with `-refined` or `-relief` behind it, the paper's
 /// with `-paper`.
-const SHIPPED: [(&str, &str); 9] = [
+const SHIPPED: [(&str, &str); 10] = [
     ("mgm-learned", include_str!("recipes/mgm-learned.toml")),
     ("mlr-learned", include_str!("recipes/mlr-learned.toml")),
     ("cnn-learned", include_str!("recipes/cnn-learned.toml")),
@@ -63,6 +63,7 @@ const SHIPPED: [(&str, &str); 9] = [
     ("cnn-learned-paper", include_str!("recipes/cnn-learned-paper.toml")),
     ("parfocal", include_str!("recipes/parfocal.toml")),
     ("parfocal-refined", include_str!("recipes/parfocal-refined.toml")),
+    ("parfocal-relief", include_str!("recipes/parfocal-relief.toml")),
 ];
 
 /// The text of the recipe that ships under `name`.

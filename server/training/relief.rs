@@ -356,25 +356,26 @@ fn level(sigma: f32) -> (usize, f32) {
 
 /// What a camera makes of the picture that reaches it: gamma and sharpening.
 struct Finish {
-    gamma: f32,
-    sharpening: f32,
+    gamma: Option<f32>,
+    /// How much of what differs from the picture's blur by a pixel is added.
+    sharpening: Option<f32>,
 }
 
 impl Finish {
     fn draw(rng: &mut impl Rng) -> Self {
         Self {
-            gamma: if rng.random_bool(0.3) { rng.random_range(0.6f32..1.5) } else { 1.0 },
-            sharpening: if rng.random_bool(0.3) { rng.random_range(0.2f32..1.5) } else { 0.0 },
+            gamma: rng.random_bool(0.3).then(|| rng.random_range(0.6f32..1.5)),
+            sharpening: rng.random_bool(0.3).then(|| rng.random_range(0.2f32..1.5)),
         }
     }
 
     fn apply(&self, mut picture: GrayImage) -> GrayImage {
-        if self.gamma < 1.0 || self.gamma > 1.0 {
-            picture.data.iter_mut().for_each(|value| *value = 255.0 * (value.max(0.0) / 255.0).powf(self.gamma));
+        if let Some(gamma) = self.gamma {
+            picture.data.iter_mut().for_each(|value| *value = 255.0 * (value.max(0.0) / 255.0).powf(gamma));
         }
-        if self.sharpening > 0.0 {
+        if let Some(share) = self.sharpening {
             let soft = gaussian_blur(&picture, 1.0);
-            let sharpen = |(value, soft): (&mut f32, &f32)| *value += self.sharpening * (*value - soft);
+            let sharpen = |(value, soft): (&mut f32, &f32)| *value += share * (*value - soft);
             picture.data.iter_mut().zip(&soft.data).for_each(sharpen);
         }
         picture.data.iter_mut().for_each(|value| *value = value.clamp(0.0, 255.0));
@@ -424,7 +425,7 @@ mod tests {
     fn a_scene_is_reproducible_and_blurs_away_from_its_optimum() {
         let scene = || scene(Split::Training, 6, Style::VARIED).unwrap();
         let (one, other) = (scene(), scene());
-        assert_eq!(one.planes.patch((100, 100), 0.7).0, other.planes.patch((100, 100), 0.7).0);
+        assert_eq!(one.planes.patch((100, 100), 0.7), other.planes.patch((100, 100), 0.7));
         let best = one.planes.sharpest((100, 100));
         let sharpness = |position| crate::autofocus::mgm(&one.planes.patch((100, 100), position));
         assert!(sharpness(best) > sharpness(best + 6.0) && sharpness(best) > sharpness(best - 6.0));

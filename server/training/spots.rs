@@ -1,6 +1,7 @@
 //! Blur of whole pictures by the spots that lenses make of a point: a Gaussian, a disc, a disc with a brighter rim or core.
 #![allow(
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
     reason = "pixel arithmetic on small numbers"
@@ -41,10 +42,14 @@ pub fn blurred(picture: &GrayImage, sigma: f64, spot: LensSpot) -> GrayImage {
             if rim != 0.0 {
                 // The whole disc at the rim's brightness, less what the core has too much.
                 let core = disc_sums(picture, CORE * radius);
-                sums.iter_mut().zip(core).for_each(|(whole, core)| *whole = (1.0 + rim) * *whole - rim * core);
+                for (whole, core) in sums.iter_mut().zip(core) {
+                    *whole = (1.0 + rim) * *whole - rim * core;
+                }
                 total = (1.0 + rim) * total - rim * disc_area(CORE * radius);
             }
-            sums.iter_mut().for_each(|sum| *sum /= total);
+            for sum in &mut sums {
+                *sum /= total;
+            }
             GrayImage { width: picture.width, height: picture.height, data: sums }
         }
     }

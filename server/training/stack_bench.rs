@@ -1,6 +1,11 @@
 //! The benchmark of real glass: photographed focal stacks, each at two scales and three seeds, and how each policy does there beside
 //! the MGM hill-climber.
-#![allow(clippy::cast_precision_loss, reason = "counts of stacks and planes are small")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "counts of stacks, planes and pixels are small"
+)]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -26,7 +31,7 @@ pub const BASELINE: &str = "mgm-hill-climber";
 /// is on the sensor, so each stack is used at both.
 const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
 /// Seeds of the courses, one scan each.
-pub const SEEDS: u64 = 3;
+pub const SEEDS: usize = 3;
 /// First of the seeds, unless another is asked for.
 pub const FIRST_SEED: u64 = 31;
 
@@ -120,7 +125,9 @@ pub fn reduced(picture: &GrayImage, side: usize) -> GrayImage {
         }
     }
     let share = 1.0 / (side * side) as f32;
-    data.iter_mut().for_each(|value| *value *= share);
+    for value in &mut data {
+        *value *= share;
+    }
     GrayImage { width, height, data }
 }
 
@@ -144,7 +151,7 @@ fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, StackError>
         let unfit = |source_error| StackError::Unfit { folder: source.folder.clone(), source: source_error };
         let stack = Arc::new(PlaneStack::new(&reduced).map_err(unfit)?);
         let course = |seed| StackCourse::new(Arc::clone(&stack), planes, seed).map(Arc::new);
-        let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index))).collect();
+        let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
         let too_small = StackError::TooSmall { folder: source.folder.clone(), planes };
         Ok(Item { stack: source.name(), scale, planes, scans: StackScans(courses.ok_or(too_small)?) })
     };
@@ -328,7 +335,7 @@ impl StackReport {
             text,
             "\nEach stack at two scales (about 500 and 1000 pixels wide), seeds {} to {}; pictures between two planes are mixed.",
             self.seed,
-            self.seed.wrapping_add(SEEDS - 1)
+            self.seed.wrapping_add(SEEDS as u64 - 1)
         );
         text
     }

@@ -6,6 +6,7 @@
 //! at the walking focal power as nearly as the stack allows. The true optimum is where the patch's mean gradient magnitude peaks.
 #![allow(
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
     reason = "indices of planes and pixels"

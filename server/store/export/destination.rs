@@ -31,7 +31,7 @@ pub enum Destination {
     /// A folder.
     Folder(NewFolder),
     /// A ZIP file.
-    Zip(ZipStream),
+    Zip(Box<ZipStream>),
 }
 
 impl Destination {
@@ -68,7 +68,7 @@ impl Destination {
             Self::Folder(folder) => folder.finish(),
             Self::Zip(zip) => {
                 let path = PathBuf::from(&zip.root);
-                zip.finish().await.map_err(|error| ExportError::Unwritable { path, error })
+                Box::pin(zip.finish()).await.map_err(|error| ExportError::Unwritable { path, error })
             }
         }
     }
@@ -232,7 +232,7 @@ mod tests {
             zip.begin("comments.csv").unwrap();
             zip.write(b"number\n1\n").await.unwrap();
             if whole {
-                zip.finish().await.unwrap();
+                Box::pin(zip.finish()).await.unwrap();
             } else {
                 drop(zip);
             }

@@ -37,7 +37,7 @@ impl Folder {
 
     /// An export into the ZIP file `zip`.
     pub fn zipped(zip: ZipStream) -> Self {
-        Self::to(Destination::Zip(zip))
+        Self::to(Destination::Zip(Box::new(zip)))
     }
 
     const fn to(destination: Destination) -> Self {
@@ -88,7 +88,8 @@ impl Folder {
     /// Writes the checksums and ends the whole. Its files come back.
     pub async fn finish(mut self) -> Result<Vec<String>, ExportError> {
         self.files.sort();
-        let sums: String = self.files.iter().map(|(file, sha256)| format!("{sha256}  {file}\n")).collect();
+        let lines: Vec<String> = self.files.iter().map(|(file, sha256)| format!("{sha256}  {file}\n")).collect();
+        let sums = lines.concat();
         self.file(SUMS, sums.as_bytes()).await?;
         self.destination.finish().await?;
         Ok(self.files.into_iter().map(|(file, _)| file).collect())
