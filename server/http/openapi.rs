@@ -54,13 +54,15 @@ const WITH_BODY: [(&str, &str); 3] = [
 const KEY: &str = "key";
 
 /// Limits that a derived schema cannot state: where, which, what.
-const LIMITS: [(&str, &str, Limit); 8] = [
+const LIMITS: [(&str, &str, Limit); 9] = [
     ("Focus/oneOf/0", "additionalProperties", Limit::None),
     ("Focus/oneOf/1", "additionalProperties", Limit::None),
     ("Focus/oneOf/0/properties/focal_power", "minimum", Limit::Number(0)),
     ("Focus/oneOf/0/properties/focal_power", "maximum", Limit::Number(1)),
     ("Said/oneOf/0/properties/text", "pattern", Limit::Text(NOT_BLANK)),
     ("Said/oneOf/1/properties/text", "pattern", Limit::Text(NOT_BLANK)),
+    // A mark says nothing: what somebody said must not be lost as its text.
+    ("Said/oneOf/2/properties", "text", Limit::None),
     ("AnswerValue/oneOf/0", "maximum", Limit::Number(u8::MAX)),
     ("AnswerValue/oneOf/1/items", "maximum", Limit::Number(u8::MAX)),
 ];

@@ -169,20 +169,20 @@ fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKin
 }
 
 fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
+    let reason = needed(reason_text(reason)?)?;
     match state.phase {
         Phase::Completed => return Err(conflict("the session is complete; nothing is left to abort")),
         Phase::Aborted => return Ok(Vec::new()),
         _ => {}
     }
-    let reason = needed(reason_text(reason)?)?;
     Ok(vec![EventKind::Aborted { reason, inspected_ms: milliseconds(state.inspected(now)) }])
 }
 
 fn unblind(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal> {
+    let reason = needed(reason_text(reason)?)?;
     if state.unblinded {
         return Ok(Vec::new());
     }
-    let reason = needed(reason_text(reason)?)?;
     Ok(vec![EventKind::Unblinded { reason, emergency: !state.ended() }])
 }
 
