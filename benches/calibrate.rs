@@ -7,12 +7,13 @@ use std::sync::Arc;
 
 use parfocal::autofocus::networks::compute_on_this_thread;
 use parfocal::autofocus::{PolicyName, Registry};
+use parfocal::evaluation::{Outcome, evaluate};
 use parfocal::imaging::GrayImage;
-use parfocal::training::clip::Clip;
-use parfocal::training::evaluate::{Benchmark, Conditions, FRAMES, Outcome, evaluate};
-use parfocal::training::pictures::{Split, sharp_phantom};
-use parfocal::training::scan::{ScanSettings, Scene};
-use parfocal::training::texture::vary_contrast;
+use parfocal::scans::benchmark::{Benchmark, Conditions, FRAMES};
+use parfocal::scans::clip::Clip;
+use parfocal::scans::pictures::{Split, sharp_phantom};
+use parfocal::scans::simulated::{ScanSettings, Scene};
+use parfocal::simulation::texture::vary_contrast;
 
 const COUNT: usize = 200;
 /// The paper's simulated column: policy and mean absolute error.

@@ -7,9 +7,10 @@
 use std::sync::Arc;
 
 use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::camera::phantom::{Haste, Trajectory};
-use parfocal::training::evaluate::{Outcome, SEED, evaluate};
-use parfocal::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
+use parfocal::evaluation::{Outcome, evaluate};
+use parfocal::scans::benchmark::SEED;
+use parfocal::scans::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
+use parfocal::simulation::phantom::{Haste, Trajectory};
 
 /// The paper's robotic column: policy and mean absolute error.
 const PAPER: [(&str, f64); 3] = [("fixed", 0.262), ("mgm-hill-climber", 0.146), ("mlr-hill-climber", 0.163)];

@@ -8,8 +8,8 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use parfocal::imaging::{
     Calibration, GrayImage, JpegEncoder, MosaicFrame, PatchArea, Reconstructor, Reference, RgbImage, content_area,
-    gaussian_blur,
 };
+use parfocal::simulation::blur::gaussian_blur;
 
 const WIDTH: usize = 2048;
 const HEIGHT: usize = 1088;

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use parfocal::camera::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH, Scene};
 use parfocal::camera::{self, CameraSettings};
 use parfocal::clock::{ManualClock, Moment};
 use parfocal::lens::{FocalPower, Optics};
+use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH, Scene};
 
 /// Glass that never moves.
 struct Still;

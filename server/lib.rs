@@ -6,24 +6,31 @@
 pub mod clock;
 pub mod files;
 pub mod ids;
-pub mod imaging;
-pub mod lens;
 pub mod notices;
 pub mod options;
+pub mod plot;
 pub mod priority;
+
+pub mod imaging;
+pub mod lens;
+
+pub mod simulation;
 
 pub mod autofocus;
 pub mod camera;
 
+pub mod scans;
+
 pub mod control;
+pub mod evaluation;
 pub mod training;
 pub mod trial;
 
-pub mod bench;
+pub mod lens_measurement;
+pub mod live;
 pub mod store;
 
 pub mod conductor;
-pub mod live;
 
 pub mod http;
 

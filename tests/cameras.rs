@@ -9,13 +9,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use parfocal::autofocus::mgm;
-use parfocal::camera::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
 use parfocal::camera::{self, Camera, CameraError, CameraSettings, Frame, FrameImage};
 use parfocal::clock::{Clock, Moment};
 use parfocal::imaging::{
     Calibration, GrayImage, MosaicFrame, PatchArea, Reconstructor, RgbImage, content_area, rgb_patch,
 };
 use parfocal::lens::{FocalPower, Optics};
+use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
 
 /// A clock on which each frame takes no time and each wait exactly as long as asked.
 #[derive(Default)]

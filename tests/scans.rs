@@ -18,13 +18,13 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::camera::phantom::Trajectory;
 use parfocal::camera::recorded::{POSES, ScanFolder};
 use parfocal::camera::{self, CameraSettings, FrameImage};
 use parfocal::clock::{Clock, Moment, SystemClock};
 use parfocal::lens::emulator::{Emulator, Model};
 use parfocal::lens::{FocalPower, Optics};
-use parfocal::training::recorded::{HASTE, RecordedScan};
+use parfocal::scans::recorded::{HASTE, RecordedScan};
+use parfocal::simulation::phantom::Trajectory;
 use serde_json::Value;
 use tempfile::TempDir;
 

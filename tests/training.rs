@@ -10,14 +10,15 @@ use std::sync::Arc;
 
 use parfocal::autofocus::{PolicyName, Registry};
 use parfocal::clock::SystemClock;
+use parfocal::evaluation::evaluate;
 use parfocal::imaging::GrayImage;
-use parfocal::training::asked::Asked;
-use parfocal::training::checkpoint::Checkpoint;
-use parfocal::training::clip::Clip;
-use parfocal::training::evaluate::{Benchmark, Conditions, FRAMES, evaluate};
+use parfocal::scans::benchmark::{Benchmark, Conditions, FRAMES};
+use parfocal::scans::clip::Clip;
+use parfocal::scans::simulated::Scene;
 use parfocal::training::recipe::{Recipe, shipped};
+use parfocal::training::run::checkpoint::Checkpoint;
+use parfocal::training::run::resume::Asked;
 use parfocal::training::run::{LEG, Run};
-use parfocal::training::scan::Scene;
 
 /// The recipe that ships for `policy`, small.
 fn small(policy: &str, updates: u64) -> Recipe {

@@ -185,7 +185,8 @@ fn correlation(a: &Square, b: &Square, rows: Range<usize>, columns: Range<usize>
 mod tests {
     use super::*;
     use crate::autofocus::spectrum::spectrum;
-    use crate::imaging::{GrayImage, gaussian_blur};
+    use crate::imaging::GrayImage;
+    use crate::simulation::blur::gaussian_blur;
 
     const SIDE: usize = 96;
 

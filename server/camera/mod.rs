@@ -5,13 +5,11 @@ pub mod footage;
 #[cfg(feature = "aravis")]
 pub mod gige;
 mod pace;
-mod path;
 pub mod phantom;
 mod playback;
 mod pool;
 pub mod recorded;
 mod spec;
-pub mod walk;
 
 pub use controls::{Adjustable, CameraOffer, ControlError, Controls, Setting};
 pub use pace::Pace;

@@ -10,18 +10,20 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{Failure, print, scan};
 use crate::autofocus::networks::compute_on_this_thread;
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
-use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::ScanFolder;
+use crate::evaluation::evaluate;
+use crate::evaluation::report::Subject;
+use crate::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
+use crate::evaluation::stacks::{FIRST_SEED, SEEDS, StackSource, bench};
 use crate::files::replace;
 use crate::notices::tell;
-use crate::training::detail::{warning, without_detail};
-use crate::training::evaluate::{Benchmark, COUNT, Conditions, FRAMES, SEED, ScanSet, evaluate};
-use crate::training::footage;
-use crate::training::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
-use crate::training::report::Subject;
-use crate::training::scan::Scene;
-use crate::training::shard::{MergeError, Part, PartOf, Shard, merge};
-use crate::training::stack_bench::{FIRST_SEED, SEEDS, StackSource, bench};
+use crate::scans::ScanSet;
+use crate::scans::benchmark::{Benchmark, COUNT, Conditions, FRAMES, SEED};
+use crate::scans::detail::{warning, without_detail};
+use crate::scans::footage;
+use crate::scans::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
+use crate::scans::simulated::Scene;
+use crate::simulation::phantom::Trajectory;
 
 /// What to evaluate, and on what.
 #[derive(Debug, clap::Args)]

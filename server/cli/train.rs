@@ -10,9 +10,9 @@ use super::{Failure, print};
 use crate::autofocus::networks::compute_on_this_thread;
 use crate::clock::SystemClock;
 use crate::notices::tell;
-use crate::training::asked::Asked;
-use crate::training::comparison::{TrainedRun, markdown};
 use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
+use crate::training::run::comparison::{TrainedRun, markdown};
+use crate::training::run::resume::Asked;
 use crate::training::run::{LEG, Progress, Run};
 
 /// Where to compute.

@@ -1,7 +1,6 @@
 //! Imaging: from a sensor's mosaic to what people and policies see. No thread, clock, file or socket.
 
 mod bad_reference;
-mod blur;
 mod calibration;
 mod calibration_toml;
 mod calibration_write;
@@ -16,7 +15,6 @@ mod reconstruct;
 mod reduce;
 mod references;
 
-pub use blur::gaussian_blur;
 pub use calibration::{BANDS, Band, Calibration, Reference};
 pub use calibration_toml::CalibrationError;
 pub use decode::{DecodeError, Picture, SENSOR_SIZE, decode, decode_any, decode_raw, is_mosaic};

@@ -7,14 +7,14 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor, nn};
 
-use super::checkpoint::{Checkpoint, CheckpointError};
+use super::environment::{Session, lead_astray};
 use super::optimiser::{Optimiser, Rule, half_cosine};
-use super::scenery::Scenery;
-use super::session::{Session, lead_astray};
+use super::run::checkpoint::{Checkpoint, CheckpointError};
 use super::trainer::Trainer;
-use super::variety::Variety;
 use crate::autofocus::belief::{Trace, spread_over_bins};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
+use crate::scans::scenery::Scenery;
+use crate::scans::variety::Variety;
 
 /// How a belief tracker is trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -3,10 +3,10 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::checkpoint::CheckpointError;
-use super::detail::NothingToFocusOn;
-use super::footage::FootageError;
-use super::run_folder::CHECKPOINT;
+use super::run::checkpoint::CheckpointError;
+use super::run::folder::CHECKPOINT;
+use crate::scans::detail::NothingToFocusOn;
+use crate::scans::footage::FootageError;
 
 /// Why a training could not start or go on.
 #[derive(Debug, thiserror::Error)]

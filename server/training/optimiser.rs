@@ -2,7 +2,7 @@
 
 use tch::{Tensor, nn};
 
-use super::checkpoint::{Checkpoint, CheckpointError};
+use super::run::checkpoint::{Checkpoint, CheckpointError};
 
 /// Which rule turns gradients into steps.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -3,13 +3,13 @@
 use tch::{Device, nn};
 
 use super::belief::BeliefTrainer;
-use super::checkpoint::{Checkpoint, CheckpointError};
 use super::dqn::DqnTrainer;
 use super::error::TrainError;
 use super::recipe::Recipe;
-use super::scenery::Scenery;
+use super::run::checkpoint::{Checkpoint, CheckpointError};
 use crate::autofocus::shipped::Design;
 use crate::autofocus::weights::{self, WeightsError};
+use crate::scans::scenery::Scenery;
 
 /// One that learns. What it does depends on its recipe, its seed, its scenery and the seeds of its legs alone.
 pub trait Trainer: Send {

@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use parfocal::autofocus::{PolicyName, Registry};
-use parfocal::camera::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
 use parfocal::camera::{Frame, FrameImage, Truth};
 use parfocal::clock::{Clock, ManualClock};
 use parfocal::control::{Command, Drive, Eye, Stepper};
 use parfocal::imaging::MosaicFrame;
 use parfocal::lens::{FocalPower, Lens, SimulatedLens};
+use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use super::fakes::reconstructor;
 

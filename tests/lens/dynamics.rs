@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use parfocal::bench::{BenchError, Measurement, Plan, View, measure};
 use parfocal::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
 use parfocal::clock::{Clock, ManualClock, Moment, SystemClock};
 use parfocal::control::Eye;
 use parfocal::imaging::{Calibration, Reconstructor, RgbImage};
 use parfocal::lens::emulator::Model;
 use parfocal::lens::{FocalPower, Lens, LensDynamics, Optics, SimulatedLens};
+use parfocal::lens_measurement::{BenchError, Measurement, Plan, View, measure};
 
 use super::{emulator, open};
 

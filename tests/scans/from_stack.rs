@@ -1,7 +1,7 @@
 //! A focal stack made into a scan: what is no stack is refused, the scan is one that policies can be evaluated on.
 
 use parfocal::imaging::{GrayImage, gaussian_blur};
-use parfocal::training::texture::texture;
+use parfocal::simulation::texture::texture;
 
 use super::*;
 

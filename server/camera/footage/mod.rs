@@ -16,11 +16,11 @@ use std::time::Duration;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::path::{Habit, Path};
 use super::playback::{Playback, View, base_name};
 use super::{Camera, CameraSettings};
 use crate::imaging::RgbImage;
 use crate::lens::FocalPower;
+use crate::simulation::path::{Habit, Path};
 use defocus::Defocus;
 use reel::Reel;
 

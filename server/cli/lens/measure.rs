@@ -8,13 +8,13 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{Failure, Which, print};
-use crate::bench::{Fit, Measurement, Plan, View, measure, plot};
 use crate::camera::{self, CameraSettings};
 use crate::clock::{Clock, SystemClock};
 use crate::control::Eye;
 use crate::files::replace;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens::{LensInfo, MeasuredDynamics};
+use crate::lens_measurement::{Fit, Measurement, Plan, View, measure, plot};
 
 /// Arguments of `parfocal lens measure`.
 #[derive(Debug, clap::Args)]

@@ -7,11 +7,11 @@ use sha2::{Digest, Sha256};
 use super::{Failure, bar, info, print};
 use crate::camera::recorded::{LEAST_SIDE, MOST_POSES};
 use crate::notices::tell;
-use crate::training::evaluate::SEED;
-use crate::training::focal_stack::FocalStack;
-use crate::training::recording::{Cut, from_stack};
-use crate::training::stack_check::check;
-use crate::training::stack_optics::Optics;
+use crate::scans::benchmark::SEED;
+use crate::scans::recording::{Cut, from_stack};
+use crate::scans::stack::FocalStack;
+use crate::scans::stack::check::check;
+use crate::scans::stack::optics::Optics;
 
 /// Poses unless it is said otherwise: 20 s at 25 a second.
 const POSES: usize = 500;

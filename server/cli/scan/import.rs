@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Failure, bar, print};
-use crate::training::recording::{Imported, import};
+use crate::scans::recording::{Imported, import};
 
 /// Arguments of `parfocal scan import`.
 #[derive(Debug, clap::Args)]

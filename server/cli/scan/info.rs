@@ -9,9 +9,9 @@ use serde::Serialize;
 use super::{Failure, bar, print};
 use crate::camera::recorded::{Damage, Image, ScanFolder, poses};
 use crate::files::replace;
-use crate::training::focal_stack::{FocalStack, Plane};
-use crate::training::plot;
-use crate::training::stack_optics::Optics;
+use crate::plot;
+use crate::scans::stack::optics::Optics;
+use crate::scans::stack::{FocalStack, Plane};
 
 /// Most poses whose focus curves are shown.
 const SHOWN: usize = 3;

@@ -9,7 +9,6 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 
 use super::{Failure, bar, print};
-use crate::camera::phantom::Trajectory;
 use crate::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
 use crate::camera::{self, CameraSettings};
 use crate::cli::calibration;
@@ -18,9 +17,10 @@ use crate::clock::SystemClock;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens;
 use crate::notices::tell;
-use crate::training::evaluate::SEED;
-use crate::training::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
-use crate::training::recording::{Bench, Devices, PhantomBench, RecordError, Stepper, StepperError, record};
+use crate::scans::benchmark::SEED;
+use crate::scans::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
+use crate::scans::recording::{Bench, Devices, PhantomBench, RecordError, Stepper, StepperError, record};
+use crate::simulation::phantom::Trajectory;
 
 /// Arguments of `parfocal scan record`.
 #[derive(Debug, clap::Args)]

@@ -1,0 +1,262 @@
+//! An evaluation in parts: each on some of the scans, in another process or on another machine, put together afterwards. A
+//! whole evaluation is one of a single part, so that parts put together give what one run would have, to the last digit.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::report::{Report, Subject};
+use super::rollout::Path;
+use super::{Outcome, ScanSet, compare};
+use crate::scans::FocalTimeScan;
+use crate::scans::detail::{NothingToFocusOn, warning};
+
+const FORMAT: &str = "parfocal-evaluation-shard";
+const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));
+
+/// One of several parts of a set of scans: with n parts each n-th scan, so that every part has scans of all kinds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Part {
+    /// Which, from 1.
+    index: usize,
+    /// Number of parts.
+    of: usize,
+}
+
+impl Part {
+    /// All scans.
+    pub const WHOLE: Self = Self { index: 1, of: 1 };
+
+    /// Numbers of its scans among `count`, from 0.
+    #[must_use]
+    pub fn scans(self, count: usize) -> Vec<usize> {
+        (self.index.saturating_sub(1)..count).step_by(self.of.max(1)).collect()
+    }
+
+    /// Name of the file of its findings.
+    #[must_use]
+    pub fn file_name(self) -> String {
+        format!("shard-{}-of-{}.json", self.index, self.of)
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+impl FromStr for Part {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        match numbers {
+            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            _ => Err("must be like 2/8, the second of eight shards".to_owned()),
+        }
+    }
+}
+
+/// The scans of a [`Part`] of a set.
+pub struct PartOf<S> {
+    set: S,
+    scans: Vec<usize>,
+}
+
+impl<S: ScanSet> PartOf<S> {
+    /// Those of `set` that belong to `part`.
+    pub fn new(set: S, part: Part) -> Self {
+        let scans = part.scans(set.count());
+        Self { set, scans }
+    }
+}
+
+impl<S: ScanSet> ScanSet for PartOf<S> {
+    fn count(&self) -> usize {
+        self.scans.len()
+    }
+
+    fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize) {
+        self.set.scan(self.scans[index])
+    }
+
+    fn parts(&self) -> usize {
+        self.set.parts()
+    }
+}
+
+/// What an evaluation found on one part of its scans.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Shard {
+    format: String,
+    software: String,
+    /// Which part.
+    pub part: Part,
+    /// What was evaluated, on all scans.
+    pub subject: Subject,
+    /// Number of this part's scans without detail.
+    pub without_detail: usize,
+    /// What each policy did on this part's scans, in their order.
+    pub outcomes: Vec<Outcome>,
+}
+
+/// Why shards do not make an evaluation.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    /// It is something else.
+    #[error("{0} holds no shard of an evaluation; name files that `parfocal evaluate --shard` wrote")]
+    NoShard(String),
+    /// Two shards are of different evaluations.
+    #[error("{first} and {second} are shards of different evaluations: they differ in {what}")]
+    Differ {
+        /// One file.
+        first: String,
+        /// Another file.
+        second: String,
+        /// In what.
+        what: &'static str,
+    },
+    /// One is there twice.
+    #[error("{first} and {second} are both shard {part}; name each once")]
+    Twice {
+        /// One file.
+        first: String,
+        /// Another file.
+        second: String,
+        /// The part that both have.
+        part: Part,
+    },
+    /// Some are not there.
+    #[error("shards are missing: {0}; run `parfocal evaluate --shard` for them, with the same arguments")]
+    Missing(String),
+    /// There is nothing to focus on.
+    #[error(transparent)]
+    Blank(#[from] NothingToFocusOn),
+}
+
+impl Shard {
+    /// What was found on `part` of the scans of `subject`.
+    #[must_use]
+    pub fn new(part: Part, subject: Subject, without_detail: usize, outcomes: Vec<Outcome>) -> Self {
+        Self { format: FORMAT.to_owned(), software: SOFTWARE.to_owned(), part, subject, without_detail, outcomes }
+    }
+
+    /// Whether it is whole: a path for each policy and each of its scans.
+    fn is_whole(&self) -> bool {
+        let scans = self.part.scans(self.subject.count).len();
+        let Part { index, of } = self.part;
+        self.format == FORMAT
+            && (1..=of).contains(&index)
+            && self.outcomes.iter().all(|outcome| outcome.paths.len() == scans)
+    }
+
+    /// In what this shard's evaluation differs from that of `other`.
+    fn difference(&self, other: &Self) -> Option<&'static str> {
+        let policies = |shard: &Self| shard.outcomes.iter().map(|outcome| outcome.policy.clone()).collect::<Vec<_>>();
+        if self.software != other.software {
+            return Some("the version of parfocal");
+        }
+        if self.part.of != other.part.of {
+            return Some("the number of shards");
+        }
+        if policies(self) != policies(other) {
+            return Some("the policies");
+        }
+        self.subject.difference(&other.subject)
+    }
+}
+
+/// The evaluation that `shards`, each with the name of its file, are the parts of: its report, and each policy's paths.
+///
+/// # Errors
+/// When they are of several evaluations, or not all there, or there was nothing to focus on.
+pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>), MergeError> {
+    if let Some((name, _)) = shards.iter().find(|(_, shard)| !shard.is_whole()) {
+        return Err(MergeError::NoShard(name.clone()));
+    }
+    shards.sort_by_key(|(_, shard)| shard.part.index);
+    for pair in shards.windows(2) {
+        let [(first, a), (second, b)] = pair else { continue };
+        let (first, second) = (first.clone(), second.clone());
+        if let Some(what) = a.difference(b) {
+            return Err(MergeError::Differ { first, second, what });
+        }
+        if a.part == b.part {
+            return Err(MergeError::Twice { first, second, part: a.part });
+        }
+    }
+    let Some(Part { of, .. }) = shards.first().map(|(_, shard)| shard.part) else {
+        return Err(MergeError::Missing("all".to_owned()));
+    };
+    let present = |part: &Part| shards.iter().any(|(_, shard)| shard.part == *part);
+    let missing = (1..=of).map(|index| Part { index, of }).filter(|part| !present(part));
+    let missing: Vec<String> = missing.take(100).map(|part| part.to_string()).collect();
+    if !missing.is_empty() {
+        return Err(MergeError::Missing(missing.join(", ")));
+    }
+
+    let shards: Vec<Shard> = shards.into_iter().map(|(_, shard)| shard).collect();
+    let subject = shards[0].subject.clone();
+    let without_detail = shards.iter().map(|shard| shard.without_detail).sum();
+    warning(without_detail, subject.count)?;
+    let outcomes: Vec<Outcome> = (0..shards[0].outcomes.len()).map(|policy| together(&shards, policy)).collect();
+    let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();
+    let comparisons = compare(&rows);
+    Ok((Report { subject, without_detail, rows, comparisons }, outcomes))
+}
+
+/// The paths of the policy at `index` over all scans, in the order of the set.
+fn together(shards: &[Shard], index: usize) -> Outcome {
+    let first = &shards[0];
+    let count = first.subject.count;
+    let mut paths = vec![Path::default(); count];
+    for shard in shards {
+        for (scan, path) in shard.part.scans(count).into_iter().zip(&shard.outcomes[index].paths) {
+            paths[scan] = path.clone();
+        }
+    }
+    Outcome { paths, ..first.outcomes[index].clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(text: &str) -> Part {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn parts_hold_every_scan_once() {
+        let parts = ["1/3", "2/3", "3/3"].map(|text| part(text).scans(7));
+        assert_eq!(parts, [vec![0, 3, 6], vec![1, 4], vec![2, 5]]);
+        for wrong in ["0/3", "4/3", "1", "1/0", "a/b", ""] {
+            assert!(wrong.parse::<Part>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_belong_together_is_told() {
+        let shard = |text: &str, seed: u64| {
+            let part = part(text);
+            let subject = Subject { scans: "simulated".to_owned(), seed, count: 3, ..Subject::default() };
+            let path = Path { focal_power: vec![0.5], optimum: vec![0.6] };
+            let paths = vec![path; part.scans(3).len()];
+            let outcome = Outcome { policy: "fixed".to_owned(), paths, parts: 1 };
+            (format!("{text} of seed {seed}"), Shard::new(part, subject, 0, vec![outcome]))
+        };
+        let told = |shards: &[(&str, u64)]| {
+            let shards = shards.iter().map(|(text, seed)| shard(text, *seed)).collect();
+            merge(shards).map_or_else(|error| error.to_string(), |(report, _)| report.rows[0].frames.to_string())
+        };
+        assert_eq!(told(&[("2/2", 7), ("1/2", 7)]), "3");
+        assert_eq!(told(&[("1/3", 7)]).split(';').next(), Some("shards are missing: 2/3, 3/3"));
+        assert!(told(&[("1/2", 7), ("1/2", 7)]).contains("are both shard 1/2"));
+        assert!(told(&[("1/2", 7), ("2/2", 8)]).contains("1/2 of seed 7 and 2/2 of seed 8 are shards of different"));
+        assert!(told(&[("1/2", 7), ("2/2", 8)]).ends_with("differ in the seed"));
+        assert!(told(&[("1/2", 7), ("3/3", 7)]).ends_with("differ in the number of shards"));
+        assert!(told(&[]).contains("missing: all"));
+    }
+}

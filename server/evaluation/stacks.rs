@@ -1,0 +1,398 @@
+//! The benchmark of real glass: photographed focal stacks, each at two scales and three seeds, and how each policy does there beside
+//! the MGM hill-climber.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "counts of stacks, planes and pixels are small"
+)]
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::report::figure;
+use super::{EvaluateError, ORACLE, Outcome, Row, evaluate};
+use crate::autofocus::{PolicyName, Registry};
+use crate::camera::footage::{self, pictures_in};
+use crate::files::replace;
+use crate::imaging::{Calibration, DecodeError, GrayImage, Reconstructor, decode};
+use crate::scans::planes::{PlaneStack, PlanesError};
+use crate::scans::stack::drift::{StackCourse, StackScans};
+
+/// The policy that all others are set beside.
+pub const BASELINE: &str = "mgm-hill-climber";
+/// The two scales, by the width in pixels that a stack's pictures are brought near to. Nobody knows how soft a lens's best picture
+/// is on the sensor, so each stack is used at both.
+const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
+/// Seeds of the courses, one scan each.
+pub const SEEDS: usize = 3;
+/// First of the seeds, unless another is asked for.
+pub const FIRST_SEED: u64 = 31;
+
+/// Why a folder's pictures cannot be used as a focal stack.
+#[derive(Debug, thiserror::Error)]
+pub enum StackError {
+    /// The folder cannot be read, or holds no picture.
+    #[error(transparent)]
+    Source(#[from] footage::FootageError),
+    /// A picture cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Unreadable {
+        /// The picture.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A picture cannot be decoded.
+    #[error("cannot use {}: {source}", path.display())]
+    Undecodable {
+        /// The picture.
+        path: PathBuf,
+        /// Why.
+        source: DecodeError,
+    },
+    /// The pictures make no stack.
+    #[error("{} is no focal stack: {source}", folder.display())]
+    Unfit {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        source: PlanesError,
+    },
+    /// The stack has fewer planes than the range needs, or is too small.
+    #[error("{} cannot be scanned: it needs {planes} pictures of at least 128x128 pixels", folder.display())]
+    TooSmall {
+        /// The folder.
+        folder: PathBuf,
+        /// Planes of the range.
+        planes: usize,
+    },
+}
+
+/// A focal stack's folder, and how many of its pictures make the range 0..=1 of a scan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StackSource {
+    /// The folder with the pictures; sorted by name, numbers by value, they are in order of focus.
+    pub folder: PathBuf,
+    /// Planes of the range; two fifths of the stack's where it is `None`, but at least 6.
+    pub planes: Option<usize>,
+}
+
+impl StackSource {
+    /// The source that `DIR` or `DIR:PLANES` names.
+    #[must_use]
+    pub fn parse(text: &str) -> Self {
+        let split = text.rsplit_once(':').and_then(|(folder, planes)| Some((folder, planes.parse().ok()?)));
+        match split {
+            Some((folder, planes)) => Self { folder: folder.into(), planes: Some(planes) },
+            None => Self { folder: text.into(), planes: None },
+        }
+    }
+
+    fn name(&self) -> String {
+        self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
+    }
+}
+
+/// Reads the pictures in `folder` as gray, in order of focus.
+///
+/// # Errors
+/// When the folder or a picture cannot be read.
+pub fn read(folder: &Path) -> Result<Vec<GrayImage>, StackError> {
+    let picture = |path: PathBuf| {
+        let bytes = std::fs::read(&path).map_err(|source| StackError::Unreadable { path: path.clone(), source })?;
+        let picture = decode(&bytes, false).map_err(|source| StackError::Undecodable { path, source })?;
+        Ok(picture.into_gray(&mut Reconstructor::new(&Calibration::default())))
+    };
+    pictures_in(folder)?.into_iter().map(picture).collect()
+}
+
+/// `picture` made smaller by means over blocks of `side` x `side` pixels; what is left at the right and below is dropped.
+#[must_use]
+pub fn reduced(picture: &GrayImage, side: usize) -> GrayImage {
+    let (width, height) = (picture.width / side, picture.height / side);
+    let mut data = vec![0.0; width * height];
+    for (row, line) in picture.data.chunks_exact(picture.width).take(height * side).enumerate() {
+        let out = &mut data[row / side * width..][..width];
+        for (sum, block) in out.iter_mut().zip(line.chunks_exact(side)) {
+            *sum += block.iter().sum::<f32>();
+        }
+    }
+    let share = 1.0 / (side * side) as f32;
+    for value in &mut data {
+        *value *= share;
+    }
+    GrayImage { width, height, data }
+}
+
+/// A stack at one scale, ready to be scanned.
+#[derive(Debug)]
+struct Item {
+    stack: String,
+    scale: &'static str,
+    planes: usize,
+    scans: StackScans,
+}
+
+/// Reads `source` at both scales and lays three courses over each.
+fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, StackError> {
+    let pictures = read(&source.folder)?;
+    let planes = source.planes.unwrap_or((2 * pictures.len() / 5).max(6));
+    let width = pictures.first().map_or(0, |picture| picture.width);
+    let item = |(scale, wide): (&'static str, usize)| {
+        let side = ((width as f64 / wide as f64).round() as usize).max(1);
+        let reduced: Vec<_> = pictures.iter().enumerate().map(|(at, p)| (at as f32, reduced(p, side))).collect();
+        let unfit = |source_error| StackError::Unfit { folder: source.folder.clone(), source: source_error };
+        let stack = Arc::new(PlaneStack::new(&reduced).map_err(unfit)?);
+        let course = |seed| StackCourse::new(Arc::clone(&stack), planes, seed).map(Arc::new);
+        let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
+        let too_small = StackError::TooSmall { folder: source.folder.clone(), planes };
+        Ok(Item { stack: source.name(), scale, planes, scans: StackScans(courses.ok_or(too_small)?) })
+    };
+    SCALES.into_iter().map(item).collect()
+}
+
+/// How the policies did on one stack at one scale.
+#[derive(Debug, Clone, Serialize)]
+pub struct StackResult {
+    /// The stack's folder's name.
+    pub stack: String,
+    /// `s` or `l`: about 500 or 1000 pixels wide.
+    pub scale: &'static str,
+    /// Planes of the range.
+    pub planes: usize,
+    /// One a policy, the oracle first.
+    pub rows: Vec<Row>,
+}
+
+/// How a policy does beside the MGM hill-climber, over all stacks and scales.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Standing {
+    /// The policy.
+    pub policy: String,
+    /// Geometric mean of its mean absolute error divided by the hill-climber's.
+    pub ratio: f64,
+    /// 95 % bootstrap interval of that over stacks.
+    pub ratio_interval: (f64, f64),
+    /// On how many stacks and scales its error is greater than the hill-climber's.
+    pub worse_on: usize,
+    /// Mean share in focus.
+    pub in_focus: f64,
+    /// Its changes of direction a second divided by the hill-climber's.
+    pub turns: f64,
+    /// The stack and scale where it does worst beside the hill-climber.
+    pub worst: String,
+}
+
+/// The benchmark's figures.
+#[derive(Debug, Clone, Serialize)]
+pub struct StackReport {
+    /// First of the seeds.
+    pub seed: u64,
+    /// One a stack and scale.
+    pub stacks: Vec<StackResult>,
+    /// One a policy.
+    pub standings: Vec<Standing>,
+}
+
+/// Evaluates `policies` on the stacks of `sources`, the oracle and the baseline beside them.
+///
+/// # Errors
+/// When a stack cannot be read or scanned, or a policy cannot run.
+pub fn bench(
+    registry: &Registry,
+    policies: &[PolicyName],
+    sources: &[StackSource],
+    seed: u64,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<(StackReport, Vec<Vec<Outcome>>), StackBenchError> {
+    let mut policies = policies.to_vec();
+    let baseline = PolicyName::new(BASELINE);
+    if !policies.contains(&baseline) {
+        policies.insert(0, baseline);
+    }
+    let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed)).collect::<Result<_, _>>()?;
+    let (mut stacks, mut all) = (Vec::new(), Vec::new());
+    for item in items.into_iter().flatten() {
+        let outcomes = evaluate(registry, &policies, &item.scans, progress)?;
+        let rows = outcomes.iter().map(Outcome::row).collect();
+        stacks.push(StackResult { stack: item.stack, scale: item.scale, planes: item.planes, rows });
+        all.push(outcomes);
+    }
+    let standings = policies.iter().filter_map(|policy| standing(policy.as_str(), &stacks)).collect();
+    Ok((StackReport { seed, stacks, standings }, all))
+}
+
+/// Why the benchmark ended without figures.
+#[derive(Debug, thiserror::Error)]
+pub enum StackBenchError {
+    /// A stack cannot be used.
+    #[error(transparent)]
+    Stack(#[from] StackError),
+    /// A policy cannot run.
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
+}
+
+/// The standing of `policy`, `None` where a row is missing.
+fn standing(policy: &str, stacks: &[StackResult]) -> Option<Standing> {
+    let row = |result: &StackResult, name: &str| result.rows.iter().find(|row| row.policy == name).cloned();
+    let pairs: Vec<(Row, Row)> =
+        stacks.iter().map(|result| Some((row(result, policy)?, row(result, BASELINE)?))).collect::<Option<_>>()?;
+    let logs: Vec<f64> = pairs.iter().map(|(own, base)| (own.mae / base.mae).ln()).collect();
+    let count = logs.len().max(1) as f64;
+    let worst = (0..logs.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]))?;
+    let turns = |which: fn(&(Row, Row)) -> f64| pairs.iter().map(which).sum::<f64>();
+    Some(Standing {
+        policy: policy.to_owned(),
+        ratio: (logs.iter().sum::<f64>() / count).exp(),
+        ratio_interval: ratio_interval(stacks, &logs),
+        worse_on: logs.iter().filter(|log| **log > 0.0).count(),
+        in_focus: pairs.iter().map(|(own, _)| own.in_focus).sum::<f64>() / count,
+        turns: turns(|pair| pair.0.reversals) / turns(|pair| pair.1.reversals).max(1e-9),
+        worst: format!("{}-{}", stacks[worst].stack, stacks[worst].scale),
+    })
+}
+
+/// The 95 % percentile-bootstrap interval of the geometric mean, drawing whole stacks: a stack's two scales are no two witnesses.
+fn ratio_interval(stacks: &[StackResult], logs: &[f64]) -> (f64, f64) {
+    const RESAMPLES: usize = 2000;
+    let mut groups: Vec<(&str, Vec<f64>)> = Vec::new();
+    for (result, log) in stacks.iter().zip(logs) {
+        match groups.iter_mut().find(|group| group.0 == result.stack) {
+            Some(group) => group.1.push(*log),
+            None => groups.push((&result.stack, vec![*log])),
+        }
+    }
+    if groups.is_empty() {
+        return (0.0, 0.0);
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut resample = |_| {
+        let drawn: Vec<f64> =
+            (0..groups.len()).flat_map(|_| groups[rng.random_range(0..groups.len())].1.clone()).collect();
+        (drawn.iter().sum::<f64>() / drawn.len() as f64).exp()
+    };
+    let mut means: Vec<f64> = (0..RESAMPLES).map(&mut resample).collect();
+    means.sort_by(f64::total_cmp);
+    (means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40])
+}
+
+impl StackReport {
+    /// Writes `stacks.json`, `stacks.md`, and a figure of the first scan's paths for each stack and scale into `folder`.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(&self, outcomes: &[Vec<Outcome>], folder: &Path) -> std::io::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        replace(&folder.join("stacks.json"), serde_json::to_string_pretty(self)?.as_bytes())?;
+        replace(&folder.join("stacks.md"), self.markdown().as_bytes())?;
+        for (result, outcomes) in self.stacks.iter().zip(outcomes) {
+            let name = format!("{}-{}.svg", result.stack, result.scale);
+            replace(&folder.join(name), figure(outcomes, 0).as_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// The figures as Markdown: a row a stack and scale, then each policy beside the MGM hill-climber.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let Some(first) = self.stacks.first() else { return String::new() };
+        let names: Vec<&str> = first.rows.iter().map(|row| row.policy.as_str()).collect();
+        let mut text = format!("| MAE / in focus | {} |\n|{}\n", names.join(" | "), "---|".repeat(names.len() + 1));
+        for result in &self.stacks {
+            let cells: Vec<String> =
+                result.rows.iter().map(|row| format!("{:.3} / {:.0} %", row.mae, 100.0 * row.in_focus)).collect();
+            let _ = writeln!(text, "| {} {} | {} |", result.stack, result.scale, cells.join(" | "));
+        }
+        let _ = write!(
+            text,
+            "\n| beside {BASELINE} | MAE, geometric mean | 95 % CI over stacks | worse on | worst | in focus, mean | turns |\n\
+             |---|---|---|---|---|---|---|\n"
+        );
+        for standing in self.standings.iter().filter(|standing| standing.policy != ORACLE) {
+            let _ = writeln!(
+                text,
+                "| {} | {:.2} | {:.2}–{:.2} | {} of {} | {} | {:.1} % | {:.2} |",
+                standing.policy,
+                standing.ratio,
+                standing.ratio_interval.0,
+                standing.ratio_interval.1,
+                standing.worse_on,
+                self.stacks.len(),
+                standing.worst,
+                100.0 * standing.in_focus,
+                standing.turns,
+            );
+        }
+        let _ = writeln!(
+            text,
+            "\nEach stack at two scales (about 500 and 1000 pixels wide), seeds {} to {}; pictures between two planes are mixed.",
+            self.seed,
+            self.seed.wrapping_add(SEEDS as u64 - 1)
+        );
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_may_say_how_many_planes_make_the_range() {
+        assert_eq!(StackSource::parse("a/b:21"), StackSource { folder: "a/b".into(), planes: Some(21) });
+        assert_eq!(StackSource::parse("a:b/c"), StackSource { folder: "a:b/c".into(), planes: None });
+    }
+
+    #[test]
+    fn blocks_become_their_means() {
+        let picture = GrayImage { width: 5, height: 4, data: (0..20).map(|v| v as f32).collect() };
+        let small = reduced(&picture, 2);
+        assert_eq!((small.width, small.height, small.data), (2, 2, vec![3.0, 5.0, 13.0, 15.0]));
+    }
+
+    fn result(stack: &str, scale: &'static str, maes: [f64; 2]) -> StackResult {
+        let row = |policy: &str, mae: f64| Row {
+            policy: policy.to_owned(),
+            frames: 1,
+            mae,
+            sd: 0.0,
+            in_focus: 0.5,
+            travel: 0.0,
+            reversals: 6.0,
+            mae_interval: (mae, mae),
+            in_focus_interval: (0.5, 0.5),
+            scan_mae: vec![mae],
+        };
+        StackResult {
+            stack: stack.to_owned(),
+            scale,
+            planes: 9,
+            rows: vec![row(BASELINE, maes[0]), row("own", maes[1])],
+        }
+    }
+
+    #[test]
+    fn a_standing_is_the_geometric_mean_of_ratios() {
+        let stacks = [
+            result("a", "s", [0.1, 0.05]),
+            result("a", "l", [0.1, 0.2]),
+            result("b", "s", [0.2, 0.1]),
+            result("b", "l", [0.2, 0.1]),
+        ];
+        let own = standing("own", &stacks).unwrap();
+        // Ratios 1/2, 2, 1/2, 1/2.
+        assert!((own.ratio - 0.5f64.sqrt()).abs() < 1e-12);
+        assert_eq!((own.worse_on, own.worst.as_str()), (1, "a-l"));
+        assert!((own.turns - 1.0).abs() < 1e-12);
+        // Whole stacks are drawn: the least mean is that of b alone, the greatest that of a alone.
+        assert!((own.ratio_interval.0 - 0.5).abs() < 1e-12 && (own.ratio_interval.1 - 1.0).abs() < 1e-12);
+    }
+}

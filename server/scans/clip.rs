@@ -1,0 +1,137 @@
+//! What simulated scans are made of: sharp pictures in order of time.
+
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+use crate::imaging::GrayImage;
+
+/// Sharp pictures in order of time, one for a still, and where patches may lie on them.
+#[derive(Debug, Clone)]
+pub struct Clip {
+    frames: Vec<Arc<GrayImage>>,
+    area: Area,
+}
+
+/// A rectangle of pixels: `left <= x < right`, `top <= y < bottom`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Area {
+    /// First column.
+    pub left: usize,
+    /// First row.
+    pub top: usize,
+    /// Column after the last.
+    pub right: usize,
+    /// Row after the last.
+    pub bottom: usize,
+}
+
+/// Pictures that no scan can be made of.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ClipError {
+    /// There is no picture at all.
+    #[error("there are no pictures to scan")]
+    Empty,
+    /// A patch and its surroundings do not fit.
+    #[error(
+        "pictures must show at least 64x64 pixels to scan, in the square within their content area where they have one; these show {width}x{height}"
+    )]
+    TooSmall {
+        /// Usable width in pixels.
+        width: usize,
+        /// Usable height in pixels.
+        height: usize,
+    },
+    /// The pictures differ in size.
+    #[error("picture {index} is not of the first one's size")]
+    SizesDiffer {
+        /// Position, from 0.
+        index: usize,
+    },
+}
+
+impl Clip {
+    /// A clip of `frames`; patches stay within `area`, or anywhere where it is `None`.
+    ///
+    /// # Errors
+    /// When there is no frame, sizes differ, or less than 64x64 pixels can be used.
+    pub fn new(frames: Vec<Arc<GrayImage>>, area: Option<Area>) -> Result<Self, ClipError> {
+        let first = frames.first().ok_or(ClipError::Empty)?;
+        let size = (first.width, first.height);
+        if let Some(index) = frames.iter().position(|frame| (frame.width, frame.height) != size) {
+            return Err(ClipError::SizesDiffer { index });
+        }
+        let area = area.unwrap_or(Area { left: 0, top: 0, right: size.0, bottom: size.1 });
+        let area = Area { right: area.right.min(size.0), bottom: area.bottom.min(size.1), ..area };
+        let (width, height) = (area.right.saturating_sub(area.left), area.bottom.saturating_sub(area.top));
+        if width < 64 || height < 64 {
+            return Err(ClipError::TooSmall { width, height });
+        }
+        Ok(Self { frames, area })
+    }
+
+    /// A clip of one picture.
+    ///
+    /// # Errors
+    /// When it is smaller than 64x64 pixels.
+    pub fn still(picture: GrayImage) -> Result<Self, ClipError> {
+        Self::new(vec![Arc::new(picture)], None)
+    }
+
+    /// The picture at time `t`; after the end the clip runs backwards, and so on.
+    #[must_use]
+    pub fn at(&self, t: usize) -> &GrayImage {
+        let last = self.frames.len() - 1;
+        if last == 0 {
+            return &self.frames[0];
+        }
+        let phase = t % (2 * last);
+        &self.frames[phase.min(2 * last - phase)]
+    }
+
+    /// Number of pictures, at least 1.
+    #[must_use]
+    #[allow(clippy::len_without_is_empty, reason = "a clip is never empty")]
+    pub const fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Adds all that scans show of it to `hash`.
+    pub(crate) fn digest(&self, hash: &mut Sha256) {
+        let Area { left, top, right, bottom } = self.area;
+        for number in [self.frames.len(), left, top, right, bottom] {
+            hash.update((number as u64).to_le_bytes());
+        }
+        for frame in &self.frames {
+            hash.update((frame.width as u64).to_le_bytes());
+            frame.data.iter().for_each(|value| hash.update(value.to_le_bytes()));
+        }
+    }
+
+    /// Where patches may lie.
+    #[must_use]
+    pub const fn area(&self) -> Area {
+        self.area
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unusable_pictures_are_refused() {
+        assert_eq!(Clip::new(Vec::new(), None).unwrap_err(), ClipError::Empty);
+        let small = GrayImage::new(70, 20, vec![0.0; 1400]).unwrap();
+        assert_eq!(Clip::still(small).unwrap_err(), ClipError::TooSmall { width: 70, height: 20 });
+    }
+
+    #[test]
+    fn after_its_end_a_clip_runs_backwards() {
+        let frames =
+            [10.0, 20.0, 30.0].map(|level| Arc::new(GrayImage { width: 64, height: 64, data: vec![level; 4096] }));
+        let clip = Clip::new(frames.to_vec(), None).unwrap();
+        let played: Vec<f32> = (0..7).map(|t| clip.at(t).data[0]).collect();
+        assert_eq!(played, [10.0, 20.0, 30.0, 20.0, 10.0, 20.0, 30.0]);
+    }
+}

@@ -1,0 +1,244 @@
+//! A recorded scan out of a focal stack: windows that drift over it, in each of which the optimum walks as the paper's
+//! simulation lets it walk. Every picture shown was really taken.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "pixels and planes of a stack"
+)]
+
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::path::Path;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Taken, shot};
+use crate::autofocus::mgm;
+use crate::camera::recorded::{FORMAT, Header, LEAST_SIDE, Order, Recording, ScanError, VERSION};
+use crate::imaging::{GrayImage, PATCH_SIDE, PatchArea};
+use crate::scans::recorded::{as_patch, evenly_spread, levels_at};
+use crate::scans::stack::FocalStack;
+use crate::simulation::walk::{Motion, Walk};
+
+/// How the window drifts along each axis, in pixels a frame.
+const DRIFT: Motion = Motion { speed: 5.0 * FRAC_1_SQRT_2, memory: 30.0 };
+/// How the optimum walks, in focal power a frame, and within what.
+const FOCUS: Motion = Motion { speed: 0.012, memory: 60.0 };
+const WITHIN: (f64, f64) = (0.03, 0.97);
+/// Frames over which the sharpest plane is smoothed before the window of planes follows it (standard deviation).
+const SMOOTH: f64 = 12.0;
+
+/// How a scan is cut out of a stack.
+#[derive(Debug, Clone)]
+pub struct Cut {
+    /// Name of the stack, for people.
+    pub name: String,
+    /// Planes that a pose sees: its focal powers.
+    pub planes: usize,
+    /// Width and height of the window, pixels.
+    pub size: usize,
+    /// Number of poses.
+    pub poses: usize,
+    /// Seed of the walks.
+    pub seed: u64,
+}
+
+/// Why no scan can be cut.
+#[derive(Debug, thiserror::Error)]
+pub enum CutError {
+    /// More planes are asked for than there are.
+    #[error("a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; give --planes at most {}", of - 1)]
+    Planes {
+        /// Planes asked for.
+        planes: usize,
+        /// Planes of the stack.
+        of: usize,
+    },
+    /// The window does not fit.
+    #[error(
+        "a window of {size}x{size} pixels does not fit into pictures of {width}x{height}; give a smaller --size or --scale"
+    )]
+    Size {
+        /// Side of the window.
+        size: usize,
+        /// Width of the pictures.
+        width: usize,
+        /// Height of the pictures.
+        height: usize,
+    },
+    /// The scan cannot be written.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+}
+
+/// What one pose sees: the upper left corner of its window, and its first plane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub left: usize,
+    /// First line.
+    pub top: usize,
+    /// First plane.
+    pub plane: usize,
+}
+
+/// The windows of `cut` on `stack`, whose planes are evenly spaced.
+///
+/// # Errors
+/// When stack or pictures are too small.
+pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
+    let Cut { planes, size, poses, .. } = *cut;
+    let ((width, height), of) = (stack.size(), stack.planes().len());
+    if planes >= of {
+        return Err(CutError::Planes { planes, of });
+    }
+    if size < LEAST_SIDE || size > width || size > height {
+        return Err(CutError::Size { size, width, height });
+    }
+
+    let mut rng = ChaCha8Rng::seed_from_u64(cut.seed);
+    let [mut x, mut y] = [width, height].map(|side| Walk::new((0.0, (side - size) as f64), DRIFT, &mut rng));
+    let mut focus = Walk::starting(0.5, WITHIN, FOCUS, &mut rng);
+    let mut corners = Vec::with_capacity(poses);
+    let mut optima = Vec::with_capacity(poses);
+    for _ in 0..poses {
+        corners.push((x.position() as usize, y.position() as usize));
+        optima.push(focus.position());
+        for walk in [&mut x, &mut y, &mut focus] {
+            walk.advance(&mut rng);
+        }
+    }
+
+    let sharpest: Vec<f64> = corners.iter().map(|&corner| sharpest(stack, corner, size) as f64).collect();
+    let followed = smoothed(&sharpest);
+    let window = |((&(left, top), optimum), at): ((&(usize, usize), &f64), &f64)| {
+        let first = (at - optimum * (planes - 1) as f64).round().clamp(0.0, (of - planes) as f64);
+        Window { left, top, plane: first as usize }
+    };
+    Ok(corners.iter().zip(&optima).zip(&followed).map(window).collect())
+}
+
+/// Stores the scan that `cut` makes of `stack` in `out`, or goes on with it. `progress` is told after each pose.
+///
+/// # Errors
+/// When the stack is too small, or `out` holds another scan or cannot be written.
+pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()) -> Result<(), CutError> {
+    let windows = windows(stack, cut)?;
+    let powers = evenly_spread(cut.planes);
+    let header = Header {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        software: concat!("parfocal ", env!("CARGO_PKG_VERSION")).to_owned(),
+        camera: format!(
+            "focal stack {}, windows of {2}x{2} pixels over {1} planes",
+            cut.name,
+            stack.planes().len(),
+            cut.size
+        ),
+        lens: None,
+        simulated: false,
+        calibration: None,
+        seed: cut.seed,
+        order: Order::Unknown,
+        poses: cut.poses,
+        focal_powers: powers.clone(),
+    };
+    let patch = middle(cut.size);
+    let mut recording = Recording::open(out, &header)?;
+    for (pose, window) in (1..).zip(windows) {
+        if !recording.folder().poses().contains_key(&pose) {
+            let planes = &stack.planes()[window.plane..window.plane + cut.planes];
+            let pictures = planes.iter().map(|plane| cropped(&plane.picture, window, cut.size)).collect();
+            recording.store(&shot(pose, &powers, Taken { pictures, patch, truth: None }))?;
+        }
+        progress();
+    }
+    Ok(())
+}
+
+fn middle(size: usize) -> PatchArea {
+    let corner = (size - PATCH_SIDE) / 2;
+    PatchArea { x: corner, y: corner, width: PATCH_SIDE, height: PATCH_SIDE }
+}
+
+/// The plane in which the patch in the middle of the window at `corner` has the greatest mean gradient magnitude.
+fn sharpest(stack: &FocalStack, corner: (usize, usize), size: usize) -> usize {
+    let area = middle(size);
+    let area = PatchArea { x: corner.0 + area.x, y: corner.1 + area.y, ..area };
+    let metric = |index: &usize| mgm(&as_patch(&levels_at(&stack.planes()[*index].picture, area)));
+    (0..stack.planes().len()).max_by(|a, b| metric(a).total_cmp(&metric(b))).unwrap_or(0)
+}
+
+fn cropped(picture: &GrayImage, window: Window, size: usize) -> GrayImage {
+    let rows = picture.data.chunks_exact(picture.width).skip(window.top).take(size);
+    let data = rows.flat_map(|row| row[window.left..window.left + size].iter().copied()).collect();
+    GrayImage { width: size, height: size, data }
+}
+
+/// Values under a Gaussian of [`SMOOTH`] frames, mirrored at both ends.
+fn smoothed(values: &[f64]) -> Vec<f64> {
+    let reach = (4.0 * SMOOTH) as isize;
+    let last = values.len() as isize - 1;
+    let mirrored = |index: isize| {
+        let period = 2 * last + 2;
+        let place = index.rem_euclid(period);
+        values[place.min(period - 1 - place) as usize]
+    };
+    let weights: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / SMOOTH).powi(2)).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let at = |index: isize| weights.iter().zip(index - reach..).map(|(w, k)| w * mirrored(k)).sum::<f64>() / total;
+    (0..=last).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scans::stack::Plane;
+    use crate::simulation::blur::gaussian_blur;
+    use crate::simulation::texture::texture;
+
+    fn stack(count: usize, side: usize) -> FocalStack {
+        let plane = |index: usize| Plane {
+            name: index.to_string(),
+            position: index as f64,
+            picture: gaussian_blur(&texture(8, side), 0.8 * (index as f64 - (count / 2) as f64).abs()),
+        };
+        FocalStack::new((0..count).map(plane).collect()).unwrap()
+    }
+
+    fn cut(planes: usize, size: usize) -> Cut {
+        Cut { name: "a".to_owned(), planes, size, poses: 200, seed: 3 }
+    }
+
+    #[test]
+    fn windows_stay_on_the_stack_and_the_optimum_walks() {
+        let stack = stack(21, 160);
+        let windows = windows(&stack, &cut(9, 96)).unwrap();
+        assert!(windows.iter().all(|w| w.left <= 64 && w.top <= 64 && w.plane <= 12));
+        // Sharpest in plane 10: the optimum within the window is wherever the walk put it.
+        let optima: Vec<usize> = windows.iter().map(|w| 10usize.saturating_sub(w.plane)).collect();
+        let (least, most) = (optima.iter().min().unwrap(), optima.iter().max().unwrap());
+        assert!(optima.iter().all(|&o| o <= 8) && most - least >= 2, "{least} to {most}");
+        assert!(windows.windows(2).all(|pair| pair[0].plane.abs_diff(pair[1].plane) <= 2));
+        assert_eq!(windows, super::windows(&stack, &cut(9, 96)).unwrap());
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let stack = stack(7, 100);
+        assert!(windows(&stack, &cut(7, 96)).unwrap_err().to_string().contains("give --planes at most 6"));
+        assert!(
+            windows(&stack, &cut(5, 128)).unwrap_err().to_string().contains("does not fit into pictures of 100x100")
+        );
+    }
+
+    #[test]
+    fn smoothing_keeps_what_is_even_and_mirrors_at_the_ends() {
+        assert!(smoothed(&[3.0; 5]).iter().all(|value| (value - 3.0).abs() < 1e-12));
+        let step: Vec<f64> = (0..200).map(|index| f64::from(u8::from(index >= 100))).collect();
+        let found = smoothed(&step);
+        assert!((found[99] + found[100] - 1.0).abs() < 1e-9 && found[0] < 1e-9 && found[199] > 1.0 - 1e-9);
+    }
+}

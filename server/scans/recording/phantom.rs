@@ -1,0 +1,54 @@
+//! The phantom as something to record: a hand-held trajectory, each pose held still.
+
+use rayon::prelude::*;
+
+use super::{Bench, RecordError, Taken};
+use crate::camera::CameraError;
+use crate::imaging::{Calibration, GrayImage, MosaicFrame, Patch, PatchArea, Reconstructor, RgbImage};
+use crate::lens::FocalPower;
+use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH, Trajectory};
+
+/// The poses of a [`Trajectory`].
+pub struct PhantomBench {
+    trajectory: Trajectory,
+    reconstructor: Reconstructor,
+}
+
+impl PhantomBench {
+    /// A bench at which `trajectory` is replayed.
+    #[must_use]
+    pub fn new(trajectory: Trajectory) -> Self {
+        Self { trajectory, reconstructor: Reconstructor::new(&Calibration::default()) }
+    }
+}
+
+impl Bench for PhantomBench {
+    fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError> {
+        let beyond = || CameraError::BadSource(format!("the trajectory has no pose {pose}"));
+        let still = pose.checked_sub(1).and_then(|index| self.trajectory.still(index)).ok_or_else(beyond)?;
+        let tools = || (vec![0; SENSOR_WIDTH * SENSOR_HEIGHT], self.reconstructor.clone());
+        let picture = |(samples, reconstructor): &mut (Vec<u16>, Reconstructor), (number, power): (u16, FocalPower)| {
+            still.expose(number, power, samples);
+            let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, std::mem::take(samples))
+                .map_err(|error| CameraError::Failed(error.to_string()))?;
+            let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+            reconstructor.reconstruct(&mosaic, &mut rgb, &mut gray);
+            put(&mut gray, &reconstructor.gray_patch(&mosaic, still.patch()), still.patch());
+            *samples = mosaic.into_samples();
+            Ok(gray)
+        };
+        let numbered: Vec<(u16, FocalPower)> = (0..).zip(powers.iter().copied()).collect();
+        let pictures = numbered.into_par_iter().map_init(tools, picture).collect::<Result<_, CameraError>>()?;
+        Ok(Taken { pictures, patch: still.patch(), truth: Some(still.optimal()) })
+    }
+}
+
+/// Puts the patch as policies see it into its picture, which is reconstructed for people and may be off by a level.
+fn put(picture: &mut GrayImage, patch: &Patch, area: PatchArea) {
+    for (row, values) in patch.0.chunks_exact(area.width).enumerate() {
+        let start = (area.y + row) * picture.width + area.x;
+        if let Some(pixels) = picture.data.get_mut(start..start + area.width) {
+            pixels.copy_from_slice(values);
+        }
+    }
+}

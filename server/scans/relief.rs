@@ -1,0 +1,434 @@
+//! Scenes with relief, as focal stacks: folds, slopes, steps and things that stand above the surface, each place blurred by its own
+//! distance to the focal plane, nearer things over farther ones; seen through a lens whose best picture is soft.
+//!
+//! Heights and positions of the focal plane are in pixels of blur: a place at height `h` is blurred by a spot of standard
+//! deviation `|p - h|` with the focal plane at `p`.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "pixel arithmetic on small numbers"
+)]
+
+use std::sync::Arc;
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::pictures::{Split, sharp_phantom_of};
+use super::planes::{PlaneStack, PlanesError};
+use super::simulated::cheap_normal;
+use crate::imaging::GrayImage;
+use crate::simulation::blur::gaussian_blur;
+use crate::simulation::spots::{LensSpot, blurred};
+use crate::simulation::texture::{Canvas, texture, vary_contrast};
+use crate::simulation::walk::standard_normal;
+
+/// Side in pixels of a scene.
+const SIDE: usize = 360;
+/// Standard deviations in pixels at which each layer is blurred; between them pictures are mixed.
+const SIGMAS: [f32; 12] = [0.0, 0.4, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 7.5, 9.5, 12.0];
+/// Most that a place is higher or lower than the middle, in pixels of blur.
+const MOST_RELIEF: f64 = 4.5;
+/// Most softness of the best picture, in pixels of standard deviation.
+const MOST_SOFTNESS: f64 = 3.0;
+/// Blur in pixels a unit of focal power: least and most of any scene.
+const SLOPES: (f64, f64) = (1.5, 24.0);
+
+/// What scenes are drawn by.
+#[derive(Debug, Clone, Copy)]
+pub struct Style {
+    /// Share of scenes without relief.
+    flat: f64,
+    /// Least relief of the others, in pixels of blur.
+    least_relief: f64,
+    /// Most of the range that the relief takes from the middle: its height over the slope.
+    most_share: f64,
+    /// How many times its least slope a scene's slope may be.
+    slopes: f64,
+    /// Share of scenes with steps.
+    steps: f64,
+    /// Share of scenes that are photographed at few positions.
+    photographed: f64,
+    /// Least noise of the pictures of those, in gray levels.
+    least_noise: f32,
+}
+
+impl Style {
+    /// What a policy may meet: from flat scenes without noise to deep relief, slow lenses and fast ones.
+    const VARIED: Self = Self {
+        flat: 0.15,
+        least_relief: 0.3,
+        most_share: 0.35,
+        slopes: f64::INFINITY,
+        steps: 0.6,
+        photographed: 0.45,
+        least_noise: 0.0,
+    };
+
+    /// As hard as photographed stacks are for the hill-climbers: relief that takes most of the range. `docs/results.md` tells how it was
+    /// calibrated.
+    const DEEP: Self = Self {
+        flat: 0.0,
+        least_relief: 2.0,
+        most_share: 0.7,
+        slopes: 1.3,
+        steps: 1.0,
+        photographed: 0.9,
+        least_noise: 1.0,
+    };
+}
+
+/// A focal stack to scan in training, and how steeply it may blur.
+#[derive(Debug, Clone)]
+pub struct StackScene {
+    /// The pictures.
+    pub planes: PlaneStack,
+    /// Positions a unit of focal power, least and most.
+    pub slopes: (f64, f64),
+    /// Whether the stack's ends are the end of what was photographed: the range then stays within them, around the place that is
+    /// sharpest. Otherwise the stack blurs no more beyond them.
+    pub photographed: bool,
+}
+
+/// The scenes `0..count` of `split`, every second one deep, the others varied; each is drawn from its number alone.
+///
+/// # Errors
+/// None in practice: the scenes are large enough.
+pub fn scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesError> {
+    let style = |index: u64| if index.is_multiple_of(2) { Style::VARIED } else { Style::DEEP };
+    (0..count).into_par_iter().map(|index| scene(split, index, style(index)).map(Arc::new)).collect()
+}
+
+/// The scenes `0..count` of `split`, all of them deep: those of the reference benchmark with relief.
+///
+/// # Errors
+/// None in practice: the scenes are large enough.
+pub fn deep_scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesError> {
+    (0..count).into_par_iter().map(|index| scene(split, index, Style::DEEP).map(Arc::new)).collect()
+}
+
+/// Scene `index` of `split`, drawn by `style`.
+fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesError> {
+    let seed = split.first_seed() + index;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7265_6c69_6566);
+    let softness = if rng.random_bool(0.3) { rng.random_range(0.0..0.6) } else { rng.random_range(0.0..MOST_SOFTNESS) };
+    let relief =
+        if rng.random_bool(style.flat) { 0.0 } else { rng.random_range(style.least_relief..MOST_RELIEF) as f32 };
+
+    let ground = gaussian_blur(&surface(split, index, &mut rng), softness);
+    let heights = heights(relief, style.steps, &mut rng);
+    let above = rng.random_bool(0.6).then(|| things_above(seed, relief, softness, &mut rng));
+    let spots = spots(&mut rng);
+    let finish = Finish::draw(&mut rng);
+    let taking = Taking::draw(style, &mut rng);
+
+    let ground = Layer::new(&ground, spots);
+    let above = above.map(|Above { colour, cover, height }| {
+        // What the things do not cover must not shine through where they are blurred.
+        (Layer::new(&colour, spots), Layer::new(&cover, spots), height)
+    });
+    let picture = |position: f32| {
+        let mut picture = ground.at_heights(position, &heights);
+        if let Some((colour, cover, height)) = &above {
+            let (colour, cover) = (colour.at(position - height), cover.at(position - height));
+            for (value, (colour, cover)) in picture.iter_mut().zip(colour.iter().zip(&cover)) {
+                *value = colour + (1.0 - cover / 255.0) * *value;
+            }
+        }
+        (position, finish.apply(GrayImage { width: SIDE, height: SIDE, data: picture }))
+    };
+    let mut pictures: Vec<_> = taking.positions().into_iter().map(picture).collect();
+    taking.spoil(&mut pictures, &mut rng);
+
+    let least = softness.max(f64::from(relief) / style.most_share).max(taking.least_slope()).max(SLOPES.0);
+    let slopes = (least, (style.slopes * least).min(SLOPES.1));
+    Ok(StackScene { planes: PlaneStack::new(&pictures)?, slopes, photographed: false })
+}
+
+/// How a scene's pictures are taken.
+enum Taking {
+    /// At so many positions, and so well, that only the scan's own noise is in the pictures.
+    Ideally,
+    /// As a stack is photographed: at few positions, each picture with noise, brightness and place of its own. Seen through a lens that moves
+    /// between them, what is mixed of two pictures has less noise than either.
+    Photographed {
+        /// Pixels of blur from one position to the next.
+        spacing: f32,
+        /// Standard deviation of the noise, in gray levels.
+        noise: f32,
+        /// Standard deviation of a picture's brightness, as a share.
+        flicker: f32,
+    },
+}
+
+/// Least positions in a unit of focal power of a photographed stack.
+const LEAST_PLANES: f64 = 5.0;
+
+impl Taking {
+    fn draw(style: Style, rng: &mut impl Rng) -> Self {
+        if !rng.random_bool(style.photographed) {
+            return Self::Ideally;
+        }
+        let noise = rng.random_range(style.least_noise..3.5);
+        let flicker = if rng.random_bool(0.5) { rng.random_range(0.0f32..0.03) } else { 0.0 };
+        Self::Photographed { spacing: rng.random_range(0.3f32..2.0), noise, flicker }
+    }
+
+    /// Positions of the focal plane, rising.
+    fn positions(&self) -> Vec<f32> {
+        match self {
+            Self::Ideally => close_positions(),
+            Self::Photographed { spacing, .. } => {
+                let each_side = (SIGMAS[SIGMAS.len() - 1] / spacing).ceil() as i32;
+                (-each_side..=each_side).map(|plane| plane as f32 * spacing).collect()
+            }
+        }
+    }
+
+    /// Least slope at which the positions are close enough.
+    fn least_slope(&self) -> f64 {
+        match self {
+            Self::Ideally => 0.0,
+            Self::Photographed { spacing, .. } => LEAST_PLANES * f64::from(*spacing),
+        }
+    }
+
+    /// Adds what each picture has of its own.
+    fn spoil(&self, pictures: &mut [(f32, GrayImage)], rng: &mut impl Rng) {
+        let Self::Photographed { noise, flicker, .. } = self else { return };
+        for (_, picture) in pictures {
+            let gain = (flicker * standard_normal(rng) as f32).exp();
+            for value in &mut picture.data {
+                *value = (gain * *value + noise * cheap_normal(rng)).clamp(0.0, 255.0);
+            }
+        }
+    }
+}
+
+/// Positions of the focal plane that lie close together where blur changes what is seen most.
+fn close_positions() -> Vec<f32> {
+    let steps = std::iter::repeat_n(0.25, 12).chain(std::iter::repeat_n(0.5, 6)).chain(std::iter::repeat_n(1.0, 6));
+    let side: Vec<f32> = steps
+        .scan(0.0, |at, step| {
+            *at += step;
+            Some(*at)
+        })
+        .collect();
+    let below = side.iter().rev().map(|at| -at);
+    below.chain([0.0]).chain(side.iter().copied()).collect()
+}
+
+/// What lies on the ground, sharp.
+fn surface(split: Split, index: u64, rng: &mut impl Rng) -> GrayImage {
+    let seed = split.first_seed() + index;
+    let mut picture =
+        if index.is_multiple_of(4) { sharp_phantom_of(split, index, SIDE) } else { texture(seed ^ 0x67_726f, SIDE) };
+    if rng.random_bool(0.5) {
+        vary_contrast(&mut picture, rng.random_range(0.2..1.2), seed);
+    }
+    picture
+}
+
+/// The height of each place, `relief` at most above or below 0: a slope, folds, and in a share of scenes `steps`.
+fn heights(relief: f32, steps: f64, rng: &mut impl Rng) -> Vec<f32> {
+    let mut field = Canvas::blank(SIDE);
+    let middle = SIDE as f32 / 2.0;
+    if rng.random_bool(0.7) {
+        let cell = rng.random_range(40.0..160.0);
+        field.add_octave(rng, cell, 1.0);
+        let finer = rng.random_range(0.0..0.5);
+        field.add_octave(rng, 0.5 * cell, finer);
+    }
+    if rng.random_bool(0.5) {
+        let (across, down) = (rng.random_range(-1.0f32..1.0), rng.random_range(-1.0f32..1.0));
+        for (index, height) in field.data.iter_mut().enumerate() {
+            let (x, y) = ((index % SIDE) as f32 / middle - 1.0, (index / SIDE) as f32 / middle - 1.0);
+            *height += across * x + down * y;
+        }
+    }
+    if rng.random_bool(steps) {
+        add_steps(&mut field, rng);
+    }
+    let most = field.data.iter().fold(1e-6f32, |most, height| most.max(height.abs()));
+    field.data.iter_mut().for_each(|height| *height *= relief / most);
+    field.data
+}
+
+/// Flat places higher or lower than what is around them, with upright sides: blocks and discs.
+fn add_steps(field: &mut Canvas, rng: &mut impl Rng) {
+    for _ in 0..rng.random_range(3..30) {
+        let (x, y) = (rng.random_range(0..SIDE), rng.random_range(0..SIDE));
+        let (wide, high) = (rng.random_range(15..110), rng.random_range(15..110));
+        let (step, round) = (rng.random_range(-1.0f32..1.0), rng.random_bool(0.4));
+        for row in y..(y + high).min(SIDE) {
+            for column in x..(x + wide).min(SIDE) {
+                let (across, down) = ((column - x) as f32 / wide as f32 - 0.5, (row - y) as f32 / high as f32 - 0.5);
+                if !round || across * across + down * down < 0.25 {
+                    field.data[row * SIDE + column] = step;
+                }
+            }
+        }
+    }
+}
+
+/// Things that stand above the ground at one height: vessels, blocks.
+struct Above {
+    /// Their gray levels times their cover.
+    colour: GrayImage,
+    /// How much of each pixel they cover, 0..=255.
+    cover: GrayImage,
+    height: f32,
+}
+
+fn things_above(seed: u64, relief: f32, softness: f64, rng: &mut impl Rng) -> Above {
+    let mut mask = Canvas::blank(SIDE);
+    if rng.random_bool(0.6) {
+        mask.add_winding_lines(rng, 3..14, 2.0..9.0, 1.0);
+    } else {
+        for _ in 0..rng.random_range(3..20) {
+            let centre = (rng.random_range(0.0..SIDE as f32), rng.random_range(0.0..SIDE as f32));
+            let (radius, stretch) = (rng.random_range(5.0f32..45.0), rng.random_range(0.4f32..2.5));
+            mask.add_leaf(centre, radius, stretch, 1.0);
+        }
+    }
+    let look = texture(seed ^ 0x0061_626f_7665, SIDE);
+    let colour = look.data.iter().zip(&mask.data).map(|(value, cover)| value * cover).collect();
+    let cover = mask.data.iter().map(|cover| 255.0 * cover).collect();
+    let soft = |data| gaussian_blur(&GrayImage { width: SIDE, height: SIDE, data }, softness);
+    Above { colour: soft(colour), cover: soft(cover), height: relief * rng.random_range(0.2f32..1.0) }
+}
+
+/// The spots on the near and on the far side of focus.
+fn spots(rng: &mut impl Rng) -> [LensSpot; 2] {
+    let near = spot(rng);
+    let far = if rng.random_bool(0.6) { near } else { spot(rng) };
+    [near, far]
+}
+
+fn spot(rng: &mut impl Rng) -> LensSpot {
+    if rng.random_bool(0.5) { LensSpot::Gaussian } else { LensSpot::Disc { rim: rng.random_range(-0.6f32..1.5) } }
+}
+
+/// A picture at each of [`SIGMAS`], on both sides of focus.
+struct Layer {
+    /// The near side's, then the far side's; empty where the two are the same.
+    levels: [Vec<Vec<f32>>; 2],
+}
+
+impl Layer {
+    fn new(picture: &GrayImage, spots: [LensSpot; 2]) -> Self {
+        let blurred = |spot| SIGMAS.iter().map(|&sigma| blurred(picture, f64::from(sigma), spot).data).collect();
+        let far = if spots[0] == spots[1] { Vec::new() } else { blurred(spots[1]) };
+        Self { levels: [blurred(spots[0]), far] }
+    }
+
+    fn side(&self, distance: f32) -> &[Vec<f32>] {
+        if distance < 0.0 && !self.levels[1].is_empty() { &self.levels[1] } else { &self.levels[0] }
+    }
+
+    /// The layer `distance` away from the focal plane, all of it.
+    fn at(&self, distance: f32) -> Vec<f32> {
+        let levels = self.side(distance);
+        let (level, share) = level(distance.abs());
+        levels[level].iter().zip(&levels[level + 1]).map(|(low, high)| low + share * (high - low)).collect()
+    }
+
+    /// The layer with the focal plane at `position`, each place blurred by its own distance.
+    fn at_heights(&self, position: f32, heights: &[f32]) -> Vec<f32> {
+        let value = |(index, height): (usize, &f32)| {
+            let distance = position - height;
+            let levels = self.side(distance);
+            let (level, share) = level(distance.abs());
+            let (low, high) = (levels[level][index], levels[level + 1][index]);
+            low + share * (high - low)
+        };
+        heights.iter().enumerate().map(value).collect()
+    }
+}
+
+/// The level of [`SIGMAS`] below `sigma`, and the share of the way to the next.
+fn level(sigma: f32) -> (usize, f32) {
+    let above = SIGMAS.partition_point(|&at| at <= sigma).clamp(1, SIGMAS.len() - 1);
+    let (low, high) = (SIGMAS[above - 1], SIGMAS[above]);
+    (above - 1, ((sigma - low) / (high - low)).min(1.0))
+}
+
+/// What a camera makes of the picture that reaches it: gamma and sharpening.
+struct Finish {
+    gamma: Option<f32>,
+    /// How much of what differs from the picture's blur by a pixel is added.
+    sharpening: Option<f32>,
+}
+
+impl Finish {
+    fn draw(rng: &mut impl Rng) -> Self {
+        Self {
+            gamma: rng.random_bool(0.3).then(|| rng.random_range(0.6f32..1.5)),
+            sharpening: rng.random_bool(0.3).then(|| rng.random_range(0.2f32..1.5)),
+        }
+    }
+
+    fn apply(&self, mut picture: GrayImage) -> GrayImage {
+        if let Some(gamma) = self.gamma {
+            picture.data.iter_mut().for_each(|value| *value = 255.0 * (value.max(0.0) / 255.0).powf(gamma));
+        }
+        if let Some(share) = self.sharpening {
+            let soft = gaussian_blur(&picture, 1.0);
+            let sharpen = |(value, soft): (&mut f32, &f32)| *value += share * (*value - soft);
+            picture.data.iter_mut().zip(&soft.data).for_each(sharpen);
+        }
+        picture.data.iter_mut().for_each(|value| *value = value.clamp(0.0, 255.0));
+        picture
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_mix_to_the_sigma_between_them() {
+        for sigma in [0.0, 0.3, 1.2, 5.0, 11.9] {
+            let (level, share) = level(sigma);
+            let mixed = SIGMAS[level] + share * (SIGMAS[level + 1] - SIGMAS[level]);
+            assert!((mixed - sigma).abs() < 1e-5, "{sigma} {mixed}");
+        }
+        assert_eq!(level(20.0), (SIGMAS.len() - 2, 1.0));
+    }
+
+    #[test]
+    fn positions_rise_and_are_symmetric() {
+        let positions = close_positions();
+        assert!(positions.is_sorted_by(|a, b| a < b));
+        assert!(positions.iter().zip(positions.iter().rev()).all(|(a, b)| (a + b).abs() < 1e-6));
+        assert!((positions[0] + 12.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_scene_is_sharpest_where_its_surface_lies() {
+        // Two halves at different heights, without softness or anything above.
+        let ground = texture(5, SIDE);
+        let heights: Vec<f32> = (0..SIDE * SIDE).map(|i| if i % SIDE < SIDE / 2 { -2.0 } else { 1.5 }).collect();
+        let layer = Layer::new(&ground, [LensSpot::Gaussian; 2]);
+        let picture = |position: f32| {
+            (position, GrayImage { width: SIDE, height: SIDE, data: layer.at_heights(position, &heights) })
+        };
+        let stack = PlaneStack::new(&close_positions().into_iter().map(picture).collect::<Vec<_>>()).unwrap();
+        for y in [20, 100, 200, 300] {
+            assert!((stack.sharpest((60, y)) + 2.0).abs() < 0.3, "{}", stack.sharpest((60, y)));
+            assert!((stack.sharpest((260, y)) - 1.5).abs() < 0.3, "{}", stack.sharpest((260, y)));
+        }
+    }
+
+    #[test]
+    fn a_scene_is_reproducible_and_blurs_away_from_its_optimum() {
+        let scene = || scene(Split::Training, 6, Style::VARIED).unwrap();
+        let (one, other) = (scene(), scene());
+        assert_eq!(one.planes.patch((100, 100), 0.7), other.planes.patch((100, 100), 0.7));
+        let best = one.planes.sharpest((100, 100));
+        let sharpness = |position| crate::autofocus::mgm(&one.planes.patch((100, 100), position));
+        assert!(sharpness(best) > sharpness(best + 6.0) && sharpness(best) > sharpness(best - 6.0));
+    }
+}

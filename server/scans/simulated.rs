@@ -1,0 +1,472 @@
+//! Simulated focal-time scans: a crop walks over sharp pictures, the optimal focal power walks too, and what is seen at
+//! another focal power is blurred in proportion to the distance (Budd et al., MICCAI 2023).
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "pixel arithmetic on small numbers"
+)]
+
+use super::FocalTimeScan;
+use std::sync::Arc;
+
+use multiversion::multiversion;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::clip::{Area, Clip};
+use super::relief::StackScene;
+use crate::imaging::{PATCH_SIDE, Patch};
+use crate::lens::FocalPower;
+use crate::simulation::cover::Cover;
+use crate::simulation::patch_defocus::{Defocus, Spot};
+use crate::simulation::unrest::{Restlessness, Unrest};
+use crate::simulation::walk::{Motion, Walk, standard_normal};
+
+/// How a scan moves, blurs and is exposed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanSettings {
+    /// How the optimal focal power moves, in focal power a frame.
+    pub focus: Motion,
+    /// How the crop moves, in pixels a frame.
+    pub crop: Motion,
+    /// Blur in pixels of standard deviation a unit of focal power, drawn per scan from this range.
+    pub blur: (f64, f64),
+    /// Shape of the blur.
+    pub spot: Spot,
+    /// Standard deviation of the noise, in gray levels.
+    pub noise: f64,
+    /// Hand tremor: each frame is blurred further, by this many pixels (standard deviation) times a normal draw.
+    pub tremor: f64,
+    /// Unsteady contrast (light, smoke, wet glints): each frame's is scaled by the exponential of this times a normal draw.
+    pub flicker: f64,
+    /// Contrast and brightness: gray becomes `gain * gray + offset`.
+    pub exposure: (f64, f64),
+    /// Share of the light that comes from something in view that moves by itself, as fluids, instruments and reflections do.
+    pub veil: f64,
+    /// Standard deviation, in gray levels, of a pattern that stays with the sensor.
+    pub pattern: f64,
+    /// How restless the scene is, if it is.
+    pub unrest: Option<Restlessness>,
+    /// Whether now and then something without detail covers the view: a glove, an instrument, glare.
+    pub covered: bool,
+}
+
+impl ScanSettings {
+    /// The reference benchmark's scans: over still pictures, on which the crop moves as fast as crop and scene together do
+    /// in footage. `docs/results.md` tells how they were calibrated.
+    #[must_use]
+    pub fn reference() -> Self {
+        Self { crop: Motion { speed: 5.0, memory: 30.0 }, ..Self::default() }
+    }
+
+    /// What fits `scene`: the default over a video, the reference's over whatever is still.
+    #[must_use]
+    pub fn fitting(scene: &Scene) -> Self {
+        match scene {
+            Scene::Flat(clip) if clip.len() > 1 => Self::default(),
+            _ => Self::reference(),
+        }
+    }
+}
+
+impl Default for ScanSettings {
+    /// Scans over footage, which is unsteady enough by itself.
+    fn default() -> Self {
+        Self {
+            focus: Motion { speed: 0.012, memory: 60.0 },
+            crop: Motion { speed: 1.0, memory: 30.0 },
+            blur: (2.0, 8.0),
+            spot: Spot::Gaussian,
+            noise: 0.0,
+            tremor: 0.0,
+            flicker: 0.0,
+            exposure: (1.0, 0.0),
+            veil: 0.0,
+            pattern: 0.0,
+            unrest: None,
+            covered: false,
+        }
+    }
+}
+
+/// What a scan goes over.
+#[derive(Debug, Clone)]
+pub enum Scene {
+    /// Sharp pictures, all of which lie at one distance.
+    Flat(Arc<Clip>),
+    /// A focal stack, whose places may lie at different distances.
+    Stack(Arc<StackScene>),
+}
+
+/// How a lens's focal power becomes a position in a focal stack.
+#[derive(Debug, Clone, Copy)]
+struct Optics {
+    /// Positions a unit of focal power; below 0 where they fall with it.
+    slope: f64,
+    /// How far from straight the response is: 0, or the change of slope over half a unit.
+    bend: f64,
+    /// Pixels that the picture moves along each axis when the position changes by one, as magnification follows focus.
+    shift: [f64; 2],
+    /// The sharpest position, smoothed over the way, of a photographed stack; 0 for others.
+    anchor: f64,
+}
+
+/// Frames over which the anchor of a photographed stack follows what is in view.
+const ANCHOR_MEMORY: f64 = 12.0;
+
+impl Optics {
+    fn draw(scene: &StackScene, start: f64, course: &mut ChaCha8Rng) -> Self {
+        let (least, most) = scene.slopes;
+        let size = least * (most.max(least) / least).powf(course.random::<f64>());
+        let slope = if course.random_bool(0.5) { size } else { -size };
+        if scene.photographed {
+            return Self { slope, bend: 0.0, shift: [0.0; 2], anchor: start };
+        }
+        let bend = course.random_range(-0.3..0.3);
+        let shift = [(); 2].map(|()| 0.15 * standard_normal(course));
+        Self { slope, bend, shift, anchor: 0.0 }
+    }
+
+    /// The position at focal power 0 of a photographed stack whose anchor stands at `focus`, as nearly as its ends allow.
+    fn origin(&self, focus: f64, (first, last): (f64, f64)) -> f64 {
+        let origin = self.anchor - self.slope * focus;
+        let (low, high) = if self.slope > 0.0 { (first, last - self.slope) } else { (first - self.slope, last) };
+        origin.clamp(low.min(high), high)
+    }
+
+    /// The position in `scene` at `focal_power` while `focus` is where the anchor stands.
+    fn position(&self, scene: &StackScene, focus: f64, focal_power: f64) -> f64 {
+        if scene.photographed {
+            return self.origin(focus, scene.planes.range()) + self.slope * focal_power;
+        }
+        let off = focal_power - focus;
+        self.slope * (off + self.bend * off * off)
+    }
+
+    /// The focal power at which `scene` is seen at `position`: what [`Optics::position`] takes back.
+    fn focal_power(&self, scene: &StackScene, focus: f64, position: f64) -> f64 {
+        if scene.photographed {
+            return (position - self.origin(focus, scene.planes.range())) / self.slope;
+        }
+        // off + bend off^2 = place, by the root that is 0 where place is, without dividing by a small bend.
+        let place = position / self.slope;
+        let root = (1.0 + 4.0 * self.bend * place).max(0.0).sqrt();
+        focus + 2.0 * place / (1.0 + root)
+    }
+}
+
+/// One focal-time scan, frame by frame. Its course depends on its seed alone, never on what is looked at.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    scene: Scene,
+    settings: ScanSettings,
+    /// Blur in pixels a unit of focal power over flat scenes.
+    sigma0: f64,
+    /// How focal power becomes a position over focal stacks.
+    optics: Option<Optics>,
+    tremor: f64,
+    contrast: f64,
+    time: usize,
+    focus: Walk,
+    crop: [Walk; 2],
+    /// Where the veil lies on the clip, if there is one.
+    veil: Option<[Walk; 2]>,
+    /// The sensor's pattern, a gray level a pixel; empty if there is none.
+    pattern: Vec<f32>,
+    unrest: Option<Unrest>,
+    cover: Option<Cover>,
+    course: ChaCha8Rng,
+    veil_course: ChaCha8Rng,
+    unrest_course: ChaCha8Rng,
+    noise: ChaCha8Rng,
+    defocus: Defocus,
+}
+
+impl Scan {
+    /// A scan over `clip` whose course is drawn from `seed`.
+    #[must_use]
+    pub fn new(clip: Arc<Clip>, settings: ScanSettings, seed: u64) -> Self {
+        Self::over(Scene::Flat(clip), settings, seed)
+    }
+
+    /// A scan over `scene` whose course is drawn from `seed`. Over a focal stack `settings` says nothing of blur, spot, tremor, veil
+    /// and unrest: the stack has its own.
+    #[must_use]
+    pub fn over(scene: Scene, settings: ScanSettings, seed: u64) -> Self {
+        let mut course = ChaCha8Rng::seed_from_u64(seed);
+        let sigma0 = course.random_range(settings.blur.0..=settings.blur.1);
+        let focus = Walk::new((0.0, 1.0), settings.focus, &mut course);
+        let room = scene.room();
+        let crop = room.map(|room| Walk::new(room, settings.crop, &mut course));
+        let time = match &scene {
+            Scene::Flat(clip) if clip.len() > 1 => course.random_range(0..2 * clip.len()),
+            _ => 0,
+        };
+        let mut noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
+        let mut veil_course = ChaCha8Rng::seed_from_u64(seed ^ 0x7665_696c);
+        let veil = (settings.veil > 0.0).then(|| room.map(|room| Walk::new(room, settings.crop, &mut veil_course)));
+        let pixels = if settings.pattern > 0.0 { PATCH_SIDE * PATCH_SIDE } else { 0 };
+        let pattern = (0..pixels).map(|_| settings.pattern as f32 * cheap_normal(&mut noise)).collect();
+        let mut unrest_course = ChaCha8Rng::seed_from_u64(seed ^ 0x756e_7265_7374);
+        let unrest = settings.unrest.map(|unrest| Unrest::new(unrest, &mut unrest_course));
+        let cover = settings.covered.then(|| Cover::new(seed ^ 0x0063_6f76_6572));
+        let tremor = settings.tremor * standard_normal(&mut course);
+        let contrast = (settings.flicker * standard_normal(&mut course)).exp();
+        let optics = match &scene {
+            Scene::Flat(_) => None,
+            Scene::Stack(stack) => Some(Optics::draw(stack, stack.planes.sharpest(whole(corner(&crop))), &mut course)),
+        };
+        let defocus = Defocus::default();
+        Self {
+            scene,
+            settings,
+            sigma0,
+            optics,
+            tremor,
+            contrast,
+            time,
+            focus,
+            crop,
+            veil,
+            pattern,
+            unrest,
+            cover,
+            course,
+            veil_course,
+            unrest_course,
+            noise,
+            defocus,
+        }
+    }
+
+    /// The optimal focal power at this frame.
+    #[must_use]
+    pub fn optimum(&self) -> FocalPower {
+        let focus = self.focus.position();
+        match (&self.scene, &self.optics) {
+            (Scene::Stack(stack), Some(optics)) => {
+                let sharpest = stack.planes.sharpest(whole(corner(&self.crop)));
+                FocalPower::nearest(optics.focal_power(stack, focus, sharpest))
+            }
+            _ => FocalPower::nearest(focus),
+        }
+    }
+
+    /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.
+    pub fn observe(&mut self, focal_power: FocalPower) -> Patch {
+        let mut patch = match self.scene.clone() {
+            Scene::Flat(clip) => self.look_at_flat(&clip, focal_power),
+            Scene::Stack(stack) => self.look_at_stack(&stack, focal_power),
+        };
+        let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
+        let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
+        expose(&mut patch, gain, (detail * self.contrast) as f32, offset);
+        if self.settings.noise > 0.0 {
+            for value in &mut patch.0 {
+                *value += self.settings.noise as f32 * cheap_normal(&mut self.noise);
+            }
+        }
+        for (value, pattern) in patch.0.iter_mut().zip(&self.pattern) {
+            *value += pattern;
+        }
+        digitise(&mut patch);
+        patch
+    }
+
+    /// What is seen of a focal stack.
+    fn look_at_stack(&self, stack: &StackScene, focal_power: FocalPower) -> Patch {
+        let (x, y) = corner(&self.crop);
+        let Some(optics) = &self.optics else { return Patch([0.0; PATCH_SIDE * PATCH_SIDE]) };
+        let position = optics.position(stack, self.focus.position(), focal_power.get());
+        let [along, down] = optics.shift.map(|shift| shift * (position - optics.anchor));
+        stack.planes.patch(whole((x + along, y + down)), position)
+    }
+
+    /// What is seen of a sharp picture, blurred, with the veil over it if there is one.
+    fn look_at_flat(&mut self, clip: &Clip, focal_power: FocalPower) -> Patch {
+        let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
+        let mut patch = self.look(clip, corner(&self.crop), sigma);
+        if let Some(at) = self.veil.as_ref().map(corner) {
+            let share = self.settings.veil as f32;
+            let veil = self.look(clip, at, sigma);
+            for (value, veiled) in patch.0.iter_mut().zip(veil.0) {
+                *value += share * (veiled - *value);
+            }
+        }
+        patch
+    }
+
+    fn look(&mut self, clip: &Clip, corner: (f64, f64), sigma: f64) -> Patch {
+        let (picture, spot) = (clip.at(self.time), self.settings.spot);
+        match &self.unrest {
+            None => self.defocus.patch(picture, (corner.0 as isize, corner.1 as isize), sigma, spot),
+            Some(unrest) => {
+                self.defocus.patch_of(sigma, spot, |_, side, out| unrest.gather(picture, corner, side, out))
+            }
+        }
+    }
+
+    /// Goes on to the next frame.
+    pub fn advance(&mut self) {
+        self.time += 1;
+        self.focus.advance(&mut self.course);
+        self.crop.iter_mut().for_each(|walk| walk.advance(&mut self.course));
+        self.veil.iter_mut().flatten().for_each(|walk| walk.advance(&mut self.veil_course));
+        self.unrest.iter_mut().for_each(|unrest| unrest.advance(&mut self.unrest_course));
+        self.cover.iter_mut().for_each(Cover::advance);
+        self.tremor = self.settings.tremor * standard_normal(&mut self.course);
+        self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
+        if let (Scene::Stack(stack), Some(optics)) = (&self.scene, &mut self.optics)
+            && stack.photographed
+        {
+            let sharpest = stack.planes.sharpest(whole(corner(&self.crop)));
+            optics.anchor += (sharpest - optics.anchor) / ANCHOR_MEMORY;
+        }
+    }
+}
+
+impl Scene {
+    /// Where a patch's corner may lie along each axis.
+    fn room(&self) -> [(f64, f64); 2] {
+        let (left, top, right, bottom) = match self {
+            Self::Flat(clip) => {
+                let Area { left, top, right, bottom } = clip.area();
+                (left, top, right, bottom)
+            }
+            Self::Stack(stack) => {
+                let (width, height) = stack.planes.size();
+                (0, 0, width, height)
+            }
+        };
+        [(left, right), (top, bottom)].map(|(low, high)| (low as f64, (high - PATCH_SIDE) as f64))
+    }
+}
+
+/// The pixel that holds a place; those before the first become it.
+fn whole((x, y): (f64, f64)) -> (usize, usize) {
+    (x.max(0.0) as usize, y.max(0.0) as usize)
+}
+
+fn corner(walks: &[Walk; 2]) -> (f64, f64) {
+    (walks[0].position(), walks[1].position())
+}
+
+/// Scales what differs from the patch's mean by `contrast`, and all by `gain`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn expose(patch: &mut Patch, gain: f32, contrast: f32, offset: f32) {
+    let mean = patch.0.iter().sum::<f32>() / patch.0.len() as f32;
+    for value in &mut patch.0 {
+        *value = gain * (mean + contrast * (*value - mean)) + offset;
+    }
+}
+
+/// Whole gray levels, 0..=255.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn digitise(patch: &mut Patch) {
+    for value in &mut patch.0 {
+        *value = value.clamp(0.0, 255.0).round();
+    }
+}
+
+/// Nearly normal, mean 0 and variance 1: the sum of four uniform bytes, good enough for camera noise and ten times as
+/// fast as an exact draw.
+pub(super) fn cheap_normal(rng: &mut impl Rng) -> f32 {
+    let sum: i32 = rng.random::<u32>().to_le_bytes().iter().map(|&byte| i32::from(byte)).sum();
+    (sum - 510) as f32 * (1.0 / 147.8)
+}
+
+impl FocalTimeScan for Scan {
+    fn observe(&mut self, focal_power: FocalPower) -> Patch {
+        Self::observe(self, focal_power)
+    }
+
+    fn optimum(&self) -> FocalPower {
+        Self::optimum(self)
+    }
+
+    fn advance(&mut self) {
+        Self::advance(self);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::texture::texture;
+
+    fn scan(seed: u64) -> Scan {
+        Scan::new(Arc::new(Clip::still(texture(1, 256)).unwrap()), ScanSettings::default(), seed)
+    }
+
+    #[test]
+    fn looking_changes_nothing_of_the_course() {
+        let (mut looked_at, mut left_alone) = (scan(5), scan(5));
+        for _ in 0..50 {
+            looked_at.observe(FocalPower::MIN);
+            looked_at.advance();
+            left_alone.advance();
+        }
+        assert_eq!(looked_at.optimum(), left_alone.optimum());
+        assert_eq!(looked_at.observe(FocalPower::MIDDLE), left_alone.observe(FocalPower::MIDDLE));
+    }
+
+    #[test]
+    fn over_a_stack_the_patch_is_sharpest_at_the_optimum() {
+        let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 1).unwrap().remove(0);
+        let mut sharper = 0;
+        let mut seen = 0;
+        for seed in 0..20 {
+            let mut scan = Scan::over(Scene::Stack(Arc::clone(&stack)), ScanSettings::reference(), seed);
+            let best = scan.optimum();
+            let sharp = crate::autofocus::mgm(&scan.observe(best));
+            for step in [-0.5, 0.5] {
+                let elsewhere = best.moved(step);
+                if elsewhere.distance(best) > 0.3 {
+                    seen += 1;
+                    sharper += usize::from(crate::autofocus::mgm(&scan.observe(elsewhere)) < sharp);
+                }
+            }
+        }
+        assert!(seen > 10 && sharper == seen, "{sharper} of {seen}");
+    }
+
+    #[test]
+    fn optics_take_back_what_they_give() {
+        let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 1).unwrap().remove(0);
+        let stack = StackScene::clone(&stack);
+        let photographed = StackScene { photographed: true, slopes: (8.0, 8.0), ..stack.clone() };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for scene in [stack, photographed] {
+            for _ in 0..20 {
+                let optics = Optics::draw(&scene, 0.3, &mut rng);
+                for (focus, focal_power) in [(0.2, 0.7), (0.5, 0.5), (0.9, 0.1)] {
+                    let position = optics.position(&scene, focus, focal_power);
+                    assert!((optics.focal_power(&scene, focus, position) - focal_power).abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_patch_is_sharpest_at_the_optimum() {
+        let mut scan = scan(6);
+        let sharp = crate::autofocus::mgm(&scan.observe(scan.optimum()));
+        for step in [-0.4, -0.2, 0.2, 0.4] {
+            let elsewhere = scan.optimum().moved(step);
+            if elsewhere.distance(scan.optimum()) > 0.1 {
+                assert!(crate::autofocus::mgm(&scan.observe(elsewhere)) < sharp);
+            }
+        }
+    }
+
+    #[test]
+    fn cheap_noise_has_unit_variance() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let draws: Vec<f32> = (0..100_000).map(|_| cheap_normal(&mut rng)).collect();
+        let mean = draws.iter().sum::<f32>() / 1e5;
+        let variance = draws.iter().map(|v| v * v).sum::<f32>() / 1e5;
+        assert!(mean.abs() < 0.02 && (variance - 1.0).abs() < 0.02, "{mean} {variance}");
+    }
+}

@@ -1,0 +1,169 @@
+//! Focal-time scans over photographed focal stacks: a window drifts over a still scene while the sharpest plane walks through the
+//! range, so that every picture a policy sees was really taken.
+//!
+//! The optimum's focal power and the window walk as in simulated scans. At each frame, `planes` neighbouring pictures of the stack
+//! become the range 0..=1, laid so that the plane in which the middle patch is sharpest, smoothed over the way, stands
+//! at the walking focal power as nearly as the stack allows. The true optimum is where the patch's mean gradient magnitude peaks.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "indices of planes and pixels"
+)]
+
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::autofocus::mgm;
+use crate::imaging::{PATCH_SIDE, Patch};
+use crate::lens::FocalPower;
+use crate::scans::FocalTimeScan;
+use crate::scans::ScanSet;
+use crate::scans::planes::PlaneStack;
+use crate::simulation::walk::{Motion, Walk};
+
+/// Frames of a scan: 20 s at 25 a second.
+pub const FRAMES: usize = 500;
+/// Side of the window that drifts over the stack, in pixels; the patch is its middle.
+const WINDOW: usize = 128;
+/// How the window drifts along each axis: 5 pixels a frame in all.
+const DRIFT: Motion = Motion { speed: 3.535_533_905_932_737_7, memory: 30.0 };
+/// How the optimum's focal power walks.
+const FOCUS: Motion = Motion { speed: 0.012, memory: 60.0 };
+/// Where it may walk.
+const FOCUS_RANGE: (f64, f64) = (0.03, 0.97);
+/// Frames (standard deviation) over which the sharpest plane along the way is smoothed before the range is laid around it.
+const SMOOTHING: f64 = 12.0;
+
+/// One scan over a focal stack, prepared: where the patch lies and which planes make the range, frame by frame.
+#[derive(Debug)]
+pub struct StackCourse {
+    stack: Arc<PlaneStack>,
+    planes: usize,
+    frames: Vec<Moment>,
+}
+
+/// One frame of a [`StackCourse`].
+#[derive(Debug, Clone, Copy)]
+struct Moment {
+    corner: (usize, usize),
+    first_plane: usize,
+    optimum: FocalPower,
+}
+
+impl StackCourse {
+    /// A course over `stack`, whose positions count its planes from 0, drawn from `seed`; `planes` of them are the range.
+    /// `None` where the stack has fewer planes, or is smaller than the window of 128 pixels.
+    #[must_use]
+    pub fn new(stack: Arc<PlaneStack>, planes: usize, seed: u64) -> Option<Self> {
+        let (width, height) = stack.size();
+        let available = stack.range().1 as usize + 1;
+        if planes < 3 || available < planes || width < WINDOW || height < WINDOW {
+            return None;
+        }
+
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut walk = |range: (f64, f64), motion: Motion, start: Option<f64>| -> Vec<f64> {
+            let start = start.unwrap_or_else(|| rng.random_range(range.0..=range.1));
+            let mut walk = Walk::starting(start, range, motion, &mut rng);
+            let step = |_| {
+                let position = walk.position();
+                walk.advance(&mut rng);
+                position
+            };
+            (0..FRAMES).map(step).collect()
+        };
+        let margin = ((WINDOW - PATCH_SIDE) / 2) as f64;
+        let down = walk((0.0, (height - WINDOW) as f64), DRIFT, None);
+        let along = walk((0.0, (width - WINDOW) as f64), DRIFT, None);
+        let focus = walk(FOCUS_RANGE, FOCUS, Some(0.5));
+        let corners: Vec<(usize, usize)> = along
+            .iter()
+            .zip(&down)
+            .map(|(x, y)| ((x.floor() + margin) as usize, (y.floor() + margin) as usize))
+            .collect();
+
+        let sharpest: Vec<f64> = corners.iter().map(|&corner| stack.sharpest(corner).round()).collect();
+        let centre = smoothed(&sharpest, SMOOTHING);
+        let steps = (planes - 1) as f64;
+        let moment = |frame: usize| {
+            let first = (centre[frame] - focus[frame] * steps).round().clamp(0.0, (available - planes) as f64);
+            let first_plane = first as usize;
+            let corner = corners[frame];
+            let sharpness = |plane: &usize| mgm(&stack.patch(corner, (first_plane + plane) as f64));
+            let best = (0..planes).max_by(|a, b| sharpness(a).total_cmp(&sharpness(b))).unwrap_or(0);
+            Moment { corner, first_plane, optimum: FocalPower::nearest(best as f64 / steps) }
+        };
+        let frames = (0..FRAMES).map(moment).collect();
+        Some(Self { stack, planes, frames })
+    }
+}
+
+/// `values` smoothed by a Gaussian of `sigma` frames, cut at four of them; beyond the ends the values are mirrored.
+fn smoothed(values: &[f64], sigma: f64) -> Vec<f64> {
+    let reach = (4.0 * sigma).round() as i64;
+    let weight = |offset: i64| (-0.5 * (offset as f64 / sigma).powi(2)).exp();
+    let total: f64 = (-reach..=reach).map(weight).sum();
+    let count = values.len() as i64;
+    let mirrored = |index: i64| {
+        let index = index.rem_euclid(2 * count);
+        values[index.min(2 * count - 1 - index) as usize]
+    };
+    (0..count).map(|at| (-reach..=reach).map(|o| weight(o) * mirrored(at + o)).sum::<f64>() / total).collect()
+}
+
+/// A [`StackCourse`] being replayed; at its last frame it stays.
+struct Playing {
+    course: Arc<StackCourse>,
+    frame: usize,
+}
+
+impl FocalTimeScan for Playing {
+    fn observe(&mut self, focal_power: FocalPower) -> Patch {
+        let Moment { corner, first_plane, .. } = self.course.frames[self.frame];
+        let position = first_plane as f64 + focal_power.get() * (self.course.planes - 1) as f64;
+        let mut patch = self.course.stack.patch(corner, position);
+        patch.0.iter_mut().for_each(|value| *value = value.round());
+        patch
+    }
+
+    fn optimum(&self) -> FocalPower {
+        self.course.frames[self.frame].optimum
+    }
+
+    fn advance(&mut self) {
+        self.frame = (self.frame + 1).min(self.course.frames.len() - 1);
+    }
+}
+
+/// Courses over focal stacks to evaluate on.
+#[derive(Debug, Clone)]
+pub struct StackScans(pub Vec<Arc<StackCourse>>);
+
+impl ScanSet for StackScans {
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize) {
+        (Box::new(Playing { course: Arc::clone(&self.0[index]), frame: 0 }), FRAMES)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smoothing_keeps_a_constant_and_spreads_a_spike_as_a_gaussian() {
+        assert!(smoothed(&[3.0; 40], 5.0).iter().all(|value| (value - 3.0).abs() < 1e-9));
+        let mut spike = [0.0; 101];
+        spike[50] = 1.0;
+        let out = smoothed(&spike, 5.0);
+        // The normal density at 0 and at one standard deviation, over 5.
+        assert!((out[50] - 0.079_79).abs() < 1e-4 && (out[55] - 0.048_39).abs() < 1e-4);
+    }
+}

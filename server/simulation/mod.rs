@@ -1,0 +1,11 @@
+//! Simulation: what a camera would see, made from a seed. The brain phantom, textures, defocus, and the walks of a hand.
+
+pub mod blur;
+pub mod cover;
+pub mod patch_defocus;
+pub mod path;
+pub mod phantom;
+pub mod spots;
+pub mod texture;
+pub mod unrest;
+pub mod walk;

@@ -1,0 +1,186 @@
+//! Poses held still: a hand-held trajectory over the phantom stopped at each of its poses, for as many exposures as are
+//! wanted, as an arm that replays a trajectory does.
+
+use std::time::Duration;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::sensor::AutoExposure;
+use super::view::{self, Mapping, Region};
+use super::{Hand, Haste, Phantom, Pose};
+use crate::imaging::{PATCH_SIDE, PatchArea};
+use crate::lens::FocalPower;
+
+/// Seed of the first brain that recorded scans are made over: none that training or its benchmark sees.
+const FIRST_BRAIN: u64 = 3 << 32;
+/// Streams of the random source from here on belong to exposures of still poses.
+const FIRST_STREAM: u64 = 1 << 32;
+/// Time between two poses: 25 a second.
+pub const INTERVAL: Duration = Duration::from_millis(40);
+/// Cells between two that the exposure is metered at, in both directions.
+const METERED: usize = 7;
+
+/// A phantom and the poses of a hand over it, evenly spaced in time.
+pub struct Trajectory {
+    phantom: Phantom,
+    poses: Vec<Pose>,
+    seed: u64,
+}
+
+impl Trajectory {
+    /// Where the hand of `seed`, moving with `haste`, is at `poses` moments [`INTERVAL`] apart. Takes about a fifth of a
+    /// second.
+    #[must_use]
+    pub fn new(seed: u64, poses: usize, haste: Haste) -> Self {
+        let brain = FIRST_BRAIN.wrapping_add(seed);
+        let mut hand = Hand::moving(brain, haste);
+        let mut time = Duration::ZERO;
+        let poses = (0..poses).map(|_| {
+            let pose = hand.pose_at(time);
+            time += INTERVAL;
+            pose
+        });
+        Self { poses: poses.collect(), phantom: Phantom::new(brain), seed: brain }
+    }
+
+    /// Number of poses.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// Whether there is no pose.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.poses.is_empty()
+    }
+
+    /// Pose `index`, from 0, held still; `None` beyond the last.
+    #[must_use]
+    pub fn still(&self, index: usize) -> Option<Still<'_>> {
+        let pose = self.poses.get(index)?;
+        let best = self.phantom.optimal(pose);
+        let gain = self.phantom.settled_gain(pose, best);
+        Some(Still { phantom: &self.phantom, pose, gain, seed: self.seed, index: index as u64, best })
+    }
+}
+
+/// One pose held still. The light gathered is what auto-exposure comes to rest at there, and the same in all exposures;
+/// each has noise of its own, which depends on its number alone.
+pub struct Still<'a> {
+    phantom: &'a Phantom,
+    pose: &'a Pose,
+    gain: f32,
+    seed: u64,
+    index: u64,
+    best: FocalPower,
+}
+
+impl Still<'_> {
+    /// The focal power at which the patch is sharpest: see [`Phantom::optimal`].
+    #[must_use]
+    pub const fn optimal(&self) -> FocalPower {
+        self.best
+    }
+
+    /// Where the patch is, in pixels of a band.
+    #[must_use]
+    pub fn patch(&self) -> PatchArea {
+        let area = self.phantom.content_area();
+        // The sensor is larger than a patch.
+        PatchArea::central(view::WIDTH, view::HEIGHT, Some(&area)).unwrap_or(PatchArea {
+            x: 0,
+            y: 0,
+            width: PATCH_SIDE,
+            height: PATCH_SIDE,
+        })
+    }
+
+    /// Exposure `number` of this pose (below 2^16), at `focal_power`, into `samples`; see [`Phantom::expose`].
+    pub fn expose(&self, number: u16, focal_power: FocalPower, samples: &mut [u16]) {
+        self.render(number, focal_power, &Region::WHOLE, samples);
+    }
+
+    /// The same exposure, of which only the samples of the patch are made: fifty times as fast.
+    pub fn expose_patch(&self, number: u16, focal_power: FocalPower, samples: &mut [u16]) {
+        let PatchArea { x, y, width, height } = self.patch();
+        self.render(number, focal_power, &Region { columns: x..x + width, rows: y..y + height }, samples);
+    }
+
+    fn render(&self, number: u16, focal_power: FocalPower, region: &Region, samples: &mut [u16]) {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(FIRST_STREAM + (self.index << 16) + u64::from(number));
+        let noise = self.phantom.sensor.noise_of(&mut rng);
+        self.phantom.render((self.pose, focal_power), self.gain, &noise, region, samples);
+    }
+}
+
+impl Phantom {
+    /// The gain at which auto-exposure comes to rest at a pose, metered without noise at every [`METERED`]th cell.
+    fn settled_gain(&self, pose: &Pose, focal_power: FocalPower) -> f32 {
+        let mapping = Mapping::new(&self.optics, pose);
+        let surface = (&self.stack, &self.relief);
+        let mut counts = Vec::new();
+        for y in (0..view::HEIGHT).step_by(METERED) {
+            let (first, last) = self.optics.span(y);
+            for x in (first..=last).step_by(METERED) {
+                let light = view::look_at(x, y, &self.optics, &mapping, surface, focal_power.get() as f32);
+                counts.extend(self.bands.counts(light));
+            }
+        }
+        AutoExposure::settled(counts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::{Calibration, MosaicFrame, Reconstructor};
+    use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH};
+
+    #[test]
+    fn a_patch_alone_is_the_same_as_that_of_the_whole_exposure() {
+        let trajectory = Trajectory::new(1, 2, Haste::default());
+        let still = trajectory.still(1).unwrap();
+        let reconstructor = Reconstructor::new(&Calibration::default());
+        let seen = |whole: bool| {
+            let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
+            let power = FocalPower::nearest(0.3);
+            if whole {
+                still.expose(3, power, &mut samples);
+            } else {
+                still.expose_patch(3, power, &mut samples);
+            }
+            let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
+            reconstructor.gray_patch(&mosaic, still.patch())
+        };
+        assert!(seen(true) == seen(false));
+    }
+
+    #[test]
+    fn the_exposure_is_the_one_that_auto_exposure_comes_to_rest_at() {
+        let mut phantom = Phantom::new(5);
+        let pose = Hand::new(5).pose_at(Duration::from_secs(2));
+        let best = phantom.optimal(&pose);
+        let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
+        for _ in 0..40 {
+            phantom.expose(&pose, best, &mut samples);
+            phantom.adjust_exposure(&samples);
+        }
+        let (settled, rested) = (phantom.settled_gain(&pose, best), phantom.exposure.gain());
+        assert!((settled / rested - 1.0).abs() < 0.08, "{settled} {rested}");
+    }
+
+    #[test]
+    fn every_exposure_has_noise_of_its_own_and_the_same_one_the_same() {
+        let trajectory = Trajectory::new(1, 1, Haste::default());
+        let still = trajectory.still(0).unwrap();
+        let seen = |number| {
+            let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
+            still.expose_patch(number, still.optimal(), &mut samples);
+            samples
+        };
+        assert!(seen(0) == seen(0) && seen(0) != seen(1));
+    }
+}

@@ -1,0 +1,199 @@
+//! Recipes: every choice of a training, as TOML. Those that ship are in `recipes/`.
+
+mod check;
+pub mod dqn;
+
+use serde::{Deserialize, Serialize};
+
+use super::belief::BeliefRecipe;
+use super::error::TrainError;
+use crate::autofocus::shipped::{Design, design};
+use crate::scans::benchmark::COUNT;
+pub use check::MAX_UPDATES;
+use check::check;
+use dqn::DqnRecipe;
+
+/// All that a training is made by, besides its seed and its footage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// The policy it makes.
+    pub policy: String,
+    /// Pictures drawn to train on, where no footage is given; validation draws as many others, 60 at most.
+    pub pictures: u64,
+    /// Scenes with relief drawn to train on beside them; validation draws as many others, 60 at most. 0: none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub reliefs: u64,
+    /// Share of the scans that go over scenes with relief.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub relief_share: f64,
+    /// Updates from one validation to the next; a checkpoint is written with each.
+    pub validate_every: u64,
+    /// Scans of the reference benchmark that the best weights are run on in the end, for their model card; 0: none.
+    #[serde(default = "whole_benchmark")]
+    pub benchmark: usize,
+    /// How, for the paper's networks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dqn: Option<DqnRecipe>,
+    /// How, for the belief tracker.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub belief: Option<BeliefRecipe>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over references")]
+const fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over references")]
+fn is_nothing(share: &f64) -> bool {
+    *share <= 0.0
+}
+
+const fn whole_benchmark() -> usize {
+    COUNT
+}
+
+/// The recipes that ship: ours by the policy's name, what comes after it with `-refined` or `-relief` behind it, the paper's
+/// with `-paper`.
+const SHIPPED: [(&str, &str); 10] = [
+    ("mgm-learned", include_str!("../../../policies/mgm-learned.toml")),
+    ("mlr-learned", include_str!("../../../policies/mlr-learned.toml")),
+    ("cnn-learned", include_str!("../../../policies/cnn-learned.toml")),
+    ("cnn-learned-refined", include_str!("../../../policies/cnn-learned-refined.toml")),
+    ("mgm-learned-paper", include_str!("../../../policies/mgm-learned-paper.toml")),
+    ("mlr-learned-paper", include_str!("../../../policies/mlr-learned-paper.toml")),
+    ("cnn-learned-paper", include_str!("../../../policies/cnn-learned-paper.toml")),
+    ("parfocal", include_str!("../../../policies/parfocal.toml")),
+    ("parfocal-refined", include_str!("../../../policies/parfocal-refined.toml")),
+    ("parfocal-relief", include_str!("../../../policies/parfocal-relief.toml")),
+];
+
+/// The text of the recipe that ships under `name`.
+#[must_use]
+pub fn shipped(name: &str) -> Option<&'static str> {
+    SHIPPED.iter().find(|recipe| recipe.0 == name).map(|recipe| recipe.1)
+}
+
+/// Names of the recipes that ship.
+#[must_use]
+pub fn names() -> Vec<&'static str> {
+    SHIPPED.iter().map(|recipe| recipe.0).collect()
+}
+
+impl Recipe {
+    /// The recipe that `text` (TOML) describes.
+    ///
+    /// # Errors
+    /// With line and key, when a key is unknown, missing or of the wrong type, or a number makes no sense.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let recipe: Self = toml::from_str(text).map_err(|error| sentence(&error, text))?;
+        check(&recipe)?;
+        Ok(recipe)
+    }
+
+    /// The first key, as `section.key`, whose value differs in `other`, with both values.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Option<(String, String, String)> {
+        let table = |recipe: &Self| toml::Table::try_from(recipe).unwrap_or_default();
+        difference("", &table(self), &table(other))
+    }
+
+    /// What the policy is made of.
+    ///
+    /// # Errors
+    /// When it is none that is learned, or the recipe's section is another's.
+    pub fn design(&self) -> Result<Design, TrainError> {
+        let unknown = || {
+            TrainError::Recipe(format!(
+                "'{}' is no learned policy; there are mgm-learned, mlr-learned, cnn-learned and parfocal",
+                self.policy
+            ))
+        };
+        let design = design(&self.policy).ok_or_else(unknown)?;
+        let fits = match design {
+            Design::Values(_) => self.dqn.is_some(),
+            Design::Belief => self.belief.is_some(),
+        };
+        if fits {
+            Ok(design)
+        } else {
+            Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", self.policy)))
+        }
+    }
+
+    /// The same recipe for a training of `updates` updates.
+    #[must_use]
+    pub fn with_updates(mut self, updates: u64) -> Self {
+        if let Some(dqn) = &mut self.dqn {
+            dqn.updates = updates;
+        }
+        if let Some(belief) = &mut self.belief {
+            belief.updates = updates;
+        }
+        self
+    }
+
+    /// Updates of the whole training.
+    #[must_use]
+    pub fn updates(&self) -> u64 {
+        self.dqn.as_ref().map_or(0, |dqn| dqn.updates).max(self.belief.as_ref().map_or(0, |belief| belief.updates))
+    }
+}
+
+/// The error in `text` as one sentence; TOML's own is a small drawing.
+fn sentence(error: &toml::de::Error, text: &str) -> String {
+    let what = error.message().trim().replace('\n', ", ");
+    let before = error.span().and_then(|span| text.get(..span.start));
+    before.map_or(what.clone(), |before| format!("line {}: {what}", before.matches('\n').count() + 1))
+}
+
+fn difference(section: &str, one: &toml::Table, other: &toml::Table) -> Option<(String, String, String)> {
+    let nothing = || "not given".to_owned();
+    one.keys().chain(other.keys()).find_map(|key| {
+        let name = format!("{section}{key}");
+        match (one.get(key), other.get(key)) {
+            (Some(toml::Value::Table(one)), Some(toml::Value::Table(other))) => {
+                difference(&format!("{name}."), one, other)
+            }
+            (one, other) if one == other => None,
+            (one, other) => {
+                let [one, other] = [one, other].map(|value| value.map_or_else(nothing, ToString::to_string));
+                Some((name, one, other))
+            }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shipped_recipe_is_sound_and_makes_its_policy() {
+        for name in names() {
+            let recipe = Recipe::parse(shipped(name).unwrap()).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let suffixes = ["-paper", "-refined", "-relief"];
+            let policy = suffixes.iter().fold(name, |name, suffix| name.trim_end_matches(suffix));
+            assert_eq!(recipe.policy, policy);
+        }
+    }
+
+    #[test]
+    fn an_unknown_key_is_told_with_its_line() {
+        let text = shipped("parfocal").unwrap().replace("clip = 1.0", "clipp = 1.0");
+        let error = Recipe::parse(&text).unwrap_err();
+        assert!(error.starts_with("line ") && error.contains("clipp") && !error.contains('\n'), "{error}");
+        let error = Recipe::parse("policy = \"a\"\npictures 3\n").unwrap_err();
+        assert!(error.starts_with("line 2: ") && !error.contains('\n'), "{error}");
+    }
+
+    #[test]
+    fn two_recipes_differ_in_a_key() {
+        let one = Recipe::parse(shipped("mgm-learned").unwrap()).unwrap();
+        assert_eq!(one.difference(&one), None);
+        let other = one.clone().with_updates(7);
+        let (key, one, other) = one.difference(&other).unwrap();
+        assert_eq!([key, one, other], ["dqn.updates", "24000", "7"]);
+    }
+}

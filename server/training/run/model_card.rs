@@ -1,0 +1,57 @@
+//! What whoever uses trained weights should know of them, as Markdown.
+
+use crate::evaluation::Row;
+use crate::scans::benchmark::SEED;
+
+/// How weights were made.
+pub(super) struct Made<'a> {
+    pub policy: &'a str,
+    pub seed: u64,
+    /// Updates of the training.
+    pub updates: u64,
+    /// The weights that it began with, if not with random ones.
+    pub origin: Option<&'a str>,
+    /// What it trained on, in words.
+    pub data: &'a str,
+}
+
+/// The card of weights whose figures on `count` validation scans are `row`.
+pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
+    let origin = made.origin.map_or("random weights".to_owned(), |file| format!("the weights {file}"));
+    format!(
+        "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, beginning with {origin}, \
+         on {}.\n\n\
+         Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
+         and layouts. Not a medical device.\n\n\
+         On {count} validation scans, half of them varied: {}.\n",
+        made.policy,
+        env!("CARGO_PKG_VERSION"),
+        made.seed,
+        made.updates,
+        made.data,
+        figures(row),
+    )
+}
+
+const BENCHMARK: &str = "of the reference benchmark";
+
+/// Whether `card` has figures on the reference benchmark.
+pub(super) fn is_benchmarked(card: &str) -> bool {
+    card.contains(BENCHMARK)
+}
+
+/// `card` with the figures `row` on `count` scans of the reference benchmark.
+pub(super) fn benchmarked(card: &str, row: &Row, count: usize) -> String {
+    format!("{card}\nOn {count} scans {BENCHMARK} (seed {SEED}): {}.\n", figures(row))
+}
+
+fn figures(row: &Row) -> String {
+    format!(
+        "mean absolute focal power error {:.4} ± {:.4}, in focus {:.1} %, travel {:.4} a frame, {:.2} reversals a second",
+        row.mae,
+        row.sd,
+        100.0 * row.in_focus,
+        row.travel,
+        row.reversals
+    )
+}
