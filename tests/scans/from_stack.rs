@@ -1,6 +1,7 @@
 //! A focal stack made into a scan: what is no stack is refused, the scan is one that policies can be evaluated on.
 
-use parfocal::imaging::{GrayImage, gaussian_blur};
+use parfocal::imaging::GrayImage;
+use parfocal::simulation::blur::gaussian_blur;
 use parfocal::simulation::texture::texture;
 
 use super::*;
