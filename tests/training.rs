@@ -15,10 +15,11 @@ use parfocal::imaging::GrayImage;
 use parfocal::scans::benchmark::{Benchmark, Conditions, FRAMES};
 use parfocal::scans::clip::Clip;
 use parfocal::scans::simulated::Scene;
+use parfocal::training::recipe::LEG;
 use parfocal::training::recipe::{Recipe, shipped};
+use parfocal::training::run::Run;
 use parfocal::training::run::checkpoint::Checkpoint;
 use parfocal::training::run::resume::Asked;
-use parfocal::training::run::{LEG, Run};
 
 /// The recipe that ships for `policy`, small.
 fn small(policy: &str, updates: u64) -> Recipe {

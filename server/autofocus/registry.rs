@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{Fixed, HillClimber, Policy, mgm, mlr, shipped};
+use super::Policy;
 
 /// A policy's name, as in docs/scripting.md; valid once a [`Registry`] has taken it. Cheap to clone.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -92,20 +92,6 @@ enum Source {
 }
 
 impl Registry {
-    /// The shipped policies in the order of docs/scripting.md.
-    #[must_use]
-    pub fn standard() -> Self {
-        let classical = Self::default()
-            .with("fixed", "the lens stays where it is", || Box::new(Fixed::default()))
-            .with("mgm-hill-climber", "climbs the mean gradient magnitude, a step a frame", || {
-                Box::new(HillClimber::new(mgm))
-            })
-            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || {
-                Box::new(HillClimber::new(mlr))
-            });
-        shipped::with_shipped(classical)
-    }
-
     /// This registry with policy `name` made by `build`, in the place of one of that name or else at the end.
     #[must_use]
     pub fn with(
@@ -188,6 +174,7 @@ impl Registry {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::autofocus::Fixed;
     use crate::autofocus::Observation;
     use crate::imaging::{PATCH_SIDE, Patch};
     use crate::lens::FocalPower;

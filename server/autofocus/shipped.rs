@@ -1,4 +1,4 @@
-//! The learned policies that ship with the program, and those that people train themselves.
+//! The policies that ship with the program, and learned ones that people train themselves.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::belief::BeliefTracker;
 use super::learned::{Learned, Sight};
 use super::weights::WeightsError;
-use super::{Fixed, Policy, Registry};
+use super::{Fixed, HillClimber, Policy, Registry, mgm, mlr};
 
 /// What a learned policy's weights are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +51,22 @@ const SHIPPED: [Shipped; 4] = [
         weights: include_bytes!("../../policies/parfocal.safetensors"),
     },
 ];
+
+impl Registry {
+    /// All policies that ship, in the order of docs/scripting.md.
+    #[must_use]
+    pub fn standard() -> Self {
+        let classical = Self::default()
+            .with("fixed", "the lens stays where it is", || Box::new(Fixed::default()))
+            .with("mgm-hill-climber", "climbs the mean gradient magnitude, a step a frame", || {
+                Box::new(HillClimber::new(mgm))
+            })
+            .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || {
+                Box::new(HillClimber::new(mlr))
+            });
+        with_shipped(classical)
+    }
+}
 
 /// The design behind a learned policy's name.
 #[must_use]

@@ -200,7 +200,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::simulation::walk::standard_normal;
+    use crate::simulation::normal::standard_normal;
 
     fn wave(frequency: f64) -> Patch {
         Patch(std::array::from_fn(|i| {

@@ -9,12 +9,14 @@ pub mod phantom;
 mod playback;
 mod pool;
 pub mod recorded;
+mod settings;
 mod spec;
 
 pub use controls::{Adjustable, CameraOffer, ControlError, Controls, Setting};
 pub use pace::Pace;
 pub use pool::MosaicPool;
-pub use spec::{CameraSettings, open};
+pub use settings::CameraSettings;
+pub use spec::open;
 
 use std::sync::Arc;
 use std::time::Duration;

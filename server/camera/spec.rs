@@ -1,25 +1,9 @@
 //! From `--camera SPEC` to a camera.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use super::phantom::{Before, PhantomCamera};
-use super::{Camera, CameraError, footage, recorded};
-use crate::clock::Clock;
-use crate::lens::Optics;
-
-/// What every camera is told.
-#[derive(Clone)]
-pub struct CameraSettings {
-    /// Frames a second to aim at.
-    pub fps: f64,
-    /// Seed of whatever a simulation draws.
-    pub seed: u64,
-    /// The lens's glass, for cameras that simulate looking through it.
-    pub optics: Arc<dyn Optics>,
-    /// Where time comes from.
-    pub clock: Arc<dyn Clock>,
-}
+use super::{Camera, CameraError, CameraSettings, footage, recorded};
 
 /// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a white tile),
 /// `phantom:dark` (with its lens cap on), `footage:PATH` with a video, an image or a folder of images, `scan:DIR` with a

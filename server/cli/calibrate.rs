@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Failure, calibration, print, tables};
+use super::output::{Failure, print};
+use super::{calibration, tables};
 use crate::camera::{self, CameraSettings, FrameImage};
 use crate::clock::{Clock, SystemClock};
 use crate::imaging::{Average, Calibration, Reference};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageBuffer, ImageFormat, Luma};
 
-use super::Failure;
+use super::output::Failure;
 use crate::files::replace;
 use crate::imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
 

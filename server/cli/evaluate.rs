@@ -7,7 +7,7 @@ use clap::ArgGroup;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{Failure, print, scan};
+use super::output::{Failure, bar, print};
 use crate::autofocus::networks::compute_on_this_thread;
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::recorded::ScanFolder;
@@ -280,14 +280,14 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
         return Err("a folder holds one scan, which cannot be cut into shards; leave out --shard".into());
     }
     let folder = ScanFolder::open(folder)?;
-    let bar = scan::bar(folder.poses().len(), 0);
+    let bar = bar(folder.poses().len(), 0);
     let scan = RecordedScan::read(&folder, &|| bar.inc(1))?;
     bar.finish_and_clear();
     Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, count: 1, between })
 }
 
 fn phantom(seed: u64) -> Arc<RecordedScan> {
-    let bar = scan::bar(POSES, 0);
+    let bar = bar(POSES, 0);
     let scan = RecordedScan::phantom(&Trajectory::new(seed, POSES, HASTE), seed, FOCAL_POWERS, &|| bar.inc(1));
     bar.finish_and_clear();
     Arc::new(scan)

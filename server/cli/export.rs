@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, print};
+use super::output::{Failure, print};
 use crate::ids::SessionId;
 use crate::store::Reader;
 use crate::store::export::export;

@@ -9,6 +9,7 @@ mod export;
 mod inspect;
 mod interrupt;
 mod lens;
+mod output;
 mod policies;
 mod scan;
 mod serve;
@@ -16,12 +17,12 @@ mod tables;
 mod train;
 mod verify;
 
-use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
 use crate::notices::tell;
+use output::Failure;
 
 /// Keeps a hyperspectral video exoscope in focus and runs blinded trials of its autofocus policies.
 #[derive(Debug, Parser)]
@@ -56,9 +57,6 @@ enum Command {
     Verify(verify::Arguments),
 }
 
-/// A command's failure: one clear sentence that says what to do.
-pub type Failure = Box<dyn std::error::Error + Send + Sync>;
-
 /// Runs the command that the process's arguments name. Exit code 0 success, 1 failure, 2 wrong usage.
 #[must_use]
 pub fn main() -> ExitCode {
@@ -73,14 +71,6 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-/// Writes what a command was asked for on standard output.
-fn print(text: &str) -> Result<(), Failure> {
-    let mut out = std::io::stdout();
-    out.write_all(text.as_bytes())
-        .and_then(|()| out.flush())
-        .map_err(|error| format!("cannot write to standard output: {error}").into())
 }
 
 fn run(command: Command) -> Result<(), Failure> {

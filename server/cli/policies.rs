@@ -1,6 +1,6 @@
 //! `parfocal policies`: lists the registry.
 
-use super::{Failure, print};
+use super::output::{Failure, print};
 use crate::autofocus::{PolicyEntry, Registry};
 
 /// Arguments of `parfocal policies`.

@@ -16,8 +16,8 @@ use tokio::sync::watch;
 use tokio::time::timeout;
 use tracing_subscriber::EnvFilter;
 
-use super::Failure;
 use super::announce::{announcement, reachable};
+use super::output::Failure;
 use super::{calibration, devices};
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
 use crate::camera::{self, CameraSettings};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::Failure;
+use super::output::Failure;
 use crate::imaging::{BANDS, Band};
 
 /// Bands of the responses in `path`: a line a wavelength in nm, followed by 16 responses; a heading may come first. Centre

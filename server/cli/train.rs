@@ -6,14 +6,15 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt::Interrupt;
-use super::{Failure, print};
+use super::output::{Failure, print};
 use crate::autofocus::networks::compute_on_this_thread;
 use crate::clock::SystemClock;
 use crate::notices::tell;
+use crate::training::recipe::LEG;
 use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
 use crate::training::run::comparison::{TrainedRun, markdown};
 use crate::training::run::resume::Asked;
-use crate::training::run::{LEG, Progress, Run};
+use crate::training::run::{Progress, Run};
 
 /// Where to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

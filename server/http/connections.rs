@@ -19,8 +19,8 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tower::ServiceExt;
 
-use super::ended;
 use super::places::{Place, Places};
+use super::shutdown::ended;
 
 /// What one connection may hold back in this process: about half a frame, so that a stream gets a new frame only when
 /// the last has gone to the kernel. Also the limit of a request's headers.

@@ -2,13 +2,13 @@
 //! latency, from which one may be guessed, is left out while a session is under way.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use prometheus_client::encoding::text::encode;
-use prometheus_client::metrics::counter::{ConstCounter, Counter};
+use prometheus_client::metrics::counter::ConstCounter;
 use prometheus_client::metrics::gauge::ConstGauge;
 use prometheus_client::registry::{Registry, Unit};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -18,15 +18,6 @@ use super::roles::Roles;
 use super::{App, AppState};
 use crate::priority::Standing;
 use crate::trial::view::Role;
-
-/// What HTTP itself counts.
-#[derive(Debug, Clone, Default)]
-pub struct Metrics {
-    /// Frames sent to viewers.
-    pub frames_sent: Counter<u64, AtomicU64>,
-    /// Bytes of those.
-    pub bytes_sent: Counter<u64, AtomicU64>,
-}
 
 /// The server's counters in the `OpenMetrics` text format.
 #[utoipa::path(get, path = "/metrics", tag = "service", responses(

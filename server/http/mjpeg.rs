@@ -11,8 +11,9 @@ use bytes::Bytes;
 use futures_util::{Stream, StreamExt, stream};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::AppState;
 use super::roles::Roles;
-use super::{AppState, ended};
+use super::shutdown::ended;
 
 const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
 const FIRST_PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";

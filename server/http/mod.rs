@@ -10,8 +10,6 @@ mod json;
 pub mod keys;
 mod links;
 mod live;
-mod live_operator;
-mod live_surgeon;
 mod metrics;
 mod mjpeg;
 mod openapi;
@@ -20,11 +18,11 @@ mod places;
 mod researcher;
 pub mod roles;
 pub mod security;
+mod shutdown;
 mod state;
 mod surgeon;
 
-pub use metrics::Metrics;
-pub use state::{App, AppState};
+pub use state::{App, AppState, Metrics};
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -32,7 +30,6 @@ use std::time::Duration;
 use axum::http::StatusCode;
 use axum::{Extension, Router, middleware};
 use tokio::net::TcpListener;
-use tokio::sync::watch;
 use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::limit::RequestBodyLimitLayer;
@@ -89,9 +86,4 @@ fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
 pub async fn run(listener: TcpListener, app: AppState) {
     let shutdown = app.shutdown.clone();
     connections::serve(listener, router(app), shutdown).await;
-}
-
-/// Waits until the server is to end.
-pub(crate) async fn ended(shutdown: &mut watch::Receiver<bool>) {
-    let _ = shutdown.wait_for(|end| *end).await;
 }

@@ -2,11 +2,12 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
+use prometheus_client::metrics::counter::Counter;
 use tokio::sync::watch;
 
 use super::keys::Keys;
-use super::metrics::Metrics;
 use crate::autofocus::Registry;
 use crate::clock::Clock;
 use crate::conductor::Conductor;
@@ -43,6 +44,15 @@ pub struct App {
     pub metrics: Metrics,
     /// Turns true when the server is to end; streams then close by themselves.
     pub shutdown: watch::Receiver<bool>,
+}
+
+/// What HTTP itself counts.
+#[derive(Debug, Clone, Default)]
+pub struct Metrics {
+    /// Frames sent to viewers.
+    pub frames_sent: Counter<u64, AtomicU64>,
+    /// Bytes of those.
+    pub bytes_sent: Counter<u64, AtomicU64>,
 }
 
 /// The state of every route.

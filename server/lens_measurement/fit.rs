@@ -2,8 +2,16 @@
 
 use std::time::Duration;
 
-use super::Sample;
 use crate::lens::LensDynamics;
+
+/// One frame after a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Seconds from the command to the middle of the exposure.
+    pub at: f64,
+    /// Share of the step that the lens had done.
+    pub share: f64,
+}
 
 /// Points of each round's grid, a side.
 const GRID: u32 = 40;

@@ -1,5 +1,4 @@
-//! Bench: what is measured once, before the first session: how a lens answers a step, as a camera sees it. Knows no web,
-//! no trial and no policy.
+//! How a lens answers a step, as a camera sees it; measured once, before the first session.
 
 mod curve;
 mod fit;
@@ -7,9 +6,9 @@ mod plot;
 mod steps;
 mod view;
 
-pub use fit::Fit;
+pub use fit::{Fit, Sample};
 pub use plot::plot;
-pub use steps::{Measurement, Plan, Sample, measure};
+pub use steps::{Measurement, Plan, measure};
 pub use view::View;
 
 use crate::camera::CameraError;

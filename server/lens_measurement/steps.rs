@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::curve::Flank;
-use super::fit::Fit;
+use super::fit::{Fit, Sample};
 use super::{BenchError, View};
 use crate::clock::Moment;
 use crate::lens::{FocalPower, Lens};
@@ -30,15 +30,6 @@ impl Default for Plan {
     fn default() -> Self {
         Self { stops: 21, repeats: 12, watch: Duration::from_millis(300) }
     }
-}
-
-/// One frame after a step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    /// Seconds from the command to the middle of the exposure.
-    pub at: f64,
-    /// Share of the step that the lens had done.
-    pub share: f64,
 }
 
 /// What was found.

@@ -81,8 +81,8 @@ mod tests {
     use crate::scans::benchmark::{Benchmark, Conditions};
     use crate::scans::clip::Clip;
     use crate::scans::simulated::Scene;
+    use crate::simulation::normal::standard_normal;
     use crate::simulation::texture::texture;
-    use crate::simulation::walk::standard_normal;
 
     const SIDE: usize = 128;
 

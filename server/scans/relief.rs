@@ -18,12 +18,11 @@ use rayon::prelude::*;
 
 use super::pictures::{Split, sharp_phantom_of};
 use super::planes::{PlaneStack, PlanesError};
-use super::simulated::cheap_normal;
 use crate::imaging::GrayImage;
 use crate::simulation::blur::gaussian_blur;
+use crate::simulation::normal::{cheap_normal, standard_normal};
 use crate::simulation::spots::{LensSpot, blurred};
 use crate::simulation::texture::{Canvas, texture, vary_contrast};
-use crate::simulation::walk::standard_normal;
 
 /// Side in pixels of a scene.
 const SIDE: usize = 360;

@@ -12,7 +12,7 @@ use super::FocalTimeScan;
 use std::sync::Arc;
 
 use multiversion::multiversion;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::clip::{Area, Clip};
@@ -20,9 +20,10 @@ use super::relief::StackScene;
 use crate::imaging::{PATCH_SIDE, Patch};
 use crate::lens::FocalPower;
 use crate::simulation::cover::Cover;
+use crate::simulation::normal::{cheap_normal, standard_normal};
 use crate::simulation::patch_defocus::{Defocus, Spot};
 use crate::simulation::unrest::{Restlessness, Unrest};
-use crate::simulation::walk::{Motion, Walk, standard_normal};
+use crate::simulation::walk::{Motion, Walk};
 
 /// How a scan moves, blurs and is exposed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -368,13 +369,6 @@ fn digitise(patch: &mut Patch) {
     for value in &mut patch.0 {
         *value = value.clamp(0.0, 255.0).round();
     }
-}
-
-/// Nearly normal, mean 0 and variance 1: the sum of four uniform bytes, good enough for camera noise and ten times as
-/// fast as an exact draw.
-pub(super) fn cheap_normal(rng: &mut impl Rng) -> f32 {
-    let sum: i32 = rng.random::<u32>().to_le_bytes().iter().map(|&byte| i32::from(byte)).sum();
-    (sum - 510) as f32 * (1.0 / 147.8)
 }
 
 impl FocalTimeScan for Scan {

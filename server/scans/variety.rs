@@ -3,9 +3,10 @@
 use rand::{Rng, RngExt};
 
 use super::simulated::{ScanSettings, Scene};
+use crate::simulation::normal::standard_normal;
 use crate::simulation::patch_defocus::Spot;
 use crate::simulation::unrest::Restlessness;
-use crate::simulation::walk::{Motion, standard_normal};
+use crate::simulation::walk::Motion;
 
 /// How far training leaves the reference's scans.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,6 +2,7 @@
 
 pub mod blur;
 pub mod cover;
+pub mod normal;
 pub mod patch_defocus;
 pub mod path;
 pub mod phantom;

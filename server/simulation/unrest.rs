@@ -11,8 +11,9 @@
 use multiversion::multiversion;
 use rand::Rng;
 
+use super::normal::standard_normal;
 use super::patch_defocus::MAX_SIDE;
-use super::walk::{Motion, Walk, standard_normal};
+use super::walk::{Motion, Walk};
 use crate::imaging::{GrayImage, PATCH_SIDE};
 
 /// Knots of the contrast's field along each axis; beyond them it repeats.

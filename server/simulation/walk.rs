@@ -2,6 +2,8 @@
 
 use rand::{Rng, RngExt};
 
+use super::normal::standard_normal;
+
 /// A position whose velocity is an Ornstein-Uhlenbeck process, reflected at both ends of its range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walk {
@@ -53,12 +55,6 @@ impl Walk {
             self.velocity = -self.velocity;
         }
     }
-}
-
-/// A draw from the normal distribution of mean 0 and variance 1 (Box and Muller 1958).
-pub fn standard_normal(rng: &mut impl Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 #[cfg(test)]

@@ -3,8 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::run::checkpoint::CheckpointError;
-use super::run::folder::CHECKPOINT;
+use super::run::checkpoint::{CHECKPOINT, CheckpointError};
 use crate::scans::detail::NothingToFocusOn;
 use crate::scans::footage::FootageError;
 

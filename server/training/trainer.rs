@@ -1,15 +1,9 @@
 //! What a training does over and over, whichever kind of policy learns.
 
-use tch::{Device, nn};
+use tch::nn;
 
-use super::belief::BeliefTrainer;
-use super::dqn::DqnTrainer;
-use super::error::TrainError;
-use super::recipe::Recipe;
 use super::run::checkpoint::{Checkpoint, CheckpointError};
-use crate::autofocus::shipped::Design;
 use crate::autofocus::weights::{self, WeightsError};
-use crate::scans::scenery::Scenery;
 
 /// One that learns. What it does depends on its recipe, its seed, its scenery and the seeds of its legs alone.
 pub trait Trainer: Send {
@@ -46,22 +40,4 @@ pub trait Trainer: Send {
     /// # Errors
     /// When the checkpoint is of another training.
     fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError>;
-}
-
-/// A trainer from nothing, by `recipe`, of a policy of `design`; its network on `device`.
-///
-/// # Errors
-/// When the recipe holds no section for such a policy.
-pub fn trainer(
-    design: Design,
-    recipe: &Recipe,
-    scenery: Scenery,
-    seed: u64,
-    device: Device,
-) -> Result<Box<dyn Trainer>, TrainError> {
-    Ok(match (design, &recipe.dqn, &recipe.belief) {
-        (Design::Values(sight), Some(dqn), _) => Box::new(DqnTrainer::new(sight, dqn.clone(), scenery, seed, device)),
-        (Design::Belief, _, Some(belief)) => Box::new(BeliefTrainer::new(belief.clone(), scenery, seed, device)),
-        _ => return Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", recipe.policy))),
-    })
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use turbojpeg::{Decompressor, Image, PixelFormat};
 
-use super::reel::{HEIGHT, WIDTH, large_enough};
+use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::{FootageError, Video};
 use crate::imaging::{JpegEncoder, RgbImage};
 

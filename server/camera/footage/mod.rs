@@ -5,6 +5,7 @@
 mod clip;
 mod defocus;
 mod reel;
+mod size;
 mod video;
 
 pub use reel::picture_reader;

@@ -8,15 +8,9 @@ use std::time::Duration;
 use image::ImageReader;
 
 use super::clip::Clip;
+use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::FootageError;
 use crate::imaging::{RgbImage, decode_any, is_mosaic};
-
-/// Most pixels across and down: what the blur can follow in real time.
-pub(super) const WIDTH: usize = 1024;
-/// See [`WIDTH`].
-pub(super) const HEIGHT: usize = 384;
-/// Least pixels across and down.
-pub(super) const LEAST: usize = 64;
 
 /// How long a still is shown.
 const STILL: Duration = Duration::from_secs(5);
@@ -108,13 +102,6 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let (width, height) = (rgb.width() as usize, rgb.height() as usize);
     large_enough(file, width, height)?;
     RgbImage::new(width, height, rgb.into_raw()).map_err(|error| FootageError::unreadable(file, error))
-}
-
-pub(super) fn large_enough(path: &Path, width: usize, height: usize) -> Result<(), FootageError> {
-    if width >= LEAST && height >= LEAST {
-        return Ok(());
-    }
-    Err(FootageError::TooSmall { path: path.to_owned(), width, height, least: LEAST })
 }
 
 /// Whether its name says that `path` is a picture.

@@ -7,6 +7,7 @@ mod device;
 mod numbers;
 mod pixels;
 mod session;
+mod shared;
 mod timestamps;
 mod worker;
 
@@ -17,7 +18,7 @@ use std::time::Duration;
 use ::aravis::Aravis;
 
 use self::device::{Device, Wanted};
-use self::worker::Shared;
+use self::shared::Shared;
 use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
 use crate::clock::Moment;
 use crate::priority::Place;

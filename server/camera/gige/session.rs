@@ -7,8 +7,8 @@ use ::aravis::Buffer;
 
 use super::device::{Arrival, Device};
 use super::numbers::steps;
+use super::shared::{Shared, words};
 use super::timestamps::{Timestamps, arrival};
-use super::worker::{Shared, words};
 use crate::camera::{Frame, FrameImage, MosaicPool, Setting};
 use crate::imaging::MosaicFrame;
 

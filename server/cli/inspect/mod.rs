@@ -9,7 +9,8 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use super::{Failure, calibration, print};
+use super::calibration;
+use super::output::{Failure, print};
 use crate::autofocus::{mgm, mlr};
 use crate::files::replace;
 use crate::imaging::{

@@ -7,7 +7,7 @@ use std::time::Duration;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 
-use super::{Failure, print};
+use crate::cli::output::{Failure, print};
 use crate::clock::{Clock, SystemClock};
 use crate::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};
 use crate::lens::{LensDynamics, Optics};

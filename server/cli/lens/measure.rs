@@ -7,8 +7,9 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::{Failure, Which, print};
+use super::which::Which;
 use crate::camera::{self, CameraSettings};
+use crate::cli::output::{Failure, print};
 use crate::clock::{Clock, SystemClock};
 use crate::control::Eye;
 use crate::files::replace;

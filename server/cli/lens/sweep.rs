@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::{Failure, Which, dioptre, go, print};
+use super::which::{Which, dioptre, go};
+use crate::cli::output::{Failure, print};
 use crate::files::replace;
 use crate::lens::FocalPower;
 

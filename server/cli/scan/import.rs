@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Failure, bar, print};
+use crate::cli::output::{Failure, bar, print};
 use crate::scans::recording::{Imported, import};
 
 /// Arguments of `parfocal scan import`.

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Failure, bar, print};
 use crate::camera::recorded::{Damage, Image, ScanFolder, poses};
+use crate::cli::output::{Failure, bar, print};
 use crate::files::replace;
 use crate::plot;
 use crate::scans::stack::optics::Optics;

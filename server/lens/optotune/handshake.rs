@@ -7,7 +7,7 @@ use super::link::{Link, LinkError};
 use super::range::{Range, Scale};
 use super::shared::Device;
 use super::status::{FOCAL_POWER_MODE, Status, mode_name};
-use super::worker::Trouble;
+use super::trouble::Trouble;
 use crate::lens::LensError;
 
 /// How the lens is to be used.

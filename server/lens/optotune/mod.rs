@@ -12,6 +12,7 @@ mod port;
 mod range;
 mod shared;
 mod status;
+mod trouble;
 mod worker;
 
 use std::path::{Path, PathBuf};

@@ -5,11 +5,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::codec::{Reply, Request, WireError};
+use super::codec::{Reply, Request};
 use super::handshake::{self, Settings};
-use super::link::{Link, LinkError, Sent};
+use super::link::{Link, Sent};
 use super::port::Port;
 use super::shared::{Device, Shared};
+use super::trouble::Trouble;
 use crate::clock::Moment;
 use crate::lens::LensError;
 
@@ -94,36 +95,6 @@ fn close(mut link: Link) -> Result<(), String> {
     match catch_unwind(AssertUnwindSafe(|| link.close())) {
         Ok(told) => told.map_err(|error| error.to_string()),
         Err(_) => Err("its driver failed".to_owned()),
-    }
-}
-
-/// What ends a connection.
-#[derive(Debug, thiserror::Error)]
-pub enum Trouble {
-    /// The thread is to end.
-    #[error("closing")]
-    Stopped,
-    /// The device cannot be used.
-    #[error(transparent)]
-    Lens(#[from] LensError),
-}
-
-impl From<Trouble> for LensError {
-    fn from(trouble: Trouble) -> Self {
-        match trouble {
-            Trouble::Stopped => Self::Gone("closed".into()),
-            Trouble::Lens(error) => error,
-        }
-    }
-}
-
-impl From<LinkError> for Trouble {
-    fn from(error: LinkError) -> Self {
-        match error {
-            LinkError::Stopped => Self::Stopped,
-            LinkError::Wire(WireError::Device(error)) => Self::Lens(LensError::Refused(error.to_string())),
-            other => Self::Lens(LensError::Gone(other.to_string())),
-        }
     }
 }
 

@@ -8,7 +8,7 @@ use multiversion::multiversion;
 use rand::{Rng, RngExt};
 
 use super::field::{Field, Spline, knots};
-use crate::simulation::walk::standard_normal;
+use crate::simulation::normal::standard_normal;
 
 /// Texels between two knots of the fields that are made coarse.
 const CELL: usize = 8;

@@ -5,6 +5,12 @@
 use multiversion::multiversion;
 use rand::{Rng, RngExt};
 
+/// Side of the phantom's square surface in texels; one texel is about one pixel of a band at the usual working distance.
+pub const SIDE: usize = 1024;
+
+/// Value of a texel's abundance that stands for 1: headroom for mirrored lamps of 8 times white.
+pub(super) const UNIT: f32 = 8191.0;
+
 /// Standard deviation of uniform noise on -1..1 after the spline's smoothing in both directions.
 const AFTER_SPLINE: f32 = 0.28;
 

@@ -19,8 +19,9 @@ mod still;
 mod vessels;
 mod view;
 
+pub use field::SIDE;
 pub use hand::{Hand, Haste, Pose};
-pub use scene::{SIDE, Scene};
+pub use scene::Scene;
 pub use still::{Still, Trajectory};
 
 use crate::imaging::{CELL, Calibration, ContentArea, PATCH_SIDE};

@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use super::scene::UNIT;
+use super::field::UNIT;
 use super::sensor::FULL_SCALE;
 use super::spectra::{ENDMEMBERS, endmembers_in_band};
 use super::view::{Line, WIDTH};

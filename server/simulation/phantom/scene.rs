@@ -13,17 +13,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cortex::{Cortex, Folding};
 use super::defocus::Texel;
-use super::field::{Field, Spline};
+use super::field::{Field, SIDE, Spline, UNIT};
 use super::mosaic::Bands;
 use super::spectra::{ARTERIAL, ENDMEMBERS, LAMP, PALE, VENOUS};
 use super::vessels::{Density, Vessels};
 use crate::imaging::{Calibration, GrayImage};
-
-/// Side of the square surface in texels; one texel is about one pixel of a band at the usual working distance.
-pub const SIDE: usize = 1024;
-
-/// Value of a texel's abundance that stands for 1: headroom for mirrored lamps of 8 times white.
-pub(super) const UNIT: f32 = 8191.0;
 
 /// A brain's surface, sharp and without noise.
 pub struct Scene {

@@ -11,7 +11,7 @@ use multiversion::multiversion;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::simulation::walk::standard_normal;
+use crate::simulation::normal::standard_normal;
 
 /// Largest count: 10 bit.
 pub(super) const FULL_SCALE: f32 = 1023.0;

@@ -9,9 +9,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::defocus::Stack;
-use super::field::Field;
+use super::field::{Field, SIDE};
 use super::hand::Pose;
-use super::scene::SIDE;
 use super::spectra::ENDMEMBERS;
 use crate::imaging::ContentArea;
 

@@ -3,12 +3,11 @@
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 
-use super::Recipe;
+use super::belief::BeliefRecipe;
 use super::dqn::{DqnRecipe, Target};
+use super::{LEG, Recipe};
 use crate::autofocus::networks::HISTORY;
-use crate::training::belief::BeliefRecipe;
 use crate::training::optimiser::Rule;
-use crate::training::run::LEG;
 
 /// Most updates of a training.
 pub const MAX_UPDATES: u64 = 1_000_000_000;

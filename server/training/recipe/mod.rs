@@ -1,17 +1,21 @@
-//! Recipes: every choice of a training, as TOML. Those that ship are in `recipes/`.
+//! Recipes: every choice of a training, as TOML. Those that ship are in `policies/`.
 
+pub mod belief;
 mod check;
 pub mod dqn;
+mod parse;
 
 use serde::{Deserialize, Serialize};
 
-use super::belief::BeliefRecipe;
 use super::error::TrainError;
 use crate::autofocus::shipped::{Design, design};
 use crate::scans::benchmark::COUNT;
+use belief::BeliefRecipe;
 pub use check::MAX_UPDATES;
-use check::check;
 use dqn::DqnRecipe;
+
+/// Updates between two moments at which a training may stop. All scans begin anew at each, so that none need be saved.
+pub const LEG: u64 = 100;
 
 /// All that a training is made by, besides its seed and its footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -82,16 +86,6 @@ pub fn names() -> Vec<&'static str> {
 }
 
 impl Recipe {
-    /// The recipe that `text` (TOML) describes.
-    ///
-    /// # Errors
-    /// With line and key, when a key is unknown, missing or of the wrong type, or a number makes no sense.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let recipe: Self = toml::from_str(text).map_err(|error| sentence(&error, text))?;
-        check(&recipe)?;
-        Ok(recipe)
-    }
-
     /// The first key, as `section.key`, whose value differs in `other`, with both values.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<(String, String, String)> {
@@ -139,13 +133,6 @@ impl Recipe {
     pub fn updates(&self) -> u64 {
         self.dqn.as_ref().map_or(0, |dqn| dqn.updates).max(self.belief.as_ref().map_or(0, |belief| belief.updates))
     }
-}
-
-/// The error in `text` as one sentence; TOML's own is a small drawing.
-fn sentence(error: &toml::de::Error, text: &str) -> String {
-    let what = error.message().trim().replace('\n', ", ");
-    let before = error.span().and_then(|span| text.get(..span.start));
-    before.map_or(what.clone(), |before| format!("line {}: {what}", before.matches('\n').count() + 1))
 }
 
 fn difference(section: &str, one: &toml::Table, other: &toml::Table) -> Option<(String, String, String)> {

@@ -13,6 +13,9 @@ use tch::{Kind, Tensor, nn};
 use crate::autofocus::weights::floats;
 use crate::files;
 
+/// The checkpoint's name.
+pub const CHECKPOINT: &str = "checkpoint.safetensors";
+
 /// Longest header that is read: some thousand times what one has.
 const MAX_HEADER: u64 = 1 << 28;
 

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::checkpoint::CHECKPOINT;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::curves;
-use super::folder::CHECKPOINT;
 use crate::evaluation::Row;
 use crate::training::recipe::Recipe;
 

@@ -4,12 +4,10 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::checkpoint::Checkpoint;
+use super::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::files;
 use crate::training::error::TrainError;
 
-/// The checkpoint's name.
-pub(crate) const CHECKPOINT: &str = "checkpoint.safetensors";
 const LOCK: &str = ".lock";
 
 /// A training's folder.

@@ -2,6 +2,7 @@
 //! folder.
 #![allow(clippy::cast_possible_truncation, reason = "event files hold single precision")]
 
+mod begin;
 pub mod checkpoint;
 pub mod comparison;
 mod curves;
@@ -17,8 +18,8 @@ use std::path::{Path, PathBuf};
 use tch::Device;
 
 use super::error::TrainError;
-use super::recipe::Recipe;
-use super::trainer::{Trainer, trainer};
+use super::recipe::{LEG, Recipe};
+use super::trainer::Trainer;
 use crate::autofocus::shipped::{self, Design};
 use crate::autofocus::{PolicyName, Registry, weights};
 use crate::clock::Clock;
@@ -27,6 +28,7 @@ use crate::scans::benchmark::{Benchmark, Conditions, FRAMES};
 use crate::scans::pictures::{Split, varied};
 use crate::scans::relief;
 use crate::scans::simulated::Scene;
+use begin::trainer;
 use checkpoint::Checkpoint;
 use comparison::{BENCHMARK, BenchmarkFigures};
 use curves::Point;
@@ -36,8 +38,6 @@ use model_card::Made;
 use resume::Asked;
 use tensorboard::EventFile;
 
-/// Updates between two moments at which a training may stop. All scans begin anew at each, so that none need be saved.
-pub const LEG: u64 = 100;
 const RECIPE: &str = "recipe.toml";
 const CARD: &str = "MODEL_CARD.md";
 const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::fault::Fault;
+use super::fault::{Fault, ProtocolError};
 use super::{Prompt, Protocol};
 use crate::autofocus::PolicyName;
 use crate::lens::FocalPower;
@@ -21,6 +21,16 @@ const MOST_SETTINGS: usize = 24;
 const MOST_BALANCED_SETTINGS: usize = 12;
 /// Longest text that surgeons read, in characters.
 const LONGEST_TEXT: usize = 400;
+
+impl Protocol {
+    /// Reads a protocol. `file` is named in errors; `known` are the policies that there are.
+    ///
+    /// # Errors
+    /// At the first thing wrong, with its line and key.
+    pub fn parse(source: &str, file: &str, known: &[PolicyName]) -> Result<Self, ProtocolError> {
+        parse(source, known).map_err(|fault| fault.in_file(file, source))
+    }
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -80,7 +90,7 @@ enum Kind {
 }
 
 /// Reads and checks `source`.
-pub(super) fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
+fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
     let file: File = toml::from_str(source)?;
     let reader = Reader { known };
     identifier(&file.name, "name")?;

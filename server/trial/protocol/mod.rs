@@ -63,14 +63,6 @@ pub struct Prompt {
 }
 
 impl Protocol {
-    /// Reads a protocol. `file` is named in errors; `known` are the policies that there are.
-    ///
-    /// # Errors
-    /// At the first thing wrong, with its line and key.
-    pub fn parse(source: &str, file: &str, known: &[PolicyName]) -> Result<Self, ProtocolError> {
-        file::parse(source, known).map_err(|fault| fault.in_file(file, source))
-    }
-
     /// Segments in a session.
     #[must_use]
     pub fn settings(&self) -> usize {

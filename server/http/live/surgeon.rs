@@ -7,9 +7,9 @@ use serde::Serialize;
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-use super::App;
-use super::live::Audience;
+use super::audience::Audience;
 use crate::control::{ControlStatus, Hold};
+use crate::http::App;
 use crate::imaging::PatchArea;
 use crate::live::{EncodedFrame, Picture};
 use crate::trial::view::SurgeonView;

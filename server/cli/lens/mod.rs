@@ -3,15 +3,11 @@
 mod emulate;
 mod measure;
 mod sweep;
+mod which;
 
-use std::sync::Arc;
-use std::time::Duration;
-
-use serde::Serialize;
-
-use super::{Failure, interrupt, print};
-use crate::clock::SystemClock;
-use crate::lens::{self, FocalPower, Lens, LensInfo};
+use super::output::{Failure, print};
+use crate::lens::FocalPower;
+use which::{Which, go};
 
 /// Arguments of `parfocal lens`.
 #[derive(Debug, clap::Args)]
@@ -41,36 +37,6 @@ enum Action {
     Measure(measure::Arguments),
     /// Start an emulated Optotune Lens Driver 4, print its port and serve it until Ctrl-C.
     Emulate(emulate::Arguments),
-}
-
-/// Which lens, and how to tell about it.
-#[derive(Debug, clap::Args)]
-struct Which {
-    /// `optotune:auto` or `optotune:/dev/...`, with `?min=5&max=10` to use only those dioptres; `simulated`; or `emulated`, an
-    /// Optotune driver that is not there, with `?delay=10&settling=40` and so on as `lens emulate` has them.
-    #[arg(long, value_name = "SPEC")]
-    lens: String,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
-}
-
-impl Which {
-    fn open(&self) -> Result<Box<dyn Lens>, Failure> {
-        interrupt::let_lenses_go_first()?;
-        Ok(lens::open(&self.lens, Arc::new(SystemClock))?)
-    }
-
-    fn open_to_stay(&self) -> Result<Box<dyn Lens>, Failure> {
-        Ok(lens::open_to_stay(&self.lens, Arc::new(SystemClock))?)
-    }
-}
-
-/// Where a lens stands (see docs/scripting.md).
-#[derive(Debug, Serialize)]
-struct Position {
-    focal_power: f64,
-    dioptre: f64,
 }
 
 /// Does what the arguments say.
@@ -109,24 +75,6 @@ fn set(target: FocalPower, which: &Which) -> Result<(), Failure> {
         return print(&(serde_json::to_string(&position)? + "\n"));
     }
     print(&format!("focal power {:.4}, {:.3} dpt\n", position.focal_power, position.dioptre))
-}
-
-/// Sends the lens to `target`, lets it settle, and reads back where it stands.
-fn go(lens: &mut dyn Lens, target: FocalPower) -> Result<Position, Failure> {
-    lens.set(target)?;
-    std::thread::sleep(settled_after(lens));
-    let read_back = lens.read_back()?;
-    Ok(Position { focal_power: read_back.get(), dioptre: dioptre(&lens.info()?, read_back) })
-}
-
-/// Four times the settling time leaves 1/160 000 of a step.
-fn settled_after(lens: &dyn Lens) -> Duration {
-    let dynamics = lens.dynamics();
-    dynamics.delay + dynamics.settling * 4
-}
-
-fn dioptre(info: &LensInfo, power: FocalPower) -> f64 {
-    info.min_dioptre + power.get() * (info.max_dioptre - info.min_dioptre)
 }
 
 fn parse_focal_power(text: &str) -> Result<FocalPower, String> {

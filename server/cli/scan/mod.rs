@@ -5,9 +5,7 @@ mod import;
 mod info;
 mod record;
 
-use indicatif::{ProgressBar, ProgressStyle};
-
-use super::{Failure, print};
+use super::output::Failure;
 
 /// Arguments of `parfocal scan`.
 #[derive(Debug, clap::Args)]
@@ -39,12 +37,4 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Action::Import(arguments) => import::run(arguments),
         Action::FromStack(arguments) => from_stack::run(arguments),
     }
-}
-
-/// A bar over `total` poses, `done` of which are done.
-pub(super) fn bar(total: usize, done: usize) -> ProgressBar {
-    let bar = ProgressBar::new(total as u64).with_position(done as u64);
-    bar.reset_eta();
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} poses, {eta} left {msg}");
-    style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
 }

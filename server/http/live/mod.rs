@@ -6,6 +6,10 @@
 //! frame that it has drawn, and only then gets the next, which is by then the latest: so no queue forms anywhere, however
 //! slow the link. A page that says it is hidden gets no frames.
 
+mod audience;
+mod operator;
+mod surgeon;
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -19,14 +23,16 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::AppState;
 use super::error::Error;
-use super::live_operator::ForOperator;
-use super::live_surgeon::ForSurgeon;
 use super::roles::Roles;
-use super::{App, AppState, ended};
+use super::shutdown::ended;
 use crate::control::ControlStatus;
 use crate::live::{EncodedFrame, Watcher};
 use crate::trial::view::Role;
+use audience::Audience;
+use operator::ForOperator;
+use surgeon::ForSurgeon;
 
 /// A page that has been silent for two of these is gone.
 const HEARTBEAT: Duration = Duration::from_secs(5);
@@ -36,23 +42,6 @@ const SEND_LIMIT: Duration = Duration::from_secs(10);
 
 /// Pages send acknowledgements, nothing longer.
 const LARGEST_REQUEST: usize = 1024;
-
-/// Who is at the other end, and so what may be sent: one implementation a role, each with types of its own.
-pub(super) trait Audience: Send + Sync + 'static {
-    /// What goes with each picture.
-    type Header: Serialize + Send;
-    /// The session under way.
-    type Session: Serialize + Send + Sync + 'static;
-    /// The state of the devices.
-    type Status: Serialize + PartialEq + Send;
-
-    /// What goes with `frame`, which is `age_ms` old.
-    fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> Self::Header;
-    /// Where the session is followed.
-    fn sessions(app: &App) -> watch::Receiver<Option<Arc<Self::Session>>>;
-    /// The state of the devices.
-    fn status(status: &ControlStatus, app: &App) -> Self::Status;
-}
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]

@@ -8,12 +8,12 @@ use std::time::Duration;
 use serde::Serialize;
 use tokio::sync::watch;
 
-use super::App;
-use super::live::Audience;
-use super::live_surgeon::{SurgeonFrame, coarse};
+use super::audience::Audience;
+use super::surgeon::{SurgeonFrame, coarse};
 use crate::autofocus::PolicyName;
 use crate::camera::{CameraHealth, CameraOffer};
 use crate::control::{ControlStatus, Hold};
+use crate::http::App;
 use crate::lens::{FocalPower, LensHealth};
 use crate::live::{EncodedFrame, Insight};
 use crate::priority::Standing;

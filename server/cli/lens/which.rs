@@ -1,0 +1,59 @@
+//! Which lens a command is for, and moving it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::cli::interrupt;
+use crate::cli::output::Failure;
+use crate::clock::SystemClock;
+use crate::lens::{self, FocalPower, Lens, LensInfo};
+
+/// Which lens, and how to tell about it.
+#[derive(Debug, clap::Args)]
+pub struct Which {
+    /// `optotune:auto` or `optotune:/dev/...`, with `?min=5&max=10` to use only those dioptres; `simulated`; or `emulated`, an
+    /// Optotune driver that is not there, with `?delay=10&settling=40` and so on as `lens emulate` has them.
+    #[arg(long, value_name = "SPEC")]
+    pub lens: String,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Which {
+    pub fn open(&self) -> Result<Box<dyn Lens>, Failure> {
+        interrupt::let_lenses_go_first()?;
+        Ok(lens::open(&self.lens, Arc::new(SystemClock))?)
+    }
+
+    pub fn open_to_stay(&self) -> Result<Box<dyn Lens>, Failure> {
+        Ok(lens::open_to_stay(&self.lens, Arc::new(SystemClock))?)
+    }
+}
+
+/// Where a lens stands (see docs/scripting.md).
+#[derive(Debug, Serialize)]
+pub struct Position {
+    pub focal_power: f64,
+    pub dioptre: f64,
+}
+
+/// Sends the lens to `target`, lets it settle, and reads back where it stands.
+pub fn go(lens: &mut dyn Lens, target: FocalPower) -> Result<Position, Failure> {
+    lens.set(target)?;
+    std::thread::sleep(settled_after(lens));
+    let read_back = lens.read_back()?;
+    Ok(Position { focal_power: read_back.get(), dioptre: dioptre(&lens.info()?, read_back) })
+}
+
+/// Four times the settling time leaves 1/160 000 of a step.
+fn settled_after(lens: &dyn Lens) -> Duration {
+    let dynamics = lens.dynamics();
+    dynamics.delay + dynamics.settling * 4
+}
+
+pub fn dioptre(info: &LensInfo, power: FocalPower) -> f64 {
+    info.min_dioptre + power.get() * (info.max_dioptre - info.min_dioptre)
+}

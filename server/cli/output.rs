@@ -1,0 +1,24 @@
+//! What every command has: how it fails, what it prints, and its progress bar.
+
+use std::io::Write;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A command's failure: one clear sentence that says what to do.
+pub type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Writes what a command was asked for on standard output.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .map_err(|error| format!("cannot write to standard output: {error}").into())
+}
+
+/// A bar over `total` poses, `done` of which are done.
+pub fn bar(total: usize, done: usize) -> ProgressBar {
+    let bar = ProgressBar::new(total as u64).with_position(done as u64);
+    bar.reset_eta();
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} poses, {eta} left {msg}");
+    style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
+}

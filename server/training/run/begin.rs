@@ -1,0 +1,29 @@
+//! From a recipe to the trainer of its policy.
+
+use tch::Device;
+
+use crate::autofocus::shipped::Design;
+use crate::scans::scenery::Scenery;
+use crate::training::belief::BeliefTrainer;
+use crate::training::dqn::DqnTrainer;
+use crate::training::error::TrainError;
+use crate::training::recipe::Recipe;
+use crate::training::trainer::Trainer;
+
+/// A trainer from nothing, by `recipe`, of a policy of `design`; its network on `device`.
+///
+/// # Errors
+/// When the recipe holds no section for such a policy.
+pub fn trainer(
+    design: Design,
+    recipe: &Recipe,
+    scenery: Scenery,
+    seed: u64,
+    device: Device,
+) -> Result<Box<dyn Trainer>, TrainError> {
+    Ok(match (design, &recipe.dqn, &recipe.belief) {
+        (Design::Values(sight), Some(dqn), _) => Box::new(DqnTrainer::new(sight, dqn.clone(), scenery, seed, device)),
+        (Design::Belief, _, Some(belief)) => Box::new(BeliefTrainer::new(belief.clone(), scenery, seed, device)),
+        _ => return Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", recipe.policy))),
+    })
+}
