@@ -48,7 +48,7 @@ impl<'a> Options<'a> {
         self.values.remove(name).map(parse).transpose()
     }
 
-    /// Ends the taking.
+    /// Rejects unknown options.
     ///
     /// # Errors
     /// When there is an option that nobody took.
@@ -56,7 +56,7 @@ impl<'a> Options<'a> {
         match self.values.keys().next() {
             None => Ok(()),
             Some(name) => Err(BadOptions(format!(
-                "in '{}': there is no option '{name}'; there are: {}",
+                "in '{}': unknown option '{name}'; there are: {}",
                 self.spec,
                 self.known.join(", ")
             ))),
@@ -88,6 +88,6 @@ mod tests {
         let (_, mut options) = Options::split("x?size=3").unwrap();
         options.take::<f64>("min").unwrap();
         options.take::<f64>("max").unwrap();
-        assert_eq!(message(options.finish()), "in 'x?size=3': there is no option 'size'; there are: min, max");
+        assert_eq!(message(options.finish()), "in 'x?size=3': unknown option 'size'; there are: min, max");
     }
 }

@@ -184,7 +184,7 @@ fn what_is_missing_or_damaged_is_named() {
     refusals("pose 2 of 3 is missing");
     fs::write(out.join(POSES), format!("{}\n", lines[0])).unwrap();
     let info = said(&parfocal(&["scan", "info", text(&out)]));
-    assert!(info.contains("changing by 0.0000 a pose") && info.contains("missing       poses 2, 3\n"), "{info}");
+    assert!(info.contains("changes by 0.0000 per pose") && info.contains("missing       poses 2, 3\n"), "{info}");
     fs::write(out.join(POSES), format!("{0}\n{0}\n", lines[0])).unwrap();
     refusals("pose 1 is there twice");
     fs::write(out.join(POSES), journal.replace("pose0002/pose0002", "../scan/pose0002")).unwrap();

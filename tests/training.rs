@@ -216,13 +216,13 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
     let output = process.wait_with_output().unwrap();
     assert!(output.status.success());
     let told = String::from_utf8(output.stdout).unwrap();
-    assert!(told.contains(&format!("go on with: parfocal train mgm-learned --out {out} --resume")), "{told}");
+    assert!(told.contains(&format!("continue with: parfocal train mgm-learned --out {out} --resume")), "{told}");
 
     let mut process = start(&["--resume"]);
     let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(lines.any(|line| line.contains(" of 1000000 updates: loss ")));
     interrupt(&process);
-    assert!(lines.any(|line| line.contains("Ctrl-C again to leave at once")));
+    assert!(lines.any(|line| line.contains("Ctrl-C again to stop at once")));
     interrupt(&process);
     assert_eq!(process.wait().unwrap().signal(), Some(2));
 }
@@ -313,7 +313,7 @@ fn bad_input_is_answered_with_one_sentence() {
     for (arguments, told) in [
         (vec!["evaluate", "--policies", "nonsense", "--count", "1"], "there is no policy 'nonsense'"),
         (vec!["evaluate", "--footage", "/no/such.mp4"], "there is no such file"),
-        (vec!["train", "fixed", "--out", out], "nothing trains 'fixed'"),
+        (vec!["train", "fixed", "--out", out], "there is no recipe 'fixed'"),
         (vec!["train", "parfocal", "--out", out, "--device", "cuda"], "use --device cpu"),
         (vec!["train", "mgm-learned", "--out", out, "--config", recipe], "unknown field `warmup`"),
         (vec!["train", "parfocal", "--out", "/proc/x"], "cannot write to /proc/x"),

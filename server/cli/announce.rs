@@ -13,8 +13,7 @@ use crate::http::keys::{Keys, ROLES};
 use crate::imaging::Calibration;
 use crate::trial::view::Role;
 
-/// The announcement for people, of a server that others reach at `host`; `terminal`, whether it goes to a terminal, which
-/// knows colours.
+/// The announcement for people of a server that others reach at `host`. On a `terminal` the code has colours.
 pub fn announcement(
     host: SocketAddr,
     keys: &Keys,
@@ -36,17 +35,17 @@ pub fn announcement(
         let _ = writeln!(text, "{:>10}  {}", role_name(role), link(role));
     }
     if let Ok(code) = QrCode::new(link(Role::Surgeon)) {
-        let _ = writeln!(text, "\nThe surgeon's tablet can scan this:\n\n{}", drawn(&code, terminal));
+        let _ = writeln!(text, "\nScan this with the surgeon's tablet:\n\n{}", drawn(&code, terminal));
     }
     text.push_str(
-        "Every page opens only by its link, and whoever has a link has its role: give each to its person only.\n",
+        "A page opens only by its link, and whoever has the link has the role: give each link only to its person.\n",
     );
     let advice = if host.ip().is_loopback() {
-        "Only this machine can reach it. For a tablet, start with --bind 0.0.0.0:8080 on a network you trust."
+        "Only this machine can connect. For a tablet, start with --bind 0.0.0.0:8080 on a network that you trust."
     } else {
-        "The connection is not encrypted: use a network you trust."
+        "The connection is not encrypted: use a network that you trust."
     };
-    let _ = writeln!(text, "{advice}\nCtrl-C ends it.");
+    let _ = writeln!(text, "{advice}\nCtrl-C stops the server.");
     text
 }
 
@@ -69,7 +68,7 @@ fn simulated(status: &ControlStatus) -> Option<String> {
         (false, true) => "THE LENS IS",
         (false, false) => return None,
     };
-    Some(format!("{what} SIMULATED: this is no real instrument"))
+    Some(format!("{what} SIMULATED: this is not a real instrument"))
 }
 
 /// An address that others can open: for "every address", the one that this machine would talk to the world from.

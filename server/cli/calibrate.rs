@@ -25,17 +25,17 @@ pub struct Arguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Take the dark reference: with the lens cap on, at the exposure and gain that will be used.
+    /// Take the dark reference: lens cap on, at the exposure and gain that you will use.
     Dark(Capture),
-    /// Take the white reference: an even white target that fills the picture, out of focus, in the light that will be used.
+    /// Take the white reference: an even white target fills the picture, out of focus, in the light that you will use.
     White(Capture),
-    /// Import what the maker measured of this unit: band centres and widths, responses, spectral correction.
+    /// Import the maker's measurements of this unit: band centres and widths, responses, spectral correction.
     Import(Import),
 }
 
 #[derive(Debug, clap::Args)]
 struct Capture {
-    /// Camera, for example `gige:ID?exposure=8000&gain=0`; `phantom:dark` and `phantom:white` to try it.
+    /// Camera, for example `gige:ID?exposure=8000&gain=0`; try it with `phantom:dark` and `phantom:white`.
     #[arg(long, value_name = "SPEC")]
     camera: String,
     #[command(flatten)]
@@ -43,17 +43,18 @@ struct Capture {
     /// Frames to average.
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=1000))]
     frames: u32,
-    /// Frames a second to ask of the camera.
+    /// Frame rate to request from the camera, per second.
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
 }
 
 #[derive(Debug, clap::Args)]
 struct Import {
-    /// A calibration as TOML: any of name, unit, `bit_depth`, `centre_nm`, `fwhm_nm`, dark, white, `spectral_correction`.
+    /// A calibration as TOML: any of name, unit, `bit_depth`, `centre_nm`, `fwhm_nm`, dark, white,
+    /// `spectral_correction`.
     #[arg(value_name = "FILE")]
     from: Option<PathBuf>,
-    /// The bands' responses as CSV: a line a wavelength, in nm, followed by 16 responses.
+    /// The responses of the bands as CSV: a line per wavelength with nm and 16 responses.
     #[arg(long, value_name = "CSV")]
     responses: Option<PathBuf>,
     /// The spectral correction as CSV: 16 lines of 16.
@@ -65,10 +66,10 @@ struct Import {
 
 #[derive(Debug, clap::Args)]
 struct Destination {
-    /// Folder of the calibration; what is there already is built upon.
+    /// Folder of the calibration; a calibration that it already holds gets a new version.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// What the calibration is to be called.
+    /// Name of the calibration.
     #[arg(long)]
     name: Option<String>,
     /// Serial number of the sensor's unit.
@@ -104,7 +105,7 @@ fn white(capture: &Capture) -> Result<(), Failure> {
     let mut calibration = calibration::begun(&capture.to.out)?;
     let Reference::PerPixel(dark) = &calibration.dark else {
         return Err(format!(
-            "there is no dark reference in {} yet: put the lens cap on and run `parfocal calibrate dark` first",
+            "{} has no dark reference yet: put the lens cap on and run `parfocal calibrate dark` first",
             capture.to.out.display()
         )
         .into());
@@ -115,7 +116,7 @@ fn white(capture: &Capture) -> Result<(), Failure> {
 }
 
 fn refused(which: &str, error: &dyn std::fmt::Display) -> Failure {
-    format!("this is no {which} reference, and nothing was kept: {error}").into()
+    format!("this is not a {which} reference, and nothing was saved: {error}").into()
 }
 
 /// Adds up frames of the camera.
@@ -132,7 +133,7 @@ fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure
             FrameImage::Mosaic(_) => {}
             FrameImage::Rgb(_) => {
                 return Err(format!(
-                    "the camera {} delivers colour pictures: there is nothing to calibrate",
+                    "the camera {} delivers colour pictures, which need no calibration",
                     capture.camera
                 )
                 .into());
@@ -174,6 +175,6 @@ impl Destination {
             calibration.unit.clone_from(&self.unit);
         }
         let path = calibration::save(Path::new(&self.out), &calibration, changed)?;
-        print(&format!("{}\nkept in {}\n", calibration.title(), path.display()))
+        print(&format!("{}\nsaved in {}\n", calibration.title(), path.display()))
     }
 }

@@ -35,8 +35,8 @@ pub fn read_or_default(path: Option<&Path>) -> Result<Calibration, Failure> {
 pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Result<(), Failure> {
     match (calibration.size(), size) {
         (Some(taken), Some(size)) if taken != size => Err(format!(
-            "the calibration {} was taken at {}x{}, but {of} is {}x{}: take the references afresh with `parfocal calibrate`, \
-             or set the camera to the size that they were taken at",
+            "the calibration {} was taken at {}x{}, but {of} is {}x{}: take new references with \
+             `parfocal calibrate`, or set the camera to the size of the references",
             calibration.title(),
             taken.0,
             taken.1,
@@ -48,7 +48,8 @@ pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usiz
     }
 }
 
-/// Refuses a calibration that does not fit a camera whose mosaics are of `size`, if it delivers any: in size, or in scale.
+/// Refuses a calibration that does not fit a camera whose mosaics are of `size`, if it delivers
+/// any: in size, or in scale.
 pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> Result<(), Failure> {
     check_size(calibration, "the camera's picture", size)?;
     if size.is_some() { check_scale(calibration) } else { Ok(()) }
@@ -58,8 +59,8 @@ pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> 
 pub fn check_scale(calibration: &Calibration) -> Result<(), Failure> {
     if calibration.bit_depth != CAMERA_BITS {
         return Err(format!(
-            "the calibration {} is for samples of {} bit, but all cameras' are brought to {CAMERA_BITS} bit here: give dark and white on \
-             that scale, and `bit_depth = {CAMERA_BITS}`",
+            "the calibration {} is for samples of {} bit, but parfocal converts every camera to {CAMERA_BITS} bit: \
+             give dark and white on that scale, and `bit_depth = {CAMERA_BITS}`",
             calibration.title(),
             calibration.bit_depth
         )
@@ -73,7 +74,7 @@ fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
     let bytes = fs::read(&path).map_err(|error| format!("cannot read the picture {}: {error}", path.display()))?;
     match decode(&bytes, true) {
         Ok(Picture::Mosaic(frame)) => Ok(frame),
-        Ok(_) => Err(format!("{name} is no 16-bit gray picture")),
+        Ok(_) => Err(format!("{name} is not a 16-bit gray picture")),
         Err(error) => Err(format!("{name}: {error}")),
     }
 }
@@ -91,7 +92,8 @@ pub fn begun(folder: &Path) -> Result<Calibration, Failure> {
     let number = |name: &String| name.strip_prefix("calibration-")?.strip_suffix(".toml")?.parse::<u32>().ok();
     let Some(latest) = names.filter_map(|name| number(&name)).max() else { return Ok(Calibration::default()) };
     Err(format!(
-        "{} holds earlier calibrations but no {CURRENT}: copy calibration-{latest}.toml to that name, or give another folder",
+        "{} holds earlier calibrations but no {CURRENT}: copy calibration-{latest}.toml to that name, \
+         or give another folder",
         folder.display()
     )
     .into())

@@ -9,8 +9,8 @@ use crate::clock::{Clock, Moment};
 use crate::control::ControlStatus;
 use crate::store::{DeviceEvent, Store};
 
-/// A device that failed counts as working again once it has worked for so long, so that one that comes and goes does not
-/// fill the log.
+/// A device that failed counts as working again once it has worked for this long, so that one that comes and goes does
+/// not fill the log.
 const SETTLED: Duration = Duration::from_secs(1);
 
 /// Whether a device works, and whether it is to be warned of.
@@ -57,7 +57,7 @@ pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Rece
             let (working, _) = condition;
             let event = DeviceEvent { wall, at, device: device.to_owned(), working, message: message.to_string() };
             if let Err(error) = store.device_event(&event).await {
-                tracing::error!(%error, "a device's state could not be recorded");
+                tracing::error!(%error, "cannot record the state of a device");
             }
         }
         if status.changed().await.is_err() {

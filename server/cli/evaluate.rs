@@ -29,39 +29,39 @@ use crate::simulation::phantom::Trajectory;
 #[derive(Debug, clap::Args)]
 #[command(group = ArgGroup::new("destination").multiple(true))]
 pub struct Arguments {
-    /// Which scans: `simulated`, the reference benchmark; `relief`, the one over scenes with relief; `phantom`, recorded over the phantom as an arm would; or the folder
-    /// of a recorded scan.
+    /// Scans: `simulated`, the reference benchmark; `relief`, the benchmark with relief; `phantom`,
+    /// a scan over the phantom as a robotic arm would record it; or the folder of a recorded scan.
     #[arg(long, value_name = "simulated|relief|phantom|DIR", default_value = "simulated")]
     scans: String,
     /// What a recorded scan shows between two of its focal powers.
     #[arg(long, value_enum, default_value_t)]
     between: Between,
-    /// The folder of a focal stack: pictures of one still scene in order of focus. Each stack is evaluated at two scales and three
-    /// seeds, 31 to 33 unless --seed names the first. May be given more than once; `DIR:K` makes K of its planes the range 0 to
-    /// 1, two fifths of them otherwise.
+    /// Evaluate on a photographed focal stack instead: a folder of pictures of one still scene in order of focus.
+    /// `DIR:K` makes K of its planes the range 0 to 1, by default two fifths of them. Each stack runs at two scales and
+    /// with three seeds, 31 to 33 unless --seed names the first. May be repeated.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"])]
     stacks: Vec<String>,
-    /// A video (its first 1500 frames), an image or a folder of images to scan in place of the reference pictures.
+    /// A video (its first 1500 frames), an image or a folder of images to use instead of the reference pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
-    /// Policies by name, separated by commas, `all` for all that can run; `file:PATH` for one from a TorchScript file, whose
-    /// path goes on to the end of the argument, commas included. May be given more than once.
+    /// Names of policies, separated by commas; `all` for all that can run; `file:PATH` for a
+    /// TorchScript file, whose path ends with the argument and may hold commas. May be repeated.
     #[arg(long, value_name = "NAMES", default_value = "all")]
     policies: Vec<String>,
-    /// Folder with weights (`NAME.safetensors`) to take in the place of those that ship.
+    /// Folder with weights of your own (`NAME.safetensors`) that replace those that ship.
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Seed of the scans' courses, 2023 unless given; a recorded scan has its own.
+    /// Seed of the scans, 2023 by default; a recorded scan has its own.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Number of scans, 10000 at most, 100 over the phantom; 200 simulated ones or 1 over the phantom, if not said.
+    /// Number of scans: 200 by default and 10000 at most; over the phantom 1 by default and 100 at most.
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     count: Option<usize>,
-    /// Run only the I-th of N parts of the scans, as 2/8, and give its paths as JSON for --merge: with --out as
+    /// Run only part I of N of the scans, for example 2/8, and give its paths as JSON for --merge: with --out as
     /// shard-I-of-N.json in that folder, with --json on standard output.
     #[arg(long, value_name = "I/N", requires = "destination")]
     shard: Option<Part>,
-    /// Put all shards of an evaluation together: the result is, to the last digit, that of one run.
+    /// Merge all shards of an evaluation; the result equals that of one run to the last digit.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = [
         "scans", "between", "footage", "policies", "weights", "seed", "count", "shard",
     ])]
@@ -69,7 +69,7 @@ pub struct Arguments {
     /// Print JSON.
     #[arg(long, group = "destination")]
     json: bool,
-    /// Folder for the table (Markdown, CSV, JSON) and the figure.
+    /// Folder for the results: tables (Markdown, CSV, JSON) and a figure.
     #[arg(long, value_name = "DIR", group = "destination")]
     out: Option<PathBuf>,
 }
@@ -174,7 +174,8 @@ fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
         replace(&file, text.as_bytes()).map_err(|error| unwritable(folder, &error))?;
         let folder = folder.display();
         told = format!(
-            "shard {} is in {}; when all are there: parfocal evaluate --merge {folder}/shard-*.json --out {folder}\n",
+            "shard {} is in {}; when all shards are there: \
+             parfocal evaluate --merge {folder}/shard-*.json --out {folder}\n",
             shard.part,
             file.display()
         );
@@ -248,7 +249,7 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
         return simulated(arguments, part);
     }
     if !arguments.footage.is_empty() {
-        return Err("--footage makes simulated scans; leave out --scans".into());
+        return Err("--footage needs simulated scans; leave out --scans".into());
     }
     if arguments.scans == "relief" {
         let (seed, count) = (arguments.seed(), arguments.count.unwrap_or(COUNT));
@@ -268,7 +269,7 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     let folder = Path::new(&arguments.scans);
     if !folder.is_dir() {
         return Err(format!(
-            "there are no scans '{0}'; use simulated, relief, phantom or a recorded scan's folder",
+            "unknown scans '{0}'; use simulated, relief, phantom or the folder of a recorded scan",
             arguments.scans
         )
         .into());
@@ -277,7 +278,7 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
         return Err("a folder holds one scan; leave out --count".into());
     }
     if part != Part::WHOLE {
-        return Err("a folder holds one scan, which cannot be cut into shards; leave out --shard".into());
+        return Err("a folder holds one scan, which cannot be split; leave out --shard".into());
     }
     let folder = ScanFolder::open(folder)?;
     let bar = bar(folder.poses().len(), 0);

@@ -12,18 +12,18 @@ use crate::store::export::export;
 /// Arguments of `parfocal export`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The session, by its id on the researcher's page.
+    /// Id of the session, as on the researcher's page.
     session: SessionId,
-    /// Folder to write; new or empty.
+    /// Folder to write: new or empty.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Tell which policy ran in which setting; only after unblinding.
+    /// Include which policy ran in which setting; possible only after unblinding.
     #[arg(long)]
     unblinded: bool,
     /// Folder of the server's database.
     #[arg(long, value_name = "DIR", default_value = "data")]
     data_dir: PathBuf,
-    /// Print what was written as JSON.
+    /// Print a summary as JSON.
     #[arg(long)]
     json: bool,
 }

@@ -73,7 +73,7 @@ impl Interrupt {
                     if heard.asked.swap(true, Ordering::Relaxed) || heard.saved.load(Ordering::Relaxed) {
                         end_by(SIGINT);
                     }
-                    tell(format_args!("{notice}; Ctrl-C again to leave at once"));
+                    tell(format_args!("{notice}; Ctrl-C again to stop at once"));
                 }
             });
         })?;

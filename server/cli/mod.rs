@@ -34,26 +34,26 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Take a sensor's dark and white references, or import its maker's tables.
+    /// Calibrate a sensor: take its dark and white references, or import its maker's tables.
     Calibrate(calibrate::Arguments),
     /// Write a session's data as a folder of CSV and JSON.
     Export(export::Arguments),
-    /// Show what is made of pictures and mosaics: content area, patch, focus metrics.
+    /// Show content area, patch and focus metrics of pictures and mosaics.
     Inspect(inspect::Arguments),
-    /// Look at a lens, move it by hand, sweep it, or start one that is not there.
+    /// Look at a lens, move it, sweep it, measure it, or emulate one.
     Lens(lens::Arguments),
-    /// Run policies on focal-time scans and print their figures.
+    /// Compare policies on focal-time scans or photographed focal stacks.
     Evaluate(evaluate::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
-    /// Record focal-time scans, look at them, and import them.
+    /// Record, import and check focal-time scans.
     Scan(scan::Arguments),
     /// Start the server: the live view, the control loop and the trial.
     #[command(after_help = serve::REAL_TIME)]
     Serve(serve::Arguments),
-    /// Make a learned policy from nothing.
+    /// Train a learned policy, or compare trainings.
     Train(train::Arguments),
-    /// Check that an export is whole, unchanged and true to its commitment.
+    /// Check that an export is complete, unchanged, and matches its commitment.
     Verify(verify::Arguments),
 }
 

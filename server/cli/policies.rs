@@ -6,7 +6,7 @@ use crate::autofocus::{PolicyEntry, Registry};
 /// Arguments of `parfocal policies`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Print one JSON array instead of a table.
+    /// Print a JSON array instead of a table.
     #[arg(long)]
     json: bool,
 }

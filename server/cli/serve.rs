@@ -34,38 +34,38 @@ use crate::{lens, live, priority};
 /// Arguments of `parfocal serve`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Address to listen on; 0.0.0.0:8080 to be reached from a tablet.
+    /// Address to listen on; 0.0.0.0:8080 lets a tablet connect.
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
     bind: SocketAddr,
-    /// Folder for the database, the keys and what is recorded.
+    /// Folder for the database and the keys.
     #[arg(long, value_name = "DIR", default_value = "data")]
     data_dir: PathBuf,
-    /// Camera: phantom, footage:PATH, scan:DIR or gige:ID (gige:list names them), options as in docs/scripting.md.
+    /// Camera: phantom, footage:PATH, scan:DIR or gige:ID (gige:list lists them); docs/scripting.md has their options.
     #[arg(long, value_name = "SPEC", default_value = "phantom")]
     camera: String,
-    /// Lens: simulated, emulated (an Optotune driver that is not there), optotune:auto or optotune:DEVICE.
+    /// Lens: simulated, emulated (an emulated Optotune driver), optotune:auto or optotune:DEVICE.
     #[arg(long, value_name = "SPEC", default_value = "simulated")]
     lens: String,
-    /// Frames a second to ask of the camera.
+    /// Frame rate to request from the camera, per second.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
-    /// Seed of simulated devices and practice sessions, so that they can be repeated; without it, a fresh one. Real sessions
-    /// always draw order and ids from the system's random source.
+    /// Seed that repeats simulated devices and practice sessions; random by default. Real sessions always use the
+    /// system's random source.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Folder of trial protocols beside those that ship; `trial-protocols`, if it is there, unless another is named.
+    /// Folder with more trial protocols; `trial-protocols` by default, if it exists.
     #[arg(long, value_name = "DIR")]
     protocols: Option<PathBuf>,
-    /// A policy from a TorchScript file, `file:PATH`: to be chosen, also in protocols, by that name. May be repeated.
+    /// Add a policy from a TorchScript file, under the name `file:PATH`, also for protocols. May be repeated.
     #[arg(long = "policy", value_name = "file:PATH")]
     policies: Vec<String>,
-    /// Folder with weights (`NAME.safetensors`) of your own training to take in the place of those that ship.
+    /// Folder with weights of your own (`NAME.safetensors`) that replace those that ship.
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Calibration of the sensor, a TOML file or a folder of `parfocal calibrate`; without it, that of a typical unit.
+    /// Calibration of the sensor: a TOML file, or a folder of `parfocal calibrate`; a typical unit's by default.
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
-    /// How the lens was measured to move, the dynamics.toml of `parfocal lens measure`; without it, what is usual.
+    /// How the lens moves: the dynamics.toml of `parfocal lens measure`; typical values by default.
     #[arg(long, value_name = "FILE")]
     lens_dynamics: Option<PathBuf>,
 }
@@ -76,13 +76,13 @@ const TELEMETRY_CAPACITY: usize = 750;
 /// What `--help` says at its end.
 pub const REAL_TIME: &str = "\
 Real-time priority:
-  Where the system allows it, the threads from camera to lens go before all other programs and their memory stays in
-  place, so that a busy machine does not delay the focus. The operator's page tells whether that is so. Root may; to
+  Where the system allows it, the threads from camera to lens run before all other programs and their memory is locked,
+  so that a busy machine does not delay the focus. The operator's page says whether they do. Root is allowed to. To
   allow it to another USER, write into /etc/security/limits.d/parfocal.conf, and log in again:
     USER  -  rtprio   40
     USER  -  memlock  unlimited
-  For a service of systemd the same are LimitRTPRIO=40 and LimitMEMLOCK=infinity; in a container, the capabilities
-  SYS_NICE and IPC_LOCK.";
+  A systemd service needs LimitRTPRIO=40 and LimitMEMLOCK=infinity, a container the capabilities SYS_NICE and
+  IPC_LOCK.";
 
 /// Open connections get this long to end by themselves, and then the disk as long to take what is left.
 const GRACE: Duration = Duration::from_millis(700);
@@ -95,8 +95,8 @@ const DEVICES: Duration = Duration::from_secs(5);
 /// # Errors
 /// When the address is taken, or a folder, camera or lens cannot be used.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    // Through a queue: a terminal that is held, or a pipe that nobody reads, must not hold the control loop that logs a line.
-    // What does not fit is left out.
+    // Through a queue: a held terminal, or a pipe that nobody reads, must not hold the control loop when it
+    // logs a line. What does not fit is left out.
     let (writer, flush) = tracing_appender::non_blocking(std::io::stderr());
     tracing_subscriber::fmt()
         .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| "info,sqlx=warn".into()))
@@ -118,7 +118,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let mut signals = Signals::new()?;
     bound_real_time()?;
     if !priority::lock_memory() {
-        tracing::debug!("memory is not locked: `parfocal serve --help` says how to allow it");
+        tracing::debug!("memory is not locked; `parfocal serve --help` says how to allow it");
     }
     // First of all: what cannot be reached need not be set up, and early visitors wait in its queue.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
@@ -183,7 +183,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     conducting.abort();
     let stopping = tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join()));
     if timeout(DEVICES, stopping).await.is_err() {
-        tracing::error!("the control loop does not end; leaving it");
+        tracing::error!("the control loop does not stop; exiting without it");
     }
     let last_words = async {
         let _ = tokio::join!(writer, ending.record_the_rest());
@@ -200,9 +200,7 @@ fn bound_real_time() -> std::io::Result<()> {
     tokio::spawn(async move {
         while overrun.recv().await.is_some() {
             priority::withdraw();
-            tracing::error!(
-                "a thread kept a processor for seconds; real-time priority is given up until the next start"
-            );
+            tracing::error!("a thread kept a processor for seconds; real-time priority is off until the next start");
         }
     });
     Ok(())
@@ -277,7 +275,7 @@ fn dynamics(path: &Path, lens: &mut dyn Lens) -> Result<LensDynamics, Failure> {
     let measured = MeasuredDynamics::from_toml(&text).map_err(named)?;
     let info = lens.info()?;
     if measured.serial != info.serial {
-        let problem = format!("they are of the lens {}, but this one is {}", measured.serial, info.serial);
+        let problem = format!("they belong to the lens {}, but this one is {}", measured.serial, info.serial);
         return Err(named(format!("{problem}; measure it with `parfocal lens measure`")).into());
     }
     Ok(measured.dynamics())
@@ -286,15 +284,17 @@ fn dynamics(path: &Path, lens: &mut dyn Lens) -> Result<LensDynamics, Failure> {
 fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> String {
     match error.kind() {
         std::io::ErrorKind::AddrInUse => {
-            format!("{address} is in use by another program; stop that one or choose another address with --bind")
+            format!("{address} is in use by another program; stop it, or choose another address with --bind")
         }
-        std::io::ErrorKind::AddrNotAvailable => format!("{address} is no address of this machine; see --bind"),
-        _ => format!("cannot listen on {address}: {error}; see --bind"),
+        std::io::ErrorKind::AddrNotAvailable => {
+            format!("this machine does not have the address {address}; choose another with --bind")
+        }
+        _ => format!("cannot listen on {address}: {error}; choose another address with --bind"),
     }
 }
 
-/// Ctrl-C or Ctrl-\, the end that a service manager asks for, or that of the terminal, after which a lens must not keep
-/// its current. Made before anything is announced, so that no signal is missed.
+/// The signals that end the server: Ctrl-C or Ctrl-\, a service manager's stop, the end of the terminal. Made before
+/// anything is announced, so that no signal is missed.
 struct Signals {
     interrupt: Signal,
     terminate: Signal,

@@ -5,13 +5,13 @@ use std::path::Path;
 use super::output::Failure;
 use crate::imaging::{BANDS, Band};
 
-/// Bands of the responses in `path`: a line a wavelength in nm, followed by 16 responses; a heading may come first. Centre
-/// and width are those of each response's main peak at half its height.
+/// Bands of the responses in `path`: a line per wavelength with nm and 16 responses; a heading may
+/// come first. Centre and width are those of each response's main peak at half its height.
 pub fn bands(path: &Path) -> Result<[Band; BANDS], Failure> {
     let rows = rows(path, BANDS + 1)?;
     let rising = rows.windows(2).all(|pair| pair[0][0] < pair[1][0]);
     if rows.len() < 3 || !rising {
-        return Err(format!("{}: needs three wavelengths or more, rising", path.display()).into());
+        return Err(format!("{}: needs at least three wavelengths, in rising order", path.display()).into());
     }
     let mut bands = Vec::with_capacity(BANDS);
     for band in 1..=BANDS {
@@ -27,7 +27,7 @@ pub fn bands(path: &Path) -> Result<[Band; BANDS], Failure> {
 pub fn correction(path: &Path) -> Result<[[f32; BANDS]; BANDS], Failure> {
     let rows = rows(path, BANDS)?;
     if rows.len() != BANDS {
-        return Err(format!("{}: needs 16 lines of 16, and has {}", path.display(), rows.len()).into());
+        return Err(format!("{}: needs 16 lines of 16, but has {}", path.display(), rows.len()).into());
     }
     Ok(std::array::from_fn(|row| std::array::from_fn(|column| rows[row][column] as f32)))
 }
@@ -46,7 +46,7 @@ fn rows(path: &Path, columns: usize) -> Result<Vec<Vec<f64>>, Failure> {
         }
         match values.into_iter().collect::<Option<Vec<f64>>>() {
             Some(row) if row.len() == columns => rows.push(row),
-            _ => return Err(failed(&format_args!("line {number} must be {columns} numbers")).into()),
+            _ => return Err(failed(&format_args!("line {number} must have {columns} numbers")).into()),
         }
     }
     Ok(rows)

@@ -30,7 +30,7 @@ enum Compute {
 pub struct Arguments {
     #[command(flatten)]
     training: Option<Training>,
-    /// Tabulate the trainings in these run folders in place of training: recipe, seed, updates, best validation, benchmark.
+    /// Compare the trainings in these run folders instead: recipe, seed, updates, best validation, benchmark.
     #[arg(long, value_name = "DIR", num_args = 1.., required_unless_present = "policy", conflicts_with = "Training")]
     compare: Vec<PathBuf>,
     /// With --compare, print JSON.
@@ -42,33 +42,33 @@ pub struct Arguments {
 #[derive(Debug, clap::Args)]
 #[group(id = "Training")]
 struct Training {
-    /// `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`; with `-paper` behind one of the first three, by the
-    /// paper's recipe; `cnn-learned-refined`, `parfocal-refined` and `parfocal-relief`: what follows these, with `--from` their
-    /// weights.
+    /// Recipe: `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`. The first three have one
+    /// by the paper, too, with `-paper` at the end. `cnn-learned-refined`, `parfocal-refined` and
+    /// `parfocal-relief` are later stages: give them the weights of the stage before by `--from`.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A recipe of your own (TOML) in place of the one that ships; with `--resume` it need not be given again.
+    /// A recipe of your own (TOML) instead of the one that ships; not needed with `--resume`.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Updates in the place of the recipe's, for a shorter or longer training; with `--resume` they need not be given again.
+    /// Number of updates instead of the recipe's; not needed with `--resume`.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_UPDATES))]
     updates: Option<u64>,
-    /// A video (its first 1500 frames), an image or a folder of images to train on in place of drawn pictures; with `--resume`
-    /// it need not be given again.
+    /// A video (its first 1500 frames), an image or a folder of images to train on instead of drawn
+    /// pictures; not needed with `--resume`.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
     /// Where to compute.
     #[arg(long, value_enum, default_value = "cpu")]
     device: Compute,
-    /// Go on where the run folder's checkpoint stands, with the recipe, seed and footage that the training was begun with.
+    /// Continue from the checkpoint in the run folder, with the same recipe, seed and footage.
     #[arg(long)]
     resume: bool,
-    /// Weights (safetensors) of the same policy to begin with in the place of random ones.
+    /// Weights (safetensors) of the same policy to start from instead of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     from: Option<PathBuf>,
-    /// Seed of everything random; 1 if not given.
+    /// Seed of everything random, 1 by default.
     #[arg(long)]
     seed: Option<u64>,
 }
@@ -95,9 +95,7 @@ fn train(arguments: &Training) -> Result<(), Failure> {
     let mut run = if arguments.resume { resume(arguments, device)? } else { begin(arguments, device)? };
     let total = run.recipe().updates();
     if let Some(version) = run.other_version() {
-        tell(format_args!(
-            "note: the checkpoint was made by parfocal {version}; what follows may differ from what it would have given"
-        ));
+        tell(format_args!("note: parfocal {version} made the checkpoint; the result may differ from that version's"));
     }
     let interrupt = Interrupt::listen(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());
@@ -113,13 +111,14 @@ fn train(arguments: &Training) -> Result<(), Failure> {
         bar.set_position(progress.updates);
         bar.set_message(message);
     };
-    // On one of the threads that share the work: it need not wait for another to wake up whenever there is some to share.
+    // On one of the threads that share the work: it need not wait for another to wake up whenever there is
+    // some to share.
     let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| compute_on_this_thread()).build()?;
     let whole = threads.install(|| run.go(&SystemClock, &|| interrupt.asked(), &mut tell_progress))?;
     if !whole {
         bar.finish_and_clear();
         return print(&format!(
-            "stopped after {} of {total} updates; go on with: parfocal train {} --out {} --resume\n",
+            "stopped after {} of {total} updates; continue with: parfocal train {} --out {} --resume\n",
             run.updates(),
             arguments.policy,
             arguments.out.display()
@@ -133,7 +132,7 @@ fn train(arguments: &Training) -> Result<(), Failure> {
             arguments.out.display()
         ));
     }
-    bar.set_message("running the best weights on the reference benchmark; Ctrl-C leaves that out");
+    bar.set_message("running the best weights on the reference benchmark; Ctrl-C skips it");
     run.report()?;
     bar.finish_and_clear();
     print(&format!("best validation MAE {:.4}; weights and model card in {}\n", run.best(), arguments.out.display()))
@@ -143,16 +142,16 @@ fn device(compute: Compute) -> Result<tch::Device, Failure> {
     match compute {
         Compute::Cpu => Ok(tch::Device::Cpu),
         Compute::Cuda if tch::Cuda::is_available() => Ok(tch::Device::Cuda(0)),
-        Compute::Cuda => {
-            Err("the libtorch in use has no CUDA, or finds no GPU; start parfocal with that of a PyTorch 2.11 \
-            for CUDA, as docs/training.md says, or use --device cpu"
-                .into())
-        }
+        Compute::Cuda => Err(
+            "this libtorch has no CUDA, or finds no GPU; start parfocal with the libtorch of PyTorch 2.11 for CUDA \
+            as in docs/training.md, or use --device cpu"
+                .into(),
+        ),
     }
 }
 
 fn begin(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
-    let unknown = || format!("nothing trains '{}'; there are recipes for {}", arguments.policy, names().join(", "));
+    let unknown = || format!("there is no recipe '{}'; there are: {}", arguments.policy, names().join(", "));
     let mut recipe = match own_recipe(arguments)? {
         Some(recipe) => recipe,
         None => Recipe::parse(shipped(&arguments.policy).ok_or_else(unknown)?)?,
@@ -184,7 +183,7 @@ fn own_recipe(arguments: &Training) -> Result<Option<Recipe>, Failure> {
     if recipe.policy != arguments.policy {
         let (file, made, asked) = (file.display(), &recipe.policy, &arguments.policy);
         return Err(
-            format!("the recipe {file} makes '{made}', not '{asked}'; name that policy, or another recipe").into()
+            format!("the recipe {file} makes '{made}', not '{asked}'; give that policy, or another recipe").into()
         );
     }
     Ok(Some(recipe))

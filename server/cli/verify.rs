@@ -23,7 +23,8 @@ pub struct Arguments {
 /// When one failed.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.dir.is_dir() {
-        return Err(format!("{} is no folder; name one that `parfocal export` wrote", arguments.dir.display()).into());
+        let folder = arguments.dir.display();
+        return Err(format!("{folder} is not a folder; give one that `parfocal export` wrote").into());
     }
     let checks = verify(&arguments.dir);
     print(&if arguments.json { serde_json::to_string(&checks)? + "\n" } else { checks.iter().map(line).collect() })?;

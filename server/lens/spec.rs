@@ -67,6 +67,6 @@ mod tests {
         assert!(message("simulated?fault=fire").contains("choose from none, drops"));
         assert!(message("emulated?fault=fire").contains("choose from none, garbage"));
         assert!(message("emulated?hysteresis=9").contains("must be from 0 to 5 dpt"));
-        assert!(message("simulated?size=3").contains("no option 'size'; there are: fault, delay, settling"));
+        assert!(message("simulated?size=3").contains("unknown option 'size'; there are: fault, delay, settling"));
     }
 }

@@ -17,8 +17,8 @@ const LEAST_PEAK: f64 = 1.2;
 /// No scan shows anything to focus on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "there is nothing to focus on: in none of {0} scans does even the sharpest patch show detail; \
-     use pictures of something that has texture, taken in focus"
+    "there is nothing to focus on: even the sharpest patch shows no detail in any of {0} scans; \
+     use pictures of something with texture, taken in focus"
 )]
 pub struct NothingToFocusOn(pub usize);
 

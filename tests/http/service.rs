@@ -42,7 +42,7 @@ fn what_cannot_be_served_is_refused_in_a_sentence() {
 
     let (code, said) = refused(data.path(), &["--bind", "192.0.2.1:8080"]);
     assert_eq!(code, Some(1));
-    assert!(said.contains("no address of this machine"), "{said}");
+    assert!(said.contains("this machine does not have the address"), "{said}");
 
     let (code, _) = refused(data.path(), &["--bind", "nonsense"]);
     assert_eq!(code, Some(2));

@@ -157,5 +157,5 @@ fn the_command_line_measures_and_the_server_takes_what_it_found() {
         .unwrap();
     assert_eq!(refused.status.code(), Some(1));
     let said = String::from_utf8(refused.stderr).unwrap();
-    assert!(said.contains("of the lens AREA0042, but this one is none"), "{said}");
+    assert!(said.contains("belong to the lens AREA0042, but this one is none"), "{said}");
 }

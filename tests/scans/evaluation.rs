@@ -150,12 +150,12 @@ fn footage_without_anything_to_focus_on_is_refused_and_a_part_without_is_told() 
     image::GrayImage::from_pixel(160, 160, image::Luma([200])).save(&wall).unwrap();
     let told = complaint(&evaluate(&["--policies", "fixed", "--footage", text(&wall)]).output().unwrap());
     assert!(
-        told.contains("nothing to focus on: in none of 1 scans does even the sharpest patch show detail"),
+        told.contains("nothing to focus on: even the sharpest patch shows no detail in any of 1 scans"),
         "{told}"
     );
     let run = folder.path().join("run");
     let train = ["train", "mgm-learned", "--out", text(&run), "--footage", text(&wall)];
-    assert!(complaint(&parfocal(&train)).contains("nothing to focus on: in none of 60 scans"));
+    assert!(complaint(&parfocal(&train)).contains("no detail in any of 60 scans"));
 
     // Scans take turns between the pictures of a folder.
     fs::remove_dir_all(&run).unwrap();
@@ -179,7 +179,7 @@ fn shards_put_together_are_one_run_to_the_last_digit() {
         said(&output)
     };
     let told = run(&["--out", text(&whole)]);
-    assert!(run(&["--shard", "2/3", "--out", text(&parts)]).contains("shard-2-of-3.json; when all are there: "));
+    assert!(run(&["--shard", "2/3", "--out", text(&parts)]).contains("shard-2-of-3.json; when all shards are there: "));
     run(&["--shard", "3/3", "--out", text(&parts)]);
     fs::write(parts.join("shard-1-of-3.json"), run(&["--shard", "1/3", "--json"])).unwrap();
 

@@ -32,7 +32,7 @@ fn a_focal_stack_becomes_a_scan_that_policies_can_be_evaluated_on() {
     let output = parfocal(&arguments);
     assert!(output.status.success(), "{}", complaint(&output));
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("note: 1 of 13 planes were not taken and are mixed from their neighbours"), "{told}");
+    assert!(told.contains("note: 1 of 13 planes are missing and are mixed from their neighbours"), "{told}");
     assert!(said(&output).contains("sharpest at position 6.000"), "{}", said(&output));
     let stored = contents(&out);
     assert!(parfocal(&arguments).status.success());

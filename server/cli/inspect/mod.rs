@@ -23,21 +23,21 @@ use report::{Kind, Report};
 /// Arguments of `parfocal inspect`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// PNG, JPEG or TIFF pictures of 8 or 16 bit, or mosaics: 16-bit gray pictures of 2048x1088, or files named .raw or
-    /// .bin that hold 2048x1088 little-endian 16-bit samples
+    /// Pictures (PNG, JPEG or TIFF of 8 or 16 bit) or mosaics (16-bit gray pictures of 2048x1088, or .raw or .bin files
+    /// with 2048x1088 little-endian 16-bit samples)
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Print one JSON object a line instead of a table
+    /// Print one JSON object per line instead of a table
     #[arg(long)]
     json: bool,
-    /// Write each picture, with its content area, patch and metrics drawn in, into this folder as PNG
+    /// Save each picture into this folder as PNG, with content area, patch and metrics drawn in
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Take 16-bit gray pictures of any size as mosaics
+    /// Treat 16-bit gray pictures of any size as mosaics
     #[arg(long)]
     mosaic: bool,
-    /// Calibration of the sensor that took the mosaics, a TOML file or a folder of `parfocal calibrate`; without it, that
-    /// of a typical unit
+    /// Calibration of the sensor that took the mosaics: a TOML file, or a folder of `parfocal calibrate`; a typical
+    /// unit's by default
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
 }
@@ -63,10 +63,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     print(&report::table(&reports))?;
     if let Some(title) = inspector.titled.filter(|_| !arguments.json) {
-        print(&format!("mosaics by the calibration {title}\n"))?;
+        print(&format!("mosaics developed with the calibration {title}\n"))?;
     }
     if failed > 0 {
-        return Err(format!("{failed} of {} files could not be inspected", arguments.paths.len()).into());
+        return Err(format!("cannot inspect {failed} of {} files", arguments.paths.len()).into());
     }
     Ok(())
 }
@@ -154,7 +154,7 @@ impl<'a> Inspector<'a> {
                     tell(format_args!(
                         "parfocal: {}",
                         named(&format_args!(
-                            "warning: counts reach {most}, above the {limit} of the calibration's bit depth, and are cut"
+                            "warning: counts reach {most} and are cut at {limit}, the calibration's limit"
                         ))
                     ));
                 }

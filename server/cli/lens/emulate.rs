@@ -13,24 +13,24 @@ use crate::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};
 use crate::lens::{LensDynamics, Optics};
 use crate::notices::tell;
 
-const HELP: &str = "type what shall befall it, then Enter:
-  unplug | plug-in | restart       its USB cable, its power
-  lens out | lens in               the lens's own cable
-  temperature CELSIUS              of the lens
-  latency MS                       until it answers a request
-  fault NAME                       none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands, stranger,
-                                   noisy-line
-  glitch NAME [N]                  befalls the next reply, or N of them: noise, checksum, late
-  glass                            tells the focal power of the glass now, which no driver can read
-Ctrl-C ends it";
+const HELP: &str = "type what should happen, then Enter:
+  unplug | plug-in | restart       pull its USB cable, plug it in, cut its power for a moment
+  lens out | lens in               pull the lens's own cable, plug it in
+  temperature CELSIUS              set the lens's temperature
+  latency MS                       set the time until it answers a request
+  fault NAME                       a lasting fault: none, garbage, wrong-checksum, wrong-read-back, silent, errors,
+                                   drops-commands, stranger, noisy-line
+  glitch NAME [N]                  spoil the next reply, or the next N: noise, checksum, late
+  glass                            print the glass's focal power, which no driver can read
+Ctrl-C stops it";
 
 /// Arguments of `parfocal lens emulate`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Serial number: one to four letters and digits, which follow on EMUL.
+    /// End of its serial number, after EMUL: one to four letters and digits.
     #[arg(long, default_value = "0001", value_parser = parse_serial)]
     serial: [u8; 8],
-    /// Type of its firmware, A to F: A counts dioptres with an offset of 5.
+    /// Type of its firmware, A to F; type A counts dioptres with an offset of 5.
     #[arg(long, value_name = "LETTER", default_value = "A", value_parser = parse_firmware)]
     firmware: u8,
     /// Milliseconds until it answers a request.
@@ -42,14 +42,14 @@ pub struct Arguments {
     /// Milliseconds from the first movement to within 5 % of the step.
     #[arg(long, value_name = "MS", default_value = "15", value_parser = parse_millis)]
     settling: Duration,
-    /// Dioptres between where the glass stands after a way up and after a way down.
+    /// Dioptres between the positions of the glass after a step up and after a step down.
     #[arg(long, value_name = "DPT", default_value = "0.04", value_parser = parse_play)]
     hysteresis: f64,
     /// Temperature of the lens in °C.
     #[arg(long, value_name = "CELSIUS", default_value = "25.5", value_parser = parse_temperature, allow_negative_numbers = true)]
     temperature: f64,
-    /// What is wrong with it from the start: none, garbage, wrong-checksum, wrong-read-back, silent, errors, drops-commands,
-    /// stranger or noisy-line.
+    /// Fault that it has from the start: none, garbage, wrong-checksum, wrong-read-back, silent, errors,
+    /// drops-commands, stranger or noisy-line.
     #[arg(long, value_name = "NAME", default_value = "none")]
     fault: Fault,
 }

@@ -22,19 +22,19 @@ use crate::lens_measurement::{Fit, Measurement, Plan, View, measure, plot};
 pub struct Arguments {
     #[command(flatten)]
     which: Which,
-    /// Camera that looks through the lens at something that stands still: `gige:ID`, or `phantom:still` to try it.
+    /// Camera that looks through the lens at something still: `gige:ID`; try it with `phantom:still`.
     #[arg(long, value_name = "SPEC")]
     camera: String,
-    /// Frames a second to ask of the camera: the more, the finer.
+    /// Frame rate to request from the camera, per second; a higher rate measures more finely.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
-    /// Steps up, and as many down.
+    /// Number of steps up, and again of steps down.
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
-    /// Milliseconds that each step is watched.
+    /// Milliseconds to watch each step.
     #[arg(long, value_name = "MS", default_value_t = 300, value_parser = clap::value_parser!(u32).range(20..=10_000))]
     watch: u32,
-    /// Also write dynamics.toml, for `parfocal serve --lens-dynamics`, and the plot steps.svg into this folder.
+    /// Also save into this folder dynamics.toml (for `parfocal serve --lens-dynamics`) and the plot steps.svg.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -108,8 +108,8 @@ impl Report {
         let Self { found, up, down, between: (low, high), .. } = self;
         format!(
             "delay       {:6.1} ms   up {:.1}, down {:.1}\nsettling    {:6.1} ms   up {:.1}, down {:.1}\n\
-             hysteresis  {:6.4}      {:.3} dpt\nfrom {} frames, between focal power {low:.2} and {high:.2}; scatter {:.1} % of a \
-             step\n",
+             hysteresis  {:6.4}      {:.3} dpt\n\
+             from {} frames, between focal power {low:.2} and {high:.2}; scatter {:.1} % of a step\n",
             found.delay_ms,
             up.delay_ms,
             down.delay_ms,

@@ -18,22 +18,22 @@ pub struct Arguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Say what the lens is and how it does.
+    /// Print what the lens is and what state it is in.
     Info {
         #[command(flatten)]
         which: Which,
     },
-    /// Go to a focal power and stay there.
+    /// Move to a focal power and stay there.
     Set {
-        /// From 0, the least dioptres of the range in use, to 1, the most.
+        /// From 0, the lowest dioptre of the range in use, to 1, the highest.
         #[arg(value_parser = parse_focal_power)]
         focal_power: FocalPower,
         #[command(flatten)]
         which: Which,
     },
-    /// Step through the range and tabulate what was asked against what the lens reads back.
+    /// Step through the range and compare the positions requested with those read back.
     Sweep(sweep::Arguments),
-    /// Step it and watch it settle with a camera: delay, settling time and hysteresis.
+    /// Measure delay, settling time and hysteresis: step the lens and watch it with a camera.
     Measure(measure::Arguments),
     /// Start an emulated Optotune Lens Driver 4, print its port and serve it until Ctrl-C.
     Emulate(emulate::Arguments),

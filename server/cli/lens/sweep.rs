@@ -16,10 +16,10 @@ use crate::lens::FocalPower;
 pub struct Arguments {
     #[command(flatten)]
     which: Which,
-    /// Stops on the way up, and again on the way down.
+    /// Number of stops on the way up, and again on the way down.
     #[arg(long, default_value_t = 21, value_parser = clap::value_parser!(u16).range(2..=1001))]
     steps: u16,
-    /// Also draw the plot into this SVG file.
+    /// Also save the plot as this SVG file.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
@@ -110,5 +110,5 @@ fn plot(stops: &[Stop]) -> String {
 
 fn save(path: &Path, text: &str) -> Result<(), Failure> {
     replace(path, text.as_bytes())
-        .map_err(|error| format!("the plot could not be saved to {}: {error}", path.display()).into())
+        .map_err(|error| format!("cannot save the plot to {}: {error}", path.display()).into())
 }

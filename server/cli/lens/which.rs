@@ -13,8 +13,8 @@ use crate::lens::{self, FocalPower, Lens, LensInfo};
 /// Which lens, and how to tell about it.
 #[derive(Debug, clap::Args)]
 pub struct Which {
-    /// `optotune:auto` or `optotune:/dev/...`, with `?min=5&max=10` to use only those dioptres; `simulated`; or `emulated`, an
-    /// Optotune driver that is not there, with `?delay=10&settling=40` and so on as `lens emulate` has them.
+    /// `optotune:auto` or `optotune:/dev/...`, with `?min=5&max=10` to use only those dioptres; `simulated`; or
+    /// `emulated`, an emulated Optotune driver, with options like those of `lens emulate`: `?delay=10&settling=40`.
     #[arg(long, value_name = "SPEC")]
     pub lens: String,
     /// Print JSON.

@@ -22,28 +22,28 @@ const PLANES: usize = 21;
 /// Arguments of `parfocal scan from-stack`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Folder of pictures of one still scene, each at another position of focus: the one number in which their names differ,
-    /// else the order of the names.
+    /// Folder of pictures of one still scene, each at another position of focus. The position is
+    /// the one number in which the names differ, or else the order of the names.
     folder: PathBuf,
-    /// Folder of the scan; new, or one that the same command began.
+    /// Folder of the scan: a new one, or one that the same command began.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// List of the pictures and their positions, a line `name,position` each, in the place of the names' numbers.
+    /// File with a line `name,position` for each picture, used instead of the numbers in the names.
     #[arg(long, value_name = "FILE")]
     list: Option<PathBuf>,
-    /// Planes that each pose sees, less than the stack has; about half of them, 21 at most, if not said.
+    /// Planes that each pose sees, fewer than the stack has; by default about half of them, 21 at most.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(3..=1000))]
     planes: Option<u16>,
     /// Width and height in pixels of the window that drifts over the stack.
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = parse_size)]
     size: usize,
-    /// Make the pictures smaller by means of blocks of S x S pixels.
+    /// Make the pictures smaller: average blocks of S x S pixels.
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
     scale: u8,
     /// Number of poses.
     #[arg(long, value_name = "N", default_value_t = POSES, value_parser = parse_poses)]
     poses: usize,
-    /// Seed of the window's and the optimum's walks.
+    /// Seed of the walks of window and optimum.
     #[arg(long, value_name = "N", default_value_t = SEED)]
     seed: u64,
 }
@@ -60,10 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let taken = stack.planes().len();
     let (even, gaps) = stack.even()?;
     if gaps > 0 {
-        tell(format_args!(
-            "note: {gaps} of {} planes were not taken and are mixed from their neighbours",
-            taken + gaps
-        ));
+        tell(format_args!("note: {gaps} of {} planes are missing and are mixed from their neighbours", taken + gaps));
     }
 
     let folder = arguments.folder.file_name().unwrap_or(arguments.folder.as_os_str()).to_string_lossy();
@@ -81,7 +78,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (width, height) = stack.size();
     let out = arguments.out.display();
     print(&format!(
-        "{taken} pictures of {width}x{height} pixels\n{}{} poses of {} planes in {out}; look at them with `parfocal scan info {out}`\n",
+        "{taken} pictures of {width}x{height} pixels\n\
+         {}{} poses of {} planes in {out}; check them with `parfocal scan info {out}`\n",
         info::optics(&Optics::of(&stack), "position"),
         cut.poses,
         cut.planes,

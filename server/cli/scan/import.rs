@@ -8,12 +8,12 @@ use crate::scans::recording::{Imported, import};
 /// Arguments of `parfocal scan import`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Folder of pictures named like `pose0001_f0.350.png`: the pose's number and the focal power, 0 to 1.
+    /// Folder of pictures named like `pose0001_f0.350.png`: number of the pose, and focal power from 0 to 1.
     folder: PathBuf,
-    /// Folder of the scan; new, or one that the same command began.
+    /// Folder of the scan: a new one, or one that the same command began.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Name of the camera, for people; the folder's name, without it.
+    /// Name of the camera, for people; the folder's name by default.
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
 }
@@ -30,5 +30,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     import(&imported, &camera, &arguments.out, &|| progress.inc(1))?;
     progress.finish_and_clear();
     let out = arguments.out.display();
-    print(&format!("{} poses in {out}; look at them with `parfocal scan info {out}`\n", imported.len()))
+    print(&format!("{} poses in {out}; check them with `parfocal scan info {out}`\n", imported.len()))
 }

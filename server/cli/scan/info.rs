@@ -24,7 +24,7 @@ pub struct Arguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
-    /// Also draw the optimum over the poses into this SVG file.
+    /// Also save a plot of the optimum over the poses as this SVG file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let info = info(&scan, bytes, &damages);
     if let Some(path) = &arguments.out {
         replace(path, picture(&scan).as_bytes())
-            .map_err(|error| format!("the picture could not be saved to {}: {error}", path.display()))?;
+            .map_err(|error| format!("cannot save the plot to {}: {error}", path.display()))?;
     }
     print(&if arguments.json { serde_json::to_string(&info)? + "\n" } else { text(&info) })?;
     if let Some(damage) = damages.first() {
@@ -159,7 +159,7 @@ fn text(info: &Info) -> String {
     let last = info.focal_powers.last().copied().unwrap_or_default();
     let mut rows = vec![
         ("camera", info.camera.clone()),
-        ("lens", info.lens.clone().unwrap_or_else(|| "not told".to_owned())),
+        ("lens", info.lens.clone().unwrap_or_else(|| "unknown".to_owned())),
         ("calibration", info.calibration.clone().unwrap_or_else(|| "none".to_owned())),
         ("seed", info.seed.to_string()),
         ("poses", format!("{} of {}", info.recorded, info.poses)),
@@ -167,14 +167,14 @@ fn text(info: &Info) -> String {
         ("pictures", format!("{}x{} pixels, {} bytes in all", info.width, info.height, info.bytes)),
         (
             "optimum",
-            format!("{:.3} to {:.3}, changing by {:.4} a pose", info.optimum.min, info.optimum.max, info.optimum.step),
+            format!("{:.3} to {:.3}, changes by {:.4} per pose", info.optimum.min, info.optimum.max, info.optimum.step),
         ),
     ];
     if let Some(Deviation { mean, max, worst_pose, within_step }) = &info.deviation {
         let share = 100.0 * within_step;
         rows.push((
-            "off the truth",
-            format!("by {mean:.4} on average, {max:.3} at most (pose {worst_pose}); {share:.1} % within a step"),
+            "error",
+            format!("{mean:.4} on average, {max:.3} at most (pose {worst_pose}); {share:.1} % within a step"),
         ));
     }
     if !info.missing.is_empty() {
@@ -199,10 +199,10 @@ fn table(rows: &[(&str, String)]) -> String {
 pub(super) fn optics(optics: &Optics, unit: &str) -> String {
     let mut rows = Vec::new();
     if let Some(blur) = optics.blur_per_unit {
-        rows.push(("blur", format!("grows by {blur:.3} pixels a unit of {unit}")));
+        rows.push(("blur", format!("grows by {blur:.3} pixels per unit of {unit}")));
     }
     if let Some(softness) = optics.softness {
-        rows.push(("at its best", format!("blurred by {softness:.1} pixels")));
+        rows.push(("softness", format!("the best picture is blurred by {softness:.1} pixels")));
     }
     if let Some(growth) = optics.magnification {
         rows.push(("magnification", format!("changes by {:+.2} % from the first {unit} to the last", 100.0 * growth)));

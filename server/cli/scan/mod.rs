@@ -16,13 +16,13 @@ pub struct Arguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Record a scan: at each pose a picture at every focal power, in random order. The same command again goes on.
+    /// Record a scan: at each pose a picture at every focal power, in random order. Run it again to continue.
     Record(record::Arguments),
-    /// Say what a scan holds, and check that every picture is the one that was stored.
+    /// Print what a scan holds, and check every picture against its checksum.
     Info(info::Arguments),
-    /// Make a scan of a folder of pictures named like `pose0001_f0.350.png`.
+    /// Make a scan from a folder of pictures named like `pose0001_f0.350.png`.
     Import(import::Arguments),
-    /// Make a scan of a focal stack: pictures of one still scene in order of focus.
+    /// Make a scan from a focal stack: pictures of one still scene in order of focus.
     FromStack(from_stack::Arguments),
 }
 

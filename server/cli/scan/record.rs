@@ -25,32 +25,32 @@ use crate::simulation::phantom::Trajectory;
 /// Arguments of `parfocal scan record`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Folder of the scan; new, or one that the same command began.
+    /// Folder of the scan: a new one, or one that the same command began.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Camera, as of `parfocal serve`. `phantom` without a lens is held still at each pose of a hand-held trajectory.
+    /// Camera, as for `parfocal serve`. `phantom` without a lens holds still at each pose of a hand-held trajectory.
     #[arg(long, value_name = "SPEC", default_value = "phantom")]
     camera: String,
-    /// Lens to send to each focal power, as of `parfocal serve`.
+    /// Lens that moves to each focal power, as for `parfocal serve`.
     #[arg(long, value_name = "SPEC")]
     lens: Option<String>,
-    /// Shell command that moves the camera to a pose, its number in the place of `{pose}`, and ends with 0 once it is
-    /// there; without it, you are asked to move the camera and to press Enter.
+    /// Shell command that moves the camera to pose number `{pose}` and exits with 0 when it is there. Without it,
+    /// parfocal asks you to move the camera and press Enter.
     #[arg(long, value_name = "COMMAND", requires = "lens")]
     stepper: Option<String>,
     /// Number of poses.
     #[arg(long, value_name = "N", default_value_t = POSES, value_parser = parse_poses)]
     poses: usize,
-    /// Number of focal powers, evenly spread over the lens's range.
+    /// Number of focal powers, evenly spaced over the range of the lens.
     #[arg(long, value_name = "N", default_value_t = FOCAL_POWERS, value_parser = parse_powers)]
     focal_powers: usize,
-    /// Seed of the order in which focal powers are taken, and of all of a simulation.
+    /// Seed of the order of the focal powers, and of the whole simulation.
     #[arg(long, value_name = "N", default_value_t = SEED)]
     seed: u64,
-    /// Frames a second to ask of the camera.
+    /// Frame rate to request from the camera, per second.
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
-    /// Calibration of the sensor, a TOML file or a folder of `parfocal calibrate`; without it, that of a typical unit.
+    /// Calibration of the sensor: a TOML file, or a folder of `parfocal calibrate`; a typical unit's by default.
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
 }
@@ -64,9 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let progress = bar(arguments.poses, 0);
     let (mut bench, header) = match &arguments.lens {
         None if arguments.camera == "phantom" => phantom(arguments),
-        None => {
-            Err(format!("say with --lens which lens goes to each focal power before `{}`", arguments.camera).into())
-        }
+        None => Err(format!("name the lens in front of `{}` with --lens", arguments.camera).into()),
         Some(lens) => devices(arguments, lens, &interrupt, &progress),
     }?;
     let mut recording = Recording::open(&arguments.out, &header)?;
@@ -76,20 +74,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     progress.finish_and_clear();
     let (done, out) = (recording.folder().poses().len(), arguments.out.display());
     match outcome {
-        Ok(()) => print(&format!("{done} poses in {out}; look at them with `parfocal scan info {out}`\n")),
+        Ok(()) => print(&format!("{done} poses in {out}; check them with `parfocal scan info {out}`\n")),
         // The stepper's command is interrupted by the same key.
         Err(RecordError::Stopped | RecordError::Stepper(_)) if interrupt.asked() => print(&format!(
-            "stopped: {done} of {} poses are kept in {out}; run the same command again to go on\n",
+            "stopped: {done} of {} poses are saved in {out}; run the same command again to continue\n",
             arguments.poses
         )),
         Err(RecordError::Folder(error)) => Err(error.into()),
-        Err(error) => Err(format!("{error} ({done} of {} poses are kept in {out})", arguments.poses).into()),
+        Err(error) => Err(format!("{error} ({done} of {} poses are saved in {out})", arguments.poses).into()),
     }
 }
 
 fn phantom(arguments: &Arguments) -> Result<(Box<dyn Bench>, Header), Failure> {
     if arguments.calibration.is_some() {
-        return Err("the phantom's sensor is the typical one: leave out --calibration, or name a --lens".into());
+        return Err("the phantom's sensor needs no calibration: leave out --calibration, or give a --lens".into());
     }
     let trajectory = Trajectory::new(arguments.seed, arguments.poses, HASTE);
     let header = header(arguments, "brain phantom, held still at each pose (simulated)", None, true);
