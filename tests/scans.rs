@@ -186,9 +186,9 @@ fn what_is_missing_or_damaged_is_named() {
     let info = said(&parfocal(&["scan", "info", text(&out)]));
     assert!(info.contains("changes by 0.0000 per pose") && info.contains("missing       poses 2, 3\n"), "{info}");
     fs::write(out.join(POSES), format!("{0}\n{0}\n", lines[0])).unwrap();
-    refusals("pose 1 is there twice");
+    refusals("pose 1 is listed twice");
     fs::write(out.join(POSES), journal.replace("pose0002/pose0002", "../scan/pose0002")).unwrap();
-    refusals("is no file in the scan's folder");
+    refusals("is not a file in the scan's folder");
     fs::write(out.join(POSES), &journal).unwrap();
     let header = fs::read_to_string(out.join("scan.json")).unwrap();
     fs::write(out.join("scan.json"), header.replace("\"version\": 1", "\"version\": 2")).unwrap();
@@ -208,7 +208,7 @@ fn what_is_missing_or_damaged_is_named() {
     let evaluated = complaint(&parfocal(&["evaluate", "--scans", text(&out), "--policies", "fixed"]));
     assert!(evaluated.contains("pose0002_f0.250.png is damaged"), "{evaluated}");
     let nothing = complaint(&parfocal(&["scan", "info", text(folder.path())]));
-    assert!(nothing.contains("no recorded scan"), "{nothing}");
+    assert!(nothing.contains("is not a recorded scan"), "{nothing}");
 }
 
 /// Glass at one focal power.
@@ -276,8 +276,7 @@ fn a_full_disk_keeps_what_is_whole() {
     };
     let (out, error) = (said(&output), String::from_utf8_lossy(&output.stderr).into_owned());
     assert!(out.starts_with("code 1\n") && error.contains("no space is left on the disk of"), "{out}{error}");
-    let kept: usize =
-        error.split(" poses are whole and kept").next().unwrap().rsplit(' ').next().unwrap().parse().unwrap();
+    let kept: usize = error.split(" poses are saved").next().unwrap().rsplit(' ').next().unwrap().parse().unwrap();
     let listed = out.lines().filter(|line| line.starts_with("pose0")).count();
     assert!((1..6).contains(&kept) && listed == kept && !out.contains(".partial"), "{out}{error}");
     let info: Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();

@@ -149,7 +149,7 @@ fn trainings_are_compared_by_what_their_folders_hold() {
     assert!(card.contains(&format!("(seed 2023): mean absolute focal power error {mae:.4} ")), "{card}");
 
     let nothing = parfocal(&["train", "--compare", folder.path().to_str().unwrap()]);
-    assert!(String::from_utf8_lossy(&nothing.stderr).contains("holds no training that was saved"));
+    assert!(String::from_utf8_lossy(&nothing.stderr).contains("holds no saved training"));
     for wrong in [["train", "parfocal"].as_slice(), &["train"], &["train", "parfocal", "--compare", first]] {
         assert_eq!(parfocal(wrong).status.code(), Some(2), "{wrong:?}");
     }
@@ -178,7 +178,7 @@ fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
     assert!(again(&[], None).unwrap_err().contains("is gone: cannot read"));
     assert_eq!(again(&[&moved], None), Ok(LEG));
     std::fs::rename(&other, &first).unwrap();
-    assert!(again(&[], None).unwrap_err().contains("has changed since"));
+    assert!(again(&[], None).unwrap_err().contains("has changed;"));
     // The model card that follows says so too.
     std::fs::rename(&moved, &first).unwrap();
     assert!(train(resume("mgm-learned", &run), u64::MAX));
@@ -318,10 +318,10 @@ fn bad_input_is_answered_with_one_sentence() {
         (vec!["train", "mgm-learned", "--out", out, "--config", recipe], "unknown field `warmup`"),
         (vec!["train", "parfocal", "--out", "/proc/x"], "cannot write to /proc/x"),
         (vec!["train", "parfocal", "--out", occupied], "choose a new or empty folder"),
-        (vec!["train", "parfocal", "--out", out, "--resume"], "holds no checkpoint to go on from"),
+        (vec!["train", "parfocal", "--out", out, "--resume"], "has no checkpoint to continue from"),
         (
             vec!["train", "mgm-learned", "--out", out, "--config", few, "--from", foreign],
-            "the weights are of another network",
+            "the weights belong to another network",
         ),
         (vec!["evaluate", "--weights", out, "--count", "1"], "there are no weights in"),
         (vec!["serve", "--weights", out], "there are no weights in"),

@@ -98,7 +98,7 @@ pub enum FolderError {
         names: String,
     },
     /// Some cannot be used.
-    #[error("the weights {} cannot be used: {reason}", file.display())]
+    #[error("cannot use the weights {}: {reason}", file.display())]
     Unfit {
         /// The file.
         file: PathBuf,

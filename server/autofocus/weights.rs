@@ -12,7 +12,7 @@ pub enum WeightsError {
     #[error("the weights are damaged: {0}")]
     Damaged(String),
     /// A tensor of the network is not there or does not fit.
-    #[error("the weights are of another network: {0}")]
+    #[error("the weights belong to another network: {0}")]
     Mismatch(String),
 }
 

@@ -87,9 +87,9 @@ impl Pace {
         let asked = 1.0 / self.period.as_secs_f64();
         let kept = self.delivered.back().is_none_or(|last| self.rate(*last) > 0.95 * asked);
         if kept {
-            return Arc::from(format!("{asked:.0} frames a second as asked"));
+            return Arc::from(format!("{asked:.0} frames a second, as requested"));
         }
-        Arc::from(format!("this machine is too busy for {asked:.0} frames a second; ask for fewer with --fps"))
+        Arc::from(format!("this machine is too busy for {asked:.0} frames a second; lower the rate with --fps"))
     }
 }
 

@@ -29,14 +29,14 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
         Some(("gige", source)) => Ok(Box::new(super::gige::GigeCamera::open(source, settings)?)),
         #[cfg(not(feature = "aravis"))]
         Some(("gige", _)) => Err(CameraError::BadSource(
-            "this build has no GigE Vision: install libaravis-dev and libusb-1.0-0-dev, then build it with \
+            "this build has no GigE Vision: install libaravis-dev and libusb-1.0-0-dev, then build with \
              `--features aravis`"
                 .into(),
         )),
         _ => Err(CameraError::BadSource(format!(
-            "there is no camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and `phantom:dark` \
+            "unknown camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and `phantom:dark` \
              to try the bench's commands), `footage:PATH` (a video, an image or a folder of images), `scan:DIR` (a \
-             recorded scan) or `gige:ID` (`gige:list` says which there are)"
+             recorded scan) or `gige:ID` (`gige:list` lists them)"
         ))),
     }
 }

@@ -78,7 +78,7 @@ pub enum EvaluateError {
     #[error(transparent)]
     Policy(#[from] PolicyError),
     /// A policy gave up.
-    #[error("policy '{policy}' failed on scan {scan}: {error}; mend it, or evaluate without it")]
+    #[error("policy '{policy}' failed on scan {scan}: {error}; repair it, or evaluate without it")]
     NoTarget {
         /// The policy.
         policy: PolicyName,

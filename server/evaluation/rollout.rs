@@ -24,8 +24,8 @@ pub struct Path {
 pub struct PathFigures {
     /// Mean absolute focal power error.
     pub mae: f64,
-    /// Share of frames with an error below [`IN_FOCUS`]. On a grid of focal powers errors of exactly that fall on either side by
-    /// rounding; `docs/results.md` tells how much hangs on it.
+    /// Share of frames with an error below [`IN_FOCUS`]. On a grid of focal powers, rounding decides on which side errors
+    /// of exactly that fall; `docs/notebook.md` says how much depends on it.
     pub in_focus: f64,
     /// Mean absolute change of focal power a frame.
     pub travel: f64,
@@ -68,7 +68,7 @@ impl Path {
 
 /// What a policy answered that is no number.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("at frame {frame} it answered {target}, which is no focal power")]
+#[error("at frame {frame} it returned {target}, which is not a focal power")]
 pub struct NoTarget {
     /// The frame, from 1.
     pub frame: usize,

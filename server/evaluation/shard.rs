@@ -106,7 +106,7 @@ pub struct Shard {
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
     /// It is something else.
-    #[error("{0} holds no shard of an evaluation; name files that `parfocal evaluate --shard` wrote")]
+    #[error("{0} is not a shard of an evaluation; give files that `parfocal evaluate --shard` wrote")]
     NoShard(String),
     /// Two shards are of different evaluations.
     #[error("{first} and {second} are shards of different evaluations: they differ in {what}")]
@@ -119,7 +119,7 @@ pub enum MergeError {
         what: &'static str,
     },
     /// One is there twice.
-    #[error("{first} and {second} are both shard {part}; name each once")]
+    #[error("{first} and {second} are both shard {part}; give each shard once")]
     Twice {
         /// One file.
         first: String,

@@ -58,7 +58,7 @@ pub enum StackError {
         source: DecodeError,
     },
     /// The pictures make no stack.
-    #[error("{} is no focal stack: {source}", folder.display())]
+    #[error("{} is not a focal stack: {source}", folder.display())]
     Unfit {
         /// The folder.
         folder: PathBuf,

@@ -55,7 +55,7 @@ pub enum BadReference {
     )]
     Uneven(f64),
     /// Pixels that see no more of white than of dark.
-    #[error("{:.1} % of the pixels see the white target no brighter than dark: take both references afresh", 100.0 * .0)]
+    #[error("{:.1} % of the pixels see the white target no brighter than dark: take both references again", 100.0 * .0)]
     NotAboveDark(f64),
     /// Frames of different brightness.
     #[error("the light is unsteady: frames differ by {:.1} %; use a lamp that does not flicker and switch automatic exposure off", 100.0 * .0)]

@@ -205,7 +205,7 @@ impl<'a> Keys<'a> {
         let name = self.text(key)?.unwrap_or_default();
         let frame = read(&name).map_err(|problem| self.error(key, at, problem))?;
         if frame.samples().iter().any(|&sample| f32::from(sample) > most) {
-            return Err(self.error(key, at, format!("{name} has counts above {most}, the most of the bit depth")));
+            return Err(self.error(key, at, format!("{name} has counts above {most}, the limit of the bit depth")));
         }
         Ok(Some(Reference::PerPixel(frame)))
     }
@@ -229,7 +229,7 @@ impl<'a> Keys<'a> {
     fn none_left(&self) -> Result<(), CalibrationError> {
         let Some((key, value)) = self.values.first_key_value() else { return Ok(()) };
         let known = "name, unit, version, date, bit_depth, centre_nm, fwhm_nm, dark, white, spectral_correction";
-        Err(self.error(key, value.span().start, format!("is not a key of a calibration; there are: {known}")))
+        Err(self.error(key, value.span().start, format!("is not a key of a calibration; the keys are: {known}")))
     }
 }
 

@@ -53,16 +53,16 @@ pub enum DecodeError {
     #[error("not a PNG, JPEG or TIFF picture (a raw mosaic's name ends in .raw or .bin)")]
     NotAPicture,
     /// A picture of a format that is not read.
-    #[error("{0} pictures are not read; convert it to PNG, JPEG or TIFF")]
+    #[error("cannot read {0} pictures; convert it to PNG, JPEG or TIFF")]
     OtherFormat(&'static str),
     /// The format is right and the contents are not.
     #[error("damaged or cut short: {0}")]
     Damaged(String),
     /// A kind of pixel that is not read.
-    #[error("pixels of this kind ({0}) are not read; convert it to 8 or 16 bit gray or RGB")]
+    #[error("cannot read pixels of this kind ({0}); convert it to 8 or 16 bit gray or RGB")]
     OtherPixels(String),
     /// More pixels or memory than is sensible.
-    #[error("too large: at most {LARGEST_SIDE} pixels a side and {} MiB are read", LARGEST_MEMORY >> 20)]
+    #[error("too large: the limit is {LARGEST_SIDE} pixels per side and {} MiB", LARGEST_MEMORY >> 20)]
     TooLarge,
     /// A mosaic was asked for, and it is colour or 8 bit.
     #[error("a mosaic is a 16-bit gray picture, not {0}")]
@@ -271,7 +271,7 @@ mod tests {
         assert!(matches!(decode(b"", false), Err(DecodeError::Empty)));
         assert!(matches!(decode(b"a text, not a picture", false), Err(DecodeError::NotAPicture)));
         let message = decode(b"GIF89a and so on", false).unwrap_err().to_string();
-        assert!(message.starts_with("gif pictures are not read"), "{message}");
+        assert!(message.starts_with("cannot read gif pictures"), "{message}");
         let floats = DynamicImage::ImageRgb32F(image::ImageBuffer::new(4, 4));
         // Of any reader: 8-bit pictures made of such would be white.
         let floats = encoded(&floats, ImageFormat::Tiff);

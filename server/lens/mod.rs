@@ -138,7 +138,7 @@ pub enum LensError {
     #[error("the lens does not answer: {0}")]
     Gone(String),
     /// It is there, but commands wait to be carried out.
-    #[error("the lens takes no commands: {0}")]
+    #[error("the lens does not accept commands: {0}")]
     Stalled(String),
     /// The device said no.
     #[error("the lens refused: {0}")]

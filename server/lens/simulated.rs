@@ -74,7 +74,7 @@ impl FromStr for SimulatedFault {
     fn from_str(name: &str) -> Result<Self, String> {
         Self::ALL.into_iter().find(|fault| fault.name() == name).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|fault| fault.name()).collect();
-            format!("there is no fault '{name}': choose from {}", names.join(", "))
+            format!("unknown fault '{name}': choose from {}", names.join(", "))
         })
     }
 }
@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn each_failing_fault_says_so_leaves_the_glass_and_heals() {
         for (fault, expected) in [
-            (SimulatedFault::Stalls, "the lens takes no commands"),
+            (SimulatedFault::Stalls, "the lens does not accept commands"),
             (SimulatedFault::Refuses, "the lens refused"),
             (SimulatedFault::Gone, "the lens does not answer"),
         ] {

@@ -35,7 +35,7 @@ fn opened(spec: &str, keep: bool, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>
         None if device == "emulated" => Ok(Box::new(EmulatedLens::open(options, clock)?)),
         Some(("optotune", port)) if !port.is_empty() => Ok(Box::new(OptotuneLens::open(port, options, keep, clock)?)),
         _ => Err(LensError::BadSpec(format!(
-            "there is no lens '{spec}': use 'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"
+            "unknown lens '{spec}': use 'simulated', 'emulated', 'optotune:auto' or 'optotune:/dev/...'"
         ))),
     }
 }

@@ -31,13 +31,13 @@ pub struct PlaneStack {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PlanesError {
     /// Fewer than three.
-    #[error("a focal stack needs at least 3 pictures at rising positions, and has {0}")]
+    #[error("a focal stack needs at least 3 pictures at rising positions, but has {0}")]
     TooFew(usize),
     /// Sizes differ.
     #[error("picture {0} of the focal stack differs in size from the first")]
     SizesDiffer(usize),
     /// Too small to hold a patch and its way.
-    #[error("the focal stack's pictures must have at least 64x64 pixels, and have {0}x{1}")]
+    #[error("the pictures of the focal stack need at least 64x64 pixels, but have {0}x{1}")]
     TooSmall(usize, usize),
 }
 

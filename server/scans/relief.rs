@@ -66,8 +66,8 @@ impl Style {
         least_noise: 0.0,
     };
 
-    /// As hard as photographed stacks are for the hill-climbers: relief that takes most of the range. `docs/results.md` tells how it was
-    /// calibrated.
+    /// As hard for the hill-climbers as photographed stacks: relief that takes most of the range. `docs/notebook.md` says
+    /// how it was calibrated.
     const DEEP: Self = Self {
         flat: 0.0,
         least_relief: 2.0,

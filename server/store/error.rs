@@ -27,9 +27,7 @@ pub enum StoreError {
         version: i64,
     },
     /// The database was made by an older version, and is open for reading only.
-    #[error(
-        "the database is not of this version of parfocal; start `parfocal serve` on it once to bring it up to date"
-    )]
+    #[error("the database is of another version of parfocal; start `parfocal serve` on it once to update it")]
     Outdated,
     /// The folder cannot be used.
     #[error("the data folder {} cannot be used: {reason}", .folder.display())]
@@ -49,9 +47,7 @@ pub enum StoreError {
     #[error("the database cannot be written: the disk or the file is read-only; make it writable and try again")]
     ReadOnly,
     /// The disk failed in another way.
-    #[error(
-        "the disk failed ({0}); see whether it has room and is sound, and try again; what was saved before is safe"
-    )]
+    #[error("the disk failed ({0}); check that it has room and works, and try again; what was saved before is safe")]
     Disk(String),
     /// The file is no database, or damaged.
     #[error("the database is damaged ({0}); keep a copy of the data folder before anything else")]
@@ -59,7 +55,7 @@ pub enum StoreError {
     /// The file cannot be opened.
     #[error(
         "the database cannot be opened; you must be able to write to it and to its folder: change their permissions, or copy the data \
-         folder to where you may write and name that with --data-dir"
+         folder to a place where you can write and name it with --data-dir"
     )]
     Shut,
     /// Another program holds it.

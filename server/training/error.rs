@@ -26,7 +26,7 @@ pub enum TrainError {
     #[error("{0}")]
     Differs(String),
     /// The run folder cannot be written.
-    #[error("cannot write to {}: {source}; choose a folder that can be written, or make this one so", path.display())]
+    #[error("cannot write to {}: {source}; choose a folder that you can write to, or make this one writable", path.display())]
     Folder {
         /// The file or folder.
         path: PathBuf,
@@ -37,7 +37,7 @@ pub enum TrainError {
     #[error(
         "the disk is too full to write {}; make room, then {}",
         path.display(),
-        if *checkpoint { "go on from the last checkpoint with --resume" } else { "begin anew in a new folder" }
+        if *checkpoint { "continue from the last checkpoint with --resume" } else { "start again in a new folder" }
     )]
     Full {
         /// The file.
@@ -54,16 +54,16 @@ pub enum TrainError {
         source: io::Error,
     },
     /// The folder for a new training holds one.
-    #[error("{} holds a training already; go on with it by --resume, or choose another folder", .0.display())]
+    #[error("{} already holds a training; continue it with --resume, or choose another folder", .0.display())]
     Begun(PathBuf),
     /// The folder for a new training holds something else.
     #[error("{} holds other files, or a training that ended before its first checkpoint; choose a new or empty folder", .0.display())]
     Occupied(PathBuf),
     /// Another process trains in the folder.
-    #[error("another training is running in {}; choose another folder, or wait for its end", .0.display())]
+    #[error("another training is running in {}; choose another folder, or wait until it ends", .0.display())]
     Busy(PathBuf),
     /// There is no checkpoint in the folder.
-    #[error("{} holds no checkpoint to go on from; check the folder, or start anew without --resume", .0.display())]
+    #[error("{} has no checkpoint to continue from; check the folder, or start again without --resume", .0.display())]
     NothingToResume(PathBuf),
     /// Weights to begin with, or to run, cannot be used.
     #[error("cannot use the weights {}: {reason}", path.display())]

@@ -21,7 +21,7 @@ pub enum Misfit {
         expected: String,
     },
     /// The text is too long.
-    #[error("the text is {length} bytes long; at most {LONGEST_TEXT} can be kept in one piece, so please split it")]
+    #[error("the text is {length} bytes long; the limit is {LONGEST_TEXT}, so please split it")]
     TooLong {
         /// Length in bytes.
         length: usize,

@@ -11,7 +11,7 @@ pub struct ParticipantCode(String);
 
 /// A text that is no participant's code.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no participant code: use 2 to 16 capital letters, digits and dashes, such as S-01; never a name")]
+#[error("'{0}' is not a participant code: use 2 to 16 capital letters, digits and dashes, such as S-01; never a name")]
 pub struct BadCode(String);
 
 impl ParticipantCode {

@@ -69,7 +69,7 @@ fn what_is_no_focal_stack_is_refused_before_anything_is_written() {
 
     let list = folder.path().join("list.csv");
     fs::write(&list, "name,position\nplane 0.png,0\nplane 1.png,1\n").unwrap();
-    assert!(told(&["--list", text(&list)]).contains("at least 5 pictures at different positions, and here are 2"));
+    assert!(told(&["--list", text(&list)]).contains("at least 5 pictures at different positions, but has 2"));
     fs::write(&list, "plane 0.png,0\nplane 1.png\n").unwrap();
     assert!(told(&["--list", text(&list)]).contains("line 2 must be a file's name, a comma and a position"));
     let shuffled = [6, 0, 7, 1, 8, 2, 9, 3, 10, 4, 11, 5, 12];
@@ -78,5 +78,5 @@ fn what_is_no_focal_stack_is_refused_before_anything_is_written() {
     assert!(told(&["--list", text(&list)]).contains("not in order of focus"));
 
     save(&texture(8, 100), &pictures.join("plane 13.png"));
-    assert!(told(&[]).contains("a stack's pictures are all of one size"));
+    assert!(told(&[]).contains("all pictures of a stack must have one size"));
 }

@@ -77,7 +77,7 @@ impl<'a> Session<'a> {
                 Arrival::Nothing => {}
             }
             if self.device.is_lost() {
-                return "the camera went away: check its power and cable".into();
+                return "the camera is gone: check its power and cable".into();
             }
         }
         "closed".into()

@@ -72,7 +72,7 @@ impl ScanFolder {
             return Err(format!("there is no pose {number} of {}", self.header.poses));
         }
         if self.poses.contains_key(&number) {
-            return Err(format!("pose {number} is there twice"));
+            return Err(format!("pose {number} is listed twice"));
         }
         if let Some(first) = self.poses.values().next().filter(|first| (first.width, first.height) != (width, height)) {
             return Err(format!(
@@ -91,7 +91,7 @@ impl ScanFolder {
         }
         let inside = |file: &str| Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
         match pose.images.iter().find(|image| image.file.is_empty() || !inside(&image.file)) {
-            Some(image) => Err(format!("{:?} is no file in the scan's folder", image.file)),
+            Some(image) => Err(format!("{:?} is not a file in the scan's folder", image.file)),
             None => Ok(()),
         }
     }
@@ -165,7 +165,7 @@ impl ScanFolder {
             let file = image.file.clone();
             match fs::read(self.path.join(&file)) {
                 Ok(content) if hex::encode(Sha256::digest(&content)) == image.sha256 => bytes += content.len() as u64,
-                Ok(_) => damages.push(Damage { file, reason: "its SHA-256 is another one".to_owned() }),
+                Ok(_) => damages.push(Damage { file, reason: "its SHA-256 differs".to_owned() }),
                 Err(error) => damages.push(Damage { file, reason: format!("it cannot be read: {error}") }),
             }
         }
@@ -185,7 +185,7 @@ fn check_header(header: &Header) -> Result<(), String> {
         return Err(format!("it has {poses} poses; a scan has 1 to {MOST_POSES}"));
     }
     if focal_powers.len() < 2 || !focal_powers.is_sorted_by(|a, b| a < b) {
-        return Err("its focal powers must be at least two, and rise".to_owned());
+        return Err("it needs at least two focal powers, in rising order".to_owned());
     }
     Ok(())
 }

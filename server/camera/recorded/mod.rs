@@ -112,7 +112,7 @@ pub struct Image {
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
     /// There is no scan there.
-    #[error("{} is no recorded scan: it has no {HEADER}", .0.display())]
+    #[error("{} is not a recorded scan: it has no {HEADER}", .0.display())]
     NoScan(PathBuf),
     /// A file cannot be read.
     #[error("cannot read {}: {error}", path.display())]
@@ -131,7 +131,7 @@ pub enum ScanError {
         reason: String,
     },
     /// Poses were not recorded yet.
-    #[error("the scan {} is not whole: {} of {of} {} missing; go on recording it with the command that began it",
+    #[error("the scan {} is not complete: {} of {of} {} missing; run the command that began it again to continue",
         path.display(), poses(missing), if missing.len() == 1 { "is" } else { "are" })]
     Missing {
         /// The scan's folder.
@@ -142,7 +142,7 @@ pub enum ScanError {
         of: usize,
     },
     /// A picture is not the one that was stored.
-    #[error("{} is damaged: its SHA-256 is not the one in {POSES}; take it from a copy, or record the scan anew", .0.display())]
+    #[error("{} is damaged: its SHA-256 differs from {POSES}; restore it from a copy, or record the scan again", .0.display())]
     Checksum(PathBuf),
     /// A picture cannot be decoded.
     #[error("{}: {error}", path.display())]
@@ -153,10 +153,10 @@ pub enum ScanError {
         error: DecodeError,
     },
     /// The folder holds something else.
-    #[error("{} is not empty and holds no scan; choose a new folder", .0.display())]
+    #[error("{} is not empty and is not a scan; choose a new folder", .0.display())]
     Occupied(PathBuf),
     /// The folder holds a scan that was begun otherwise.
-    #[error("{} holds another scan ({difference}); give the same arguments to go on with it, or choose a new folder", path.display())]
+    #[error("{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder", path.display())]
     Other {
         /// The folder.
         path: PathBuf,
@@ -167,8 +167,8 @@ pub enum ScanError {
     #[error("another parfocal is recording into {}", .0.display())]
     Busy(PathBuf),
     /// The disk is full.
-    #[error("no space is left on the disk of {}: {kept} poses are whole and kept; free some space and run the same \
-        command again to go on", path.display())]
+    #[error("no space is left on the disk of {}: {kept} poses are saved; free some space and run the same command \
+        again to continue", path.display())]
     Full {
         /// The folder.
         path: PathBuf,

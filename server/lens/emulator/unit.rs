@@ -66,7 +66,7 @@ impl FromStr for Glitch {
     fn from_str(name: &str) -> Result<Self, String> {
         Self::ALL.into_iter().find(|glitch| glitch.name() == name).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|glitch| glitch.name()).collect();
-            format!("there is no glitch '{name}': choose from {}", names.join(", "))
+            format!("unknown glitch '{name}': choose from {}", names.join(", "))
         })
     }
 }
@@ -107,7 +107,7 @@ impl FromStr for Fault {
     fn from_str(name: &str) -> Result<Self, String> {
         Self::ALL.into_iter().find(|fault| fault.name() == name).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|fault| fault.name()).collect();
-            format!("there is no fault '{name}': choose from {}", names.join(", "))
+            format!("unknown fault '{name}': choose from {}", names.join(", "))
         })
     }
 }

@@ -93,7 +93,7 @@ fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
     match link.relax() {
         Err(error @ (LinkError::Stopped | LinkError::Port(_))) => Err(error.into()),
         Err(error) => {
-            tracing::debug!(%error, "the lens was not seen to rest before it was set up");
+            tracing::debug!(%error, "could not confirm that the lens was without current before set-up");
             Ok(())
         }
         Ok(()) => Ok(()),
@@ -129,7 +129,7 @@ fn check_lens(status: Status) -> Result<(), LensError> {
 }
 
 fn confused() -> Trouble {
-    LensError::Refused("it answered another question than was asked".into()).into()
+    LensError::Refused("its reply does not match the request".into()).into()
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "held within the bounds of i16")]

@@ -57,7 +57,7 @@ impl Range {
             return Ok(Self { scale, min, max });
         }
         Err(LensError::Refused(format!(
-            "it can do {:.2} to {:.2} dpt, and none of that was allowed: change min and max",
+            "it reaches {:.2} to {:.2} dpt, all of it outside min and max: change them",
             scale.dioptre(device.min),
             scale.dioptre(device.max)
         )))

@@ -87,7 +87,7 @@ fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>)
     // The line may be well again, and the lens still under current.
     let afresh = Port::open(path).map_err(|error| error.to_string());
     if let Err(error) = afresh.and_then(|port| close(Link::new(port, shared))) {
-        tracing::warn!(error, "the lens was not seen to rest on closing");
+        tracing::warn!(error, "could not confirm that the lens is without current after closing");
     }
 }
 
@@ -222,12 +222,12 @@ fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
     let line = match line_errors {
         0 => String::new(),
         1 => "; 1 error on its line so far".to_owned(),
-        many => format!("; {many} errors on its line so far: if they go on, check its USB cable"),
+        many => format!("; {many} errors on its line so far: if they continue, check its USB cable"),
     };
     let (low, high) = settings.temperatures;
     if status.doubtful() {
         return Arc::from(format!(
-            "follows commands, but at {temperature:.1} °C the focal power cannot be relied on ({}): let the lens get \
+            "follows commands, but at {temperature:.1} °C the focal power is unreliable ({}): let the lens get \
              between {low:.0} and {high:.0} °C{line}",
             status.words().join("; ")
         ));

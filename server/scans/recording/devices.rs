@@ -29,16 +29,16 @@ pub enum Stepper {
 #[derive(Debug, thiserror::Error)]
 pub enum StepperError {
     /// Nobody is there to do it.
-    #[error("nobody confirmed pose {0}: the input has ended; give a --stepper where nobody is to press Enter")]
+    #[error("nobody confirmed pose {0}: the input has ended; use --stepper if nobody can press Enter")]
     Unattended(usize),
     /// It was told to stop.
     #[error("stopped before pose {0}")]
     Stopped(usize),
     /// The command cannot be started.
-    #[error("the stepper's shell cannot be started: {0}")]
+    #[error("cannot start the stepper's shell: {0}")]
     NotStarted(io::Error),
     /// The command says that it did not get there.
-    #[error("the stepper failed at pose {pose} ({status}); once it works, run the same command again to go on")]
+    #[error("the stepper failed at pose {pose} ({status}); once it works, run the same command again to continue")]
     Failed {
         /// The pose it was for.
         pose: usize,

@@ -215,10 +215,10 @@ fn parse(name: &str) -> Option<Result<(usize, FocalPower), String>> {
         return None;
     }
     let (pose, power) = stem.strip_prefix("pose")?.split_once("_f")?;
-    let number = pose.parse::<usize>().map_err(|_| format!("'{pose}' is no number of a pose"));
+    let number = pose.parse::<usize>().map_err(|_| format!("'{pose}' is not the number of a pose"));
     let power = power
         .parse::<f64>()
-        .map_err(|_| format!("'{power}' is no focal power"))
+        .map_err(|_| format!("'{power}' is not a focal power"))
         .and_then(|value| FocalPower::new(value).map_err(|error| error.to_string()));
     Some(number.and_then(|number| power.map(|power| (number, power))))
 }
@@ -235,6 +235,6 @@ mod tests {
         assert_eq!(parsed("notes.txt"), None);
         assert_eq!(parsed("overview.png"), None);
         assert!(parsed("pose1_f1.5.png").unwrap().unwrap_err().contains("from 0 to 1"));
-        assert!(parsed("poseA_f0.5.png").unwrap().unwrap_err().contains("no number"));
+        assert!(parsed("poseA_f0.5.png").unwrap().unwrap_err().contains("is not the number of a pose"));
     }
 }

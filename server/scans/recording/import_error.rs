@@ -57,7 +57,7 @@ pub enum ImportError {
     #[error("a scan needs at least two focal powers; every picture is at {0:.3}")]
     OnePower(f64),
     /// Pictures of different sizes.
-    #[error("{} is {}x{} pixels, but {} is {}x{}; a scan's pictures are all of one size",
+    #[error("{} is {}x{} pixels, but {} is {}x{}; all pictures of a scan must have one size",
         other.display(), other_size.0, other_size.1, first.display(), size.0, size.1)]
     Sizes {
         /// The first picture.

@@ -54,7 +54,7 @@ pub enum RecordError {
     #[error(transparent)]
     Lens(#[from] LensError),
     /// The lens is not where it was sent.
-    #[error("the lens was sent to focal power {asked:.3} and stands at {reached:.3}; see `parfocal lens info`")]
+    #[error("the lens was sent to focal power {asked:.3} but is at {reached:.3}; see `parfocal lens info`")]
     Astray {
         /// Where it was sent.
         asked: f64,

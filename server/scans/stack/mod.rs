@@ -72,11 +72,11 @@ pub enum StackError {
     },
     /// Too few pictures.
     #[error(
-        "a focal stack needs at least {LEAST_PLANES} pictures at different positions, and here are {0}; take more between them"
+        "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {0}; take more between them"
     )]
     TooFew(usize),
     /// Pictures of different sizes.
-    #[error("{other} is {}x{} pixels, but {first} is {}x{}; a stack's pictures are all of one size", sizes[1].0, sizes[1].1, sizes[0].0, sizes[0].1)]
+    #[error("{other} is {}x{} pixels, but {first} is {}x{}; all pictures of a stack must have one size", sizes[1].0, sizes[1].1, sizes[0].0, sizes[0].1)]
     Sizes {
         /// The first picture.
         first: String,
@@ -371,7 +371,7 @@ mod tests {
     fn pictures_that_are_no_stack_are_refused() {
         let told = |planes: Vec<Plane>| FocalStack::new(planes).unwrap_err().to_string();
         let five = || (0..5).map(|i| plane(f64::from(i), 0.0)).collect::<Vec<_>>();
-        assert!(told(five()[..2].to_vec()).contains("at least 5 pictures at different positions, and here are 2"));
+        assert!(told(five()[..2].to_vec()).contains("at least 5 pictures at different positions, but has 2"));
         assert!(told([five(), vec![plane(2.0, 0.0)]].concat()).contains("both at position 2"));
         let other = Plane { picture: GrayImage { width: 1, height: 4, data: vec![0.0; 4] }, ..plane(9.0, 0.0) };
         assert!(told([five(), vec![other]].concat()).contains("9.png is 1x4 pixels, but 4.png is 2x2"));

@@ -54,7 +54,7 @@ pub enum ExportError {
     #[error("session {0} has not been unblinded: unblind it on the researcher's page first, or export it blinded")]
     StillBlinded(SessionId),
     /// The folder to write holds something.
-    #[error("{} is there already and not empty; name a new folder", .0.display())]
+    #[error("{} exists and is not empty; choose a new folder", .0.display())]
     Exists(PathBuf),
     /// A file could not be written.
     #[error("cannot write {}: {error}", .path.display())]

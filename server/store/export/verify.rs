@@ -93,7 +93,7 @@ fn columns(folder: &Path) -> Outcome {
             let row = row.map_err(|error| format!("{file}: {error}"))?;
             let mut cells = table.columns_of(format).zip(&row);
             if let Some((column, cell)) = cells.find(|(column, cell)| !column.kind.accepts(cell)) {
-                return Err(format!("{file}, row {line}: '{cell}' is no {}", column.name));
+                return Err(format!("{file}, row {line}: '{cell}' is not a valid {}", column.name));
             }
             rows += 1;
         }
@@ -123,7 +123,7 @@ fn said(folder: &Path) -> Outcome {
     let (comments, answers) = (numbered(folder, "comments.csv")?, numbered(folder, "answers.csv")?);
     let told = session_cell(folder, "comments")?;
     if told != comments.to_string() {
-        return Err(format!("comments.csv holds {comments} comments, and sessions.csv tells of {told}"));
+        return Err(format!("comments.csv holds {comments} comments, but sessions.csv counts {told}"));
     }
     if format(folder)? >= 2 {
         counting(folder)?;
@@ -140,7 +140,7 @@ fn counting(folder: &Path) -> Result<(), String> {
     for place in (0..counts.len()).filter(|&place| counts[place] == "true") {
         let number = place + 1;
         if late[place] == "true" {
-            return Err(format!("answers.csv: answer {number} counts though it is late"));
+            return Err(format!("answers.csv: answer {number} counts although it is late"));
         }
         if !counted.insert((&segments[place], &questions[place])) {
             return Err(format!("answers.csv: answer {number} is the second to its question that counts"));
@@ -173,7 +173,7 @@ fn copies(folder: &Path) -> Outcome {
     let format = format(folder)?;
     for table in [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES] {
         let file = table.file();
-        let differs = || format!("session.json and {file} tell different things");
+        let differs = || format!("session.json and {file} disagree");
         let objects = session[table.name].as_array().ok_or_else(differs)?;
         let mut reader = csv(folder, &file)?;
         let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(|error| format!("{file}: {error}"))?;
@@ -186,7 +186,7 @@ fn copies(folder: &Path) -> Outcome {
             return Err(differs());
         }
     }
-    Ok(Verdict::Passed("session.json tells the same as the tables".to_owned()))
+    Ok(Verdict::Passed("session.json and the tables agree".to_owned()))
 }
 
 fn references(folder: &Path) -> Outcome {
@@ -211,9 +211,9 @@ fn protocol(folder: &Path) -> Outcome {
     let found = hex::encode(Sha256::digest(text(folder, "protocol.toml")?));
     let expected = session_cell(folder, "protocol_sha256")?;
     if found == expected {
-        Ok(Verdict::Passed("protocol.toml is the one that the session was made by".to_owned()))
+        Ok(Verdict::Passed("protocol.toml is the one that the session was made with".to_owned()))
     } else {
-        Err("protocol.toml is not the one that the session was made by".to_owned())
+        Err("protocol.toml is not the one that the session was made with".to_owned())
     }
 }
 

@@ -31,21 +31,21 @@ fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
         .map_err(|error| format!("allocation.json: {error}"))?;
     for column in ["session", "setting", "segment"] {
         if cells(folder, "allocation.csv", column)? != cells(folder, "segments.csv", column)? {
-            return Err(format!("allocation.csv and segments.csv tell different {column}s"));
+            return Err(format!("allocation.csv and segments.csv have different {column}s"));
         }
     }
     let listed = cells(folder, "allocation.csv", "policy")?;
     if !listed.iter().map(String::as_str).eq(told.schedule.iter().map(PolicyName::as_str)) {
-        return Err("allocation.csv and allocation.json tell different orders".to_owned());
+        return Err("allocation.csv and allocation.json have different orders".to_owned());
     }
     for (column, told) in [("session", told.session.to_string()), ("algorithm", told.algorithm.to_string())] {
         if session_cell(folder, column)? != told {
-            return Err(format!("allocation.json and sessions.csv tell different {column}s"));
+            return Err(format!("allocation.json and sessions.csv have different {column}s"));
         }
     }
     let Some(seed) = told.seed else {
         if told.algorithm.order() != Order::Balanced {
-            return Err("allocation.json withholds the seed, which is done within a balanced set alone".to_owned());
+            return Err("allocation.json withholds the seed, which is right only within a balanced set".to_owned());
         }
         let why = "the seed is withheld while other sessions of its balanced set are blinded";
         return Ok(Err(Verdict::NotChecked(why.to_owned())));

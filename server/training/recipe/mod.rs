@@ -100,7 +100,7 @@ impl Recipe {
     pub fn design(&self) -> Result<Design, TrainError> {
         let unknown = || {
             TrainError::Recipe(format!(
-                "'{}' is no learned policy; there are mgm-learned, mlr-learned, cnn-learned and parfocal",
+                "'{}' is not a learned policy; those are mgm-learned, mlr-learned, cnn-learned and parfocal",
                 self.policy
             ))
         };

@@ -31,7 +31,7 @@ pub enum CheckpointError {
         source: io::Error,
     },
     /// The content is damaged or of another program.
-    #[error("the checkpoint {} is damaged: {reason}; start anew in another folder", path.display())]
+    #[error("the checkpoint {} is damaged: {reason}; start again in another folder", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -200,7 +200,7 @@ impl Checkpoint<'static> {
         file.read_exact(&mut length).map_err(cut)?;
         let length = u64::from_le_bytes(length);
         if length > MAX_HEADER.min(size) {
-            return Err(damaged("it is no safetensors file".to_owned()));
+            return Err(damaged("it is not a safetensors file".to_owned()));
         }
         let mut header = Vec::new();
         file.by_ref().take(length).read_to_end(&mut header).map_err(failed)?;

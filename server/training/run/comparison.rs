@@ -67,13 +67,13 @@ pub struct TrainedRun {
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// It holds no training.
-    #[error("{} holds no training that was saved; name run folders of `parfocal train`", .0.display())]
+    #[error("{} holds no saved training; give run folders of `parfocal train`", .0.display())]
     NoRun(PathBuf),
     /// Its checkpoint cannot be read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// Its figures on the benchmark cannot be read.
-    #[error("cannot read {}: {reason}; `parfocal train --resume` makes it anew once the file is gone", path.display())]
+    #[error("cannot read {}: {reason}; delete it, then `parfocal train --resume` makes it again", path.display())]
     Benchmark {
         /// The file.
         path: PathBuf,

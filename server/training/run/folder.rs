@@ -111,7 +111,7 @@ mod tests {
         run.save(&Checkpoint::default()).unwrap();
         assert!(RunFolder::go_on(&path).unwrap_err().to_string().contains("another training is running in"));
         drop(run);
-        assert!(RunFolder::begin(&path).unwrap_err().to_string().contains("holds a training already"));
+        assert!(RunFolder::begin(&path).unwrap_err().to_string().contains("already holds a training"));
         let half = path.join(".checkpoint.safetensors.partial");
         fs::write(&half, "half").unwrap();
         RunFolder::go_on(&path).unwrap();
@@ -124,7 +124,7 @@ mod tests {
         fs::write(folder.path().join("MODEL_CARD.md"), "mine").unwrap();
         assert!(RunFolder::begin(folder.path()).unwrap_err().to_string().contains("holds other files"));
         assert_eq!(folder.path().read_dir().unwrap().count(), 1);
-        assert!(RunFolder::go_on(folder.path()).unwrap_err().to_string().contains("no checkpoint to go on from"));
+        assert!(RunFolder::go_on(folder.path()).unwrap_err().to_string().contains("no checkpoint to continue from"));
         // Nor does an empty folder that a training was refused for its footage in stand in anyone's way.
         fs::remove_file(folder.path().join("MODEL_CARD.md")).unwrap();
         drop(RunFolder::begin(folder.path()).unwrap());
@@ -137,10 +137,10 @@ mod tests {
         let told = |path: &Path| TrainError::writing(path, io::ErrorKind::StorageFull.into()).to_string();
         let file = folder.path().join("curves.csv");
         let error = told(&file);
-        assert!(error.contains("curves.csv") && error.contains("make room, then begin anew"), "{error}");
+        assert!(error.contains("curves.csv") && error.contains("make room, then start again"), "{error}");
         fs::write(folder.path().join(CHECKPOINT), "").unwrap();
         for path in [&file, folder.path()] {
-            assert!(told(path).contains("make room, then go on from the last checkpoint with --resume"));
+            assert!(told(path).contains("make room, then continue from the last checkpoint with --resume"));
         }
     }
 }

@@ -57,7 +57,9 @@ impl Material {
         let differs = |text: String| Err(TrainError::Differs(text));
         let Some(known) = checkpoint.notes.get(FOOTAGE) else {
             if !asked.is_empty() {
-                return differs("this training was begun on drawn pictures; leave out --footage to go on".to_owned());
+                return differs(
+                    "this training was begun on drawn pictures; leave out --footage to continue".to_owned(),
+                );
             }
             return Self::open(&[], pictures);
         };
@@ -67,7 +69,7 @@ impl Material {
         let gone = asked.is_empty() && known.iter().any(|path| !path.exists());
         let material = Self::open(from, pictures).map_err(|error| match error {
             TrainError::Footage(error) if gone => {
-                let advice = "give --footage with the place where it lies now";
+                let advice = "give its new path with --footage";
                 TrainError::Differs(format!("the footage that this training was begun on is gone: {error}; {advice}"))
             }
             error => error,
@@ -75,12 +77,12 @@ impl Material {
         match &material.footage {
             Some((_, sum)) if checkpoint.notes.get(SHA256) == Some(sum) => Ok(material),
             _ if asked.is_empty() => differs(format!(
-                "the footage that this training was begun on ({names}) has changed since; give --footage with a place where it \
-                 lies as it was, or start anew in another folder"
+                "the footage that this training was begun on ({names}) has changed; give the path of the unchanged \
+                 footage with --footage, or start again in another folder"
             )),
             _ => differs(format!(
-                "this training was begun on other footage: {names}; leave out --footage, or give what has the same pictures in \
-                 the same order"
+                "this training was begun on other footage: {names}; leave out --footage, or give the same pictures in the \
+                 same order"
             )),
         }
     }

@@ -30,13 +30,13 @@ impl Asked {
             let same_policy = ships.as_ref().is_some_and(|ships| ships.policy == *made);
             if !same_policy {
                 return differs(format!(
-                    "{folder} holds a training of {made}, not of {}; name {made} to go on",
+                    "{folder} holds a training of {made}, not of {}; name {made} to continue",
                     self.name
                 ));
             }
             if ships.map(|ships| ships.with_updates(recipe.updates())).as_ref() != Some(recipe) {
                 return differs(format!(
-                    "{folder} holds a training of {made} by another recipe than {}; name {made} to go on",
+                    "{folder} holds a training of {made} by another recipe than {}; name {made} to continue",
                     self.name
                 ));
             }
@@ -47,14 +47,14 @@ impl Asked {
         }
         if let Some((key, was, is)) = recipe.difference(&wanted) {
             return differs(format!(
-                "the training in {folder} was begun with {key} = {was}, not {is}; leave out --config and --updates to go on \
-                 as it was begun, or start anew in another folder"
+                "the training in {folder} was begun with {key} = {was}, not {is}; leave out --config and --updates to \
+                 continue, or start again in another folder"
             ));
         }
         match self.seed {
             Some(other) if other != seed => differs(format!(
-                "the training in {folder} was begun with seed {seed}, not {other}; leave out --seed to go on, or start anew in \
-                 another folder"
+                "the training in {folder} was begun with seed {seed}, not {other}; leave out --seed to continue, or start \
+                 again in another folder"
             )),
             _ => Ok(()),
         }

@@ -126,7 +126,7 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
 
 fn check_order(file: &File, settings: usize) -> Result<(), Fault> {
     if settings > MOST_SETTINGS {
-        let message = format!("{settings} segments in all are too many; at most {MOST_SETTINGS}");
+        let message = format!("{settings} segments are too many; the limit is {MOST_SETTINGS}");
         return Err(Fault::new(file.repeats.span(), "repeats", message));
     }
     if *file.order.get_ref() != Order::Balanced {
@@ -187,7 +187,7 @@ impl Reader<'_> {
                 return Err(Fault::new(policy.span(), "policies", message));
             }
             if names.contains(name) {
-                return Err(Fault::new(policy.span(), "policies", format!("'{name}' stands twice; use 'repeats'")));
+                return Err(Fault::new(policy.span(), "policies", format!("'{name}' is listed twice; use 'repeats'")));
             }
             names.push(name.clone());
         }
@@ -244,7 +244,7 @@ impl Reader<'_> {
                 identifier(&question.id, "id")?;
                 let id = question.id.get_ref().clone();
                 if !ids.insert(id.clone()) {
-                    return Err(Fault::new(question.id.span(), "id", format!("'{id}' stands twice")));
+                    return Err(Fault::new(question.id.span(), "id", format!("'{id}' is used twice")));
                 }
                 let kind = self.kind(question, closing)?;
                 Ok(Question { id, text: self.shown(&question.text, "text")?, kind, optional: question.optional })

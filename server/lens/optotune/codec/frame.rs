@@ -29,16 +29,16 @@ pub enum WireError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DeviceError {
     /// Error 1, or `N` from old firmware.
-    #[error("the driver says that a command reached it damaged")]
+    #[error("the driver received a damaged command")]
     Checksum,
     /// Error 2.
-    #[error("the driver says that its firmware does not have this command: update it")]
+    #[error("the driver's firmware does not have this command: update it")]
     NotInFirmware,
     /// Error 3.
-    #[error("the driver says that it does not know this command")]
+    #[error("the driver does not know this command")]
     Unknown,
     /// Error 4.
-    #[error("the driver says that the lens does not fit: plug a compatible lens in")]
+    #[error("the lens does not fit the driver: plug in a compatible lens")]
     LensIncompatible,
     /// Any other.
     #[error("the driver reports error {0}")]
