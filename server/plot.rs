@@ -1,79 +1,164 @@
-//! Plots as SVG: lines over frames or poses.
+//! Plots as SVG: panels one below another, each with lines and dots over one axis, and a key of their names below.
 
 use std::fmt::Write as _;
 
 /// Width of a plot.
 const WIDTH: f64 = 900.0;
-/// Height of a panel.
-pub const PANEL: f64 = 230.0;
-/// Where panels begin, rightwards.
+/// Left end of panels and keys: room for the numbers of the upright axis.
 const LEFT: f64 = 55.0;
-
-/// Rightmost end of panels and keys.
+/// Right end of panels and keys.
 const RIGHT: f64 = WIDTH - 15.0;
+/// Height of a panel.
+const PANEL: f64 = 230.0;
+/// From one panel to the next: room for the words above a panel and below it.
+const GAP: f64 = 50.0;
 /// Height of a row of keys.
 const ROW: f64 = 18.0;
+/// Longest name in the key, in characters; a longer one loses its beginning.
+const LONGEST_NAME: usize = 80;
 
-/// A frame with its top at `top`, for values of `label` from 0 to `most` over `across`.
-pub fn panel(svg: &mut String, top: f64, label: &str, most: f64, across: &str) {
-    let (right, bottom) = (RIGHT, top + PANEL);
-    let _ = writeln!(
-        svg,
-        "<rect x=\"{LEFT}\" y=\"{top}\" width=\"{}\" height=\"{PANEL}\" fill=\"none\" stroke=\"#cccccc\"/>\
-         <text x=\"{LEFT}\" y=\"{}\">{label}</text><text x=\"{}\" y=\"{}\" text-anchor=\"end\">{most}</text>\
-         <text x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">0</text>\
-         <text x=\"{right}\" y=\"{}\" text-anchor=\"end\">{across}</text>",
-        right - LEFT,
-        top - 5.0,
-        LEFT - 5.0,
-        top + 10.0,
-        LEFT - 5.0,
-        bottom + 14.0,
-    );
+/// One direction of a panel.
+#[derive(Debug, Clone, Copy)]
+pub struct Axis<'a> {
+    /// What is along it, with its unit.
+    pub label: &'a str,
+    /// Value at its beginning: left, or below.
+    pub from: f64,
+    /// Value at its end: right, or above.
+    pub to: f64,
 }
 
-/// A line through `values` in the panel whose top is at `top`.
-#[allow(clippy::cast_precision_loss, reason = "frame numbers are small")]
-pub fn line(svg: &mut String, values: &[f64], top: f64, most: f64, colour: &str, name: &str) {
-    let step = (RIGHT - LEFT) / (values.len().max(2) - 1) as f64;
-    let mut points = String::new();
-    for (index, value) in values.iter().enumerate() {
-        let y = top + PANEL * (1.0 - (value / most).clamp(0.0, 1.0));
-        let _ = write!(points, "{:.1},{y:.1} ", LEFT + step * index as f64);
+impl Axis<'_> {
+    /// How far along the axis `value` lies: 0 at its beginning, 1 at its end.
+    fn share(&self, value: f64) -> f64 {
+        let length = self.to - self.from;
+        if length == 0.0 { 0.0 } else { ((value - self.from) / length).clamp(0.0, 1.0) }
     }
-    let _ = writeln!(
-        svg,
-        "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\">\
-         <title>{}</title></polyline>",
-        escaped(name),
-    );
 }
 
-/// The whole plot of what `panels` holds down to `bottom`, with a key below for each name and colour.
-#[must_use]
-pub fn finished<'a>(panels: &str, bottom: f64, entries: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
-    let (mut keys, mut x, mut y) = (String::new(), LEFT, bottom + ROW);
-    for (name, colour) in entries {
-        let name = shortened(name);
-        let width = key_width(&name);
-        if x + width > RIGHT && x > LEFT {
-            (x, y) = (LEFT, y + ROW);
-        }
+/// A plot that is being drawn.
+#[derive(Debug, Default)]
+pub struct Plot {
+    panels: usize,
+    body: String,
+    /// Name and colour of each series, in the order in which they came.
+    keys: Vec<(String, String)>,
+}
+
+/// A panel of a [`Plot`].
+pub struct Panel<'a> {
+    plot: &'a mut Plot,
+    across: Axis<'a>,
+    up: Axis<'a>,
+    top: f64,
+}
+
+impl Plot {
+    /// Begins a panel below those that are there.
+    #[allow(clippy::cast_precision_loss, reason = "a handful of panels")]
+    pub fn panel<'a>(&'a mut self, across: Axis<'a>, up: Axis<'a>) -> Panel<'a> {
+        let top = 20.0 + self.panels as f64 * (PANEL + GAP);
+        self.panels += 1;
+
+        let bottom = top + PANEL;
+        let width = RIGHT - LEFT;
         let _ = writeln!(
-            keys,
-            "<rect x=\"{x:.1}\" y=\"{}\" width=\"12\" height=\"4\" fill=\"{colour}\"/>\
-             <text x=\"{:.1}\" y=\"{y}\">{}</text>",
-            y - 6.0,
-            x + 16.0,
-            escaped(&name),
+            self.body,
+            "<rect x=\"{LEFT}\" y=\"{top}\" width=\"{width}\" height=\"{PANEL}\" fill=\"none\" stroke=\"#cccccc\"/>"
         );
-        x += width;
+        self.text(LEFT, top - 5.0, "start", up.label);
+        self.text(LEFT - 5.0, top + 10.0, "end", &up.to.to_string());
+        self.text(LEFT - 5.0, bottom, "end", &up.from.to_string());
+        self.text(LEFT, bottom + 14.0, "start", &across.from.to_string());
+        self.text(f64::midpoint(LEFT, RIGHT), bottom + 14.0, "middle", across.label);
+        self.text(RIGHT, bottom + 14.0, "end", &across.to.to_string());
+        Panel { plot: self, across, up, top }
     }
-    let height = y + 12.0;
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" \
-         font-size=\"12\"><rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{panels}{keys}</svg>\n"
-    )
+
+    /// The whole plot as an SVG document.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "a handful of panels")]
+    pub fn svg(mut self) -> String {
+        let mut x = LEFT;
+        let mut y = 20.0 + self.panels as f64 * (PANEL + GAP) + ROW - 10.0;
+        for (name, colour) in std::mem::take(&mut self.keys) {
+            let width = key_width(&name);
+            if x + width > RIGHT && x > LEFT {
+                x = LEFT;
+                y += ROW;
+            }
+            let swatch = y - 6.0;
+            let _ =
+                writeln!(self.body, "<rect x=\"{x:.1}\" y=\"{swatch}\" width=\"12\" height=\"4\" fill=\"{colour}\"/>");
+            self.text(x + 16.0, y, "start", &name);
+            x += width;
+        }
+
+        let height = y + 12.0;
+        let body = self.body;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" \
+             font-size=\"12\"><rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{body}</svg>\n"
+        )
+    }
+
+    fn text(&mut self, x: f64, y: f64, anchor: &str, text: &str) {
+        let text = escaped(text);
+        let _ = writeln!(self.body, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>");
+    }
+
+    /// Puts `name` into the key, once.
+    fn key(&mut self, name: &str, colour: &str) {
+        let key = (shortened(name), colour.to_owned());
+        if !self.keys.contains(&key) {
+            self.keys.push(key);
+        }
+    }
+}
+
+impl Panel<'_> {
+    /// A line through `points` (across, up), with its name in the key.
+    pub fn line(&mut self, name: &str, colour: &str, points: impl IntoIterator<Item = (f64, f64)>) {
+        let mut places = String::new();
+        for (x, y) in points.into_iter().map(|point| self.place(point)) {
+            let _ = write!(places, "{x:.1},{y:.1} ");
+        }
+        let title = escaped(name);
+        let _ = writeln!(
+            self.plot.body,
+            "<polyline points=\"{places}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\">\
+             <title>{title}</title></polyline>"
+        );
+        self.plot.key(name, colour);
+    }
+
+    /// A line through `values`, one at each whole number across, from the axis's beginning on.
+    #[allow(clippy::cast_precision_loss, reason = "frame numbers are small")]
+    pub fn values(&mut self, name: &str, colour: &str, values: &[f64]) {
+        let from = self.across.from;
+        self.line(name, colour, values.iter().enumerate().map(|(index, &value)| (from + index as f64, value)));
+    }
+
+    /// A dot at each of `points` (across, up), with their name in the key. Those outside the panel are left out.
+    pub fn dots(&mut self, name: &str, colour: &str, points: impl IntoIterator<Item = (f64, f64)>) {
+        let within = |axis: &Axis<'_>, value: f64| (axis.from..=axis.to).contains(&value);
+        let _ = writeln!(self.plot.body, "<g fill=\"{colour}\" fill-opacity=\"0.6\">");
+        for point in points {
+            if within(&self.across, point.0) && within(&self.up, point.1) {
+                let (x, y) = self.place(point);
+                let _ = writeln!(self.plot.body, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\"/>");
+            }
+        }
+        self.plot.body.push_str("</g>\n");
+        self.plot.key(name, colour);
+    }
+
+    /// Where a point lies on the picture; one outside the panel lies on its edge.
+    fn place(&self, (across, up): (f64, f64)) -> (f64, f64) {
+        let x = LEFT + self.across.share(across) * (RIGHT - LEFT);
+        let y = self.top + (1.0 - self.up.share(up)) * PANEL;
+        (x, y)
+    }
 }
 
 /// Room for a key: swatch, gaps, and 7.5 a character, wider than sans-serif letters of 12 are on average.
@@ -84,8 +169,7 @@ fn key_width(name: &str) -> f64 {
 
 /// The end of a name that is too long for a row, as of a file deep in folders.
 fn shortened(name: &str) -> String {
-    const MOST: usize = 80;
-    let extra = name.chars().count().saturating_sub(MOST);
+    let extra = name.chars().count().saturating_sub(LONGEST_NAME);
     if extra == 0 { name.to_owned() } else { format!("…{}", name.chars().skip(extra).collect::<String>()) }
 }
 
@@ -94,37 +178,38 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// Focal powers over poses: a line for each name and colour.
-#[must_use]
-pub fn over_poses(lines: &[(&str, &str, &[f64])]) -> String {
-    let mut panels = String::new();
-    panel(&mut panels, 20.0, "focal power", 1.0, "pose");
-    for (name, colour, values) in lines {
-        line(&mut panels, values, 20.0, 1.0, colour, name);
-    }
-    finished(&panels, PANEL + 40.0, lines.iter().map(|(name, colour, _)| (*name, *colour)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const UNIT: Axis<'static> = Axis { label: "", from: 0.0, to: 1.0 };
+
     /// Where each key stands: left end, base line, name.
     fn keys(svg: &str) -> Vec<(f64, f64, String)> {
-        let keys = svg.lines().filter(|line| line.starts_with("<rect x=") && line.contains("height=\"4\""));
-        keys.map(|line| {
-            let (x, rest) = line.split_once("<text x=\"").unwrap().1.split_once("\" y=\"").unwrap();
-            let (y, rest) = rest.split_once("\">").unwrap();
-            (x.parse().unwrap(), y.parse().unwrap(), rest.strip_suffix("</text>").unwrap().to_owned())
-        })
-        .collect()
+        let lines: Vec<&str> = svg.lines().collect();
+        let swatches = lines.windows(2).filter(|pair| pair[0].contains("height=\"4\""));
+        let number = |line: &str, name: &str| -> f64 {
+            let rest = line.split_once(&format!(" {name}=\"")).unwrap().1;
+            rest.split_once('"').unwrap().0.parse().unwrap()
+        };
+        swatches
+            .map(|pair| {
+                let name = pair[1].split_once('>').unwrap().1.strip_suffix("</text>").unwrap();
+                (number(pair[0], "x"), number(pair[1], "y"), name.to_owned())
+            })
+            .collect()
     }
 
     #[test]
-    fn keys_go_on_in_the_next_row_and_stay_within_the_picture() {
+    fn keys_continue_in_the_next_row_and_stay_within_the_picture() {
         let names = ["fixed", "mgm-hill-climber", "mlr-hill-climber", "mgm-learned", "mlr-learned", "cnn-learned"];
-        let names = names.into_iter().chain(["parfocal", "file:my.pt", "optimum"]);
-        let svg = finished("", 300.0, names.map(|name| (name, "black")));
+        let mut plot = Plot::default();
+        let mut panel = plot.panel(UNIT, UNIT);
+        for name in names.into_iter().chain(["parfocal", "file:my.pt", "optimum"]) {
+            panel.values(name, "black", &[0.5]);
+        }
+        let svg = plot.svg();
+
         let keys = keys(&svg);
         assert_eq!(keys.len(), 9);
         for (key, next) in keys.iter().zip(&keys[1..]) {
@@ -133,14 +218,30 @@ mod tests {
             assert!(end <= WIDTH && (next.1 > key.1 || end < next.0 - 16.0), "{key:?} {next:?}");
         }
         let last = keys.last().unwrap();
-        assert!(last.1 > 318.0 && svg.contains(&format!("0 0 900 {}", last.1 + 12.0)), "{svg}");
+        assert!(last.1 > 270.0 && svg.contains(&format!("0 0 900 {}", last.1 + 12.0)), "{svg}");
     }
 
     #[test]
     fn names_are_escaped_and_long_ones_lose_their_beginning() {
         let name = format!("file:{}/a&b<c>.pt", "x".repeat(200));
-        let svg = over_poses(&[(&name, "black", &[0.5])]);
+        let mut plot = Plot::default();
+        plot.panel(UNIT, UNIT).values(&name, "black", &[0.5]);
+        let svg = plot.svg();
         assert!(svg.contains("<title>file:xxx") && svg.contains("/a&amp;b&lt;c&gt;.pt</title>"), "{svg}");
         assert!(keys(&svg)[0].2.starts_with("…xxx"), "{svg}");
+    }
+
+    #[test]
+    fn a_point_lies_where_its_axes_say() {
+        let mut plot = Plot::default();
+        let across = Axis { label: "ms", from: 0.0, to: 40.0 };
+        let up = Axis { label: "share", from: -1.0, to: 1.0 };
+        let mut panel = plot.panel(across, up);
+        panel.dots("seen", "red", [(10.0, 0.0), (50.0, 0.0), (20.0, 2.0)]);
+        let svg = plot.svg();
+
+        // A quarter of the way from 55 to 885, and half way down from 20 to 250; the others lie outside.
+        assert!(svg.contains("<circle cx=\"262.5\" cy=\"135.0\""), "{svg}");
+        assert_eq!(svg.matches("<circle").count(), 1);
     }
 }

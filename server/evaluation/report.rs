@@ -12,7 +12,7 @@ use super::statistics::Method;
 use super::{Comparison, ORACLE, Outcome, Row};
 use crate::autofocus::{IN_FOCUS, PolicyName};
 use crate::files::replace;
-use crate::plot::{PANEL, finished, line, panel};
+use crate::plot::{Axis, Plot};
 use crate::scans::detail::warning;
 use crate::scans::recorded::Between;
 
@@ -253,25 +253,32 @@ const COLOURS: [&str; 8] = ["#999999", "#0072b2", "#56b4e9", "#009e73", "#e69f00
 
 /// Focal path (above) and error (below; moving average of 5 frames) of each policy on scan `index`, the optimum in black.
 #[must_use]
+#[allow(clippy::cast_precision_loss, reason = "counts of frames are small")]
 pub fn figure(outcomes: &[Outcome], index: usize) -> String {
     let policies: Vec<(&str, &Path)> = outcomes
         .iter()
         .filter(|outcome| outcome.policy != ORACLE)
         .filter_map(|outcome| Some((outcome.policy.as_str(), outcome.paths.get(index)?)))
         .collect();
-    let mut svg = String::new();
-    panel(&mut svg, 20.0, "focal power", 1.0, "frame");
-    panel(&mut svg, PANEL + 50.0, "focal error", 0.5, "frame");
-    for (colour, (name, path)) in COLOURS.iter().cycle().zip(&policies) {
-        line(&mut svg, &path.focal_power, 20.0, 1.0, colour, name);
-        line(&mut svg, &moving_average(&path.errors().collect::<Vec<_>>()), PANEL + 50.0, 0.5, colour, name);
+    let frames = policies.first().map_or(0, |(_, path)| path.optimum.len());
+    let across = Axis { label: "frame", from: 1.0, to: frames.max(1) as f64 };
+    let coloured = || COLOURS.iter().cycle().zip(&policies);
+    let mut plot = Plot::default();
+
+    let mut panel = plot.panel(across, Axis { label: "focal power", from: 0.0, to: 1.0 });
+    for (colour, (name, path)) in coloured() {
+        panel.values(name, colour, &path.focal_power);
     }
     if let Some((_, path)) = policies.first() {
-        line(&mut svg, &path.optimum, 20.0, 1.0, "black", "optimum");
-        line(&mut svg, &vec![IN_FOCUS; path.optimum.len()], PANEL + 50.0, 0.5, "#bbbbbb", "in focus");
+        panel.values("optimum", "black", &path.optimum);
     }
-    let names = policies.iter().map(|policy| policy.0);
-    finished(&svg, 2.0 * PANEL + 80.0, names.zip(COLOURS.into_iter().cycle()).chain([("optimum", "black")]))
+
+    let mut panel = plot.panel(across, Axis { label: "focal error", from: 0.0, to: 0.5 });
+    for (colour, (name, path)) in coloured() {
+        panel.values(name, colour, &moving_average(&path.errors().collect::<Vec<_>>()));
+    }
+    panel.values("limit of in focus", "#bbbbbb", &vec![IN_FOCUS; frames]);
+    plot.svg()
 }
 
 /// Mean of up to five values around each.

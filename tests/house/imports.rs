@@ -25,12 +25,12 @@ pub struct Import {
 
 impl Import {
     /// The room that uses.
-    pub fn from_room(&self) -> &str {
+    pub fn user_room(&self) -> &str {
         room(&self.from)
     }
 
     /// The room that is used.
-    pub fn to_room(&self) -> &str {
+    pub fn used_room(&self) -> &str {
         room(&self.to)
     }
 }
@@ -97,7 +97,9 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if path.is_dir() {
             found.extend(sources(&path));
-        } else if name.ends_with(".rs") && !["lib.rs", "main.rs", "tests.rs"].contains(&&*name) {
+        } else if path.extension().is_some_and(|extension| extension == "rs")
+            && !["lib.rs", "main.rs", "tests.rs"].contains(&&*name)
+        {
             found.push(path);
         }
     }

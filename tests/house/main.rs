@@ -44,7 +44,7 @@ fn a_room_uses_only_rooms_of_lower_floors() {
     let tree = SourceTree::read(root());
 
     let is_upward = |import: &&Import| {
-        let (from, to) = (import.from_room(), import.to_room());
+        let (from, to) = (import.user_room(), import.used_room());
         from != to && floors[to] >= floors[from]
     };
     let upward: Vec<String> = tree.imports.iter().filter(is_upward).map(ToString::to_string).collect();
@@ -56,7 +56,7 @@ fn a_room_uses_only_rooms_of_lower_floors() {
 fn no_files_of_a_room_use_one_another_in_a_circle() {
     let tree = SourceTree::read(root());
     let mut graph: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-    for import in tree.imports.iter().filter(|import| import.from_room() == import.to_room()) {
+    for import in tree.imports.iter().filter(|import| import.user_room() == import.used_room()) {
         graph.entry(&import.from).or_default().insert(&import.to);
     }
 

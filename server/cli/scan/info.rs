@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::camera::recorded::{Damage, Image, ScanFolder, poses};
 use crate::cli::output::{Failure, bar, print};
 use crate::files::replace;
-use crate::plot;
+use crate::plot::{Axis, Plot};
 use crate::scans::stack::optics::Optics;
 use crate::scans::stack::{FocalStack, Plane};
 
@@ -241,11 +241,15 @@ fn optics_of(scan: &ScanFolder) -> Option<Optics> {
 /// The optimum over the poses in black, the truth behind it where it is known.
 fn picture(scan: &ScanFolder) -> String {
     let truth: Option<Vec<f64>> = scan.poses().values().map(|pose| Some(pose.truth?.get())).collect();
-    let mut lines = Vec::new();
-    if let Some(truth) = &truth {
-        lines.push(("truth", "#56b4e9", truth.as_slice()));
-    }
     let path = path(scan);
-    lines.push(("optimum", "black", path.as_slice()));
-    plot::over_poses(&lines)
+    let across = Axis { label: "pose", from: 1.0, to: path.len().max(1) as f64 };
+    let up = Axis { label: "focal power", from: 0.0, to: 1.0 };
+
+    let mut plot = Plot::default();
+    let mut panel = plot.panel(across, up);
+    if let Some(truth) = &truth {
+        panel.values("truth", "#56b4e9", truth);
+    }
+    panel.values("optimum", "black", &path);
+    plot.svg()
 }

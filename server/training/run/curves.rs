@@ -1,7 +1,7 @@
 //! A training's curves: as lines of text, and as a picture.
 #![allow(clippy::cast_precision_loss, reason = "counts of updates")]
 
-use std::fmt::Write as _;
+use crate::plot::{Axis, Plot};
 
 /// Updates done, mean loss since the point before, and the validation's mean absolute error where there was one.
 pub(super) type Point = (u64, f64, Option<f64>);
@@ -23,28 +23,19 @@ pub(super) fn parse(text: &str) -> Vec<Point> {
     text.lines().filter_map(point).collect()
 }
 
-/// Loss (grey) and validation error (blue) over updates, each from 0 to its largest value.
+/// Loss and validation error over updates, in a panel each, from 0 to their largest value.
 pub(super) fn svg(curve: &[Point]) -> String {
     let end = curve.last().map_or(1, |point| point.0).max(1) as f64;
-    let line = |points: Vec<(u64, f64)>, colour: &str, name: &str| {
+    let loss: Vec<_> = curve.iter().map(|point| (point.0 as f64, point.1)).collect();
+    let mae: Vec<_> = curve.iter().filter_map(|point| Some((point.0 as f64, point.2?))).collect();
+
+    let mut plot = Plot::default();
+    for (label, colour, points) in [("loss", "#555555", loss), ("validation MAE", "#0a58ca", mae)] {
         let most = points.iter().map(|point| point.1).fold(1e-9, f64::max);
-        let mut text = String::new();
-        for (updates, value) in points {
-            let _ = write!(text, "{:.1},{:.1} ", 20.0 + 760.0 * updates as f64 / end, 280.0 - 240.0 * value / most);
-        }
-        format!(
-            "<polyline points=\"{text}\" fill=\"none\" stroke=\"{colour}\"/>\
-             <text x=\"{}\" y=\"20\" fill=\"{colour}\">{name}, at most {most:.3}</text>",
-            if colour == "grey" { 20 } else { 400 }
-        )
-    };
-    let loss = line(curve.iter().map(|point| (point.0, point.1)).collect(), "grey", "loss");
-    let mae = line(curve.iter().filter_map(|point| Some((point.0, point.2?))).collect(), "blue", "validation MAE");
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 800 300\" font-family=\"sans-serif\" font-size=\"12\">\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>{loss}{mae}\
-         <text x=\"780\" y=\"296\" text-anchor=\"end\">{end} updates</text></svg>\n"
-    )
+        let up = Axis { label, from: 0.0, to: (1000.0 * most).ceil() / 1000.0 };
+        plot.panel(Axis { label: "updates", from: 0.0, to: end }, up).line(label, colour, points);
+    }
+    plot.svg()
 }
 
 #[cfg(test)]
