@@ -2,6 +2,7 @@
 //! surgeon's browser; and a server killed again and again.
 
 #[allow(dead_code, reason = "shared with other tests")]
+#[path = "system/support/mod.rs"]
 mod support;
 
 #[path = "browser/aftermath.rs"]
@@ -15,13 +16,6 @@ mod by_hand;
 mod camera_card;
 #[path = "browser/course.rs"]
 mod course;
-#[allow(dead_code, reason = "shared with other tests")]
-#[path = "support/disk.rs"]
-mod disk;
-#[cfg(feature = "aravis")]
-#[allow(dead_code, reason = "shared with other tests")]
-#[path = "support/fake_camera.rs"]
-mod fake_camera;
 #[path = "browser/full_disk.rs"]
 mod full_disk;
 #[path = "browser/killed.rs"]
@@ -48,3 +42,7 @@ mod webdriver;
 mod wire;
 #[path = "browser/writing.rs"]
 mod writing;
+
+use support::disk;
+#[cfg(feature = "aravis")]
+use support::fake_camera;

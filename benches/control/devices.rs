@@ -15,7 +15,7 @@ use parfocal::control::LatencyFigures;
 use parfocal::lens::emulator::{Emulator, Model};
 use parfocal::lens::{self, FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics};
 
-use crate::fake_camera::Fake;
+use crate::fake_camera::{FakeCamera, NAME};
 use crate::watch_loop;
 
 /// Until the camera's clock is known well.
@@ -29,7 +29,7 @@ type Commands = Arc<Mutex<Vec<Moment>>>;
 
 /// Prints the figures at the paper's size: the deepest pixels at 25 frames a second, and 50 frames a second.
 pub fn measure() {
-    let Some(_fake) = Fake::start(&[]) else { return };
+    let Some(_camera) = FakeCamera::start() else { return };
     for (format, fps) in [("Mono16", 25.0), ("Mono8", 50.0)] {
         scenario(format, fps);
     }
@@ -40,7 +40,7 @@ fn scenario(format: &str, fps: f64) {
     let emulator = Emulator::start(Model::default(), clock.clone()).expect("starts");
     let driver = lens::open(&format!("optotune:{}", emulator.path().display()), clock.clone()).expect("connects");
     let settings = CameraSettings { fps, seed: 0, optics: emulator.glass(), clock };
-    let camera = GigeCamera::open(&format!("Aravis-Fake-TEST?format={format}"), settings).expect("connects");
+    let camera = GigeCamera::open(&format!("{NAME}?format={format}"), settings).expect("connects");
     let (arrivals, commands) = (Arrivals::default(), Commands::default());
     let lens = Box::new(Timed { lens: driver, commands: commands.clone() });
     let camera = Box::new(Watched { camera, arrivals: arrivals.clone() });

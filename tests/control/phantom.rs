@@ -62,7 +62,6 @@ fn run(policy: &str, seed: u64) -> Vec<f64> {
     errors
 }
 
-#[allow(clippy::cast_precision_loss, reason = "a few hundred frames")]
 fn focal_error(policy: &str) -> FocalError {
     let errors: Vec<f64> = SEEDS.iter().flat_map(|&seed| run(policy, seed)).collect();
     let count = errors.len() as f64;

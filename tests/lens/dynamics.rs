@@ -32,7 +32,6 @@ struct Stripes {
 }
 
 impl Camera for Stripes {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels")]
     fn next_frame(&mut self, _: Duration) -> Result<Frame, CameraError> {
         (self.pause)(self.due.since(self.clock.now()));
         let at = self.clock.now();

@@ -16,7 +16,6 @@ fn stack(folder: &Path, gaps: &[usize]) {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels")]
 fn save(picture: &GrayImage, path: &Path) {
     let levels = picture.data.iter().map(|level| level.round() as u8).collect();
     let (width, height) = (picture.width.try_into().unwrap(), picture.height.try_into().unwrap());

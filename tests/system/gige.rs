@@ -1,10 +1,5 @@
 //! GigE Vision cameras against Aravis's fake camera, a real peer on the loopback (Debian's package `aravis-tools`).
 
-#[path = "support/fake_camera.rs"]
-mod fake_camera;
-#[allow(dead_code, reason = "shared with other tests")]
-mod support;
-
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,8 +12,8 @@ use parfocal::lens::SimulatedLens;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use fake_camera::Fake;
-use support::Server;
+use crate::support::Server;
+use crate::support::fake_camera::Fake;
 
 const SECOND: Duration = Duration::from_secs(1);
 
@@ -248,7 +243,7 @@ fn hardly_a_frame_is_lost_in(time: Duration) {
     assert!(usize::try_from(lost).unwrap() * 100 < due, "{lost} of {due} frames were lost");
 }
 
-/// `cargo test --features aravis --test gige -- --ignored --nocapture`.
+/// `cargo test --features aravis --test system gige:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute"]
 fn mono16_at_25_fps_loses_hardly_a_frame_in_a_minute() {

@@ -1,6 +1,6 @@
 //! Imaging at the sensor's full size, beside a plain copy of the same mosaic.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at the first surprise")]
+#![allow(missing_docs, reason = "`criterion_group!` makes a public function")]
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -15,12 +15,6 @@ const WIDTH: usize = 2048;
 const HEIGHT: usize = 1088;
 
 /// Texture inside a circle, dark outside, as the sensor sees it.
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "10-bit counts"
-)]
 fn mosaic() -> MosaicFrame {
     let samples = (0..WIDTH * HEIGHT).map(|i| {
         let (x, y) = ((i % WIDTH) as f32, (i / WIDTH) as f32);

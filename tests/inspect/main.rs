@@ -1,7 +1,5 @@
 //! `parfocal inspect` as people and scripts use it.
 
-#![allow(missing_docs, reason = "tests")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,6 +1,5 @@
 //! Cameras from outside: what the simulated ones show, what they claim to know, and what they say of bad sources.
 
-#[path = "cameras/calibrate.rs"]
 mod calibrate;
 
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! What a frame of the simulated cameras costs, beside a plain copy of the phantom's mosaic.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at the first surprise")]
+#![allow(missing_docs, reason = "`criterion_group!` makes a public function")]
 
 use std::hint::black_box;
 use std::sync::Arc;

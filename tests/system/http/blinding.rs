@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashSet};
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
-use crate::live::{Heard, Page};
+use super::live::{Heard, Page};
 use crate::support::{Server, client};
 
 /// What would tell a policy, or how one works.

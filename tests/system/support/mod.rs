@@ -1,5 +1,9 @@
 //! Starts the real server as its users do, on a port of its own and in a folder of its own.
 
+pub mod disk;
+#[cfg(feature = "aravis")]
+pub mod fake_camera;
+
 use std::io::{BufRead, BufReader, Read};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};

@@ -1,9 +1,11 @@
 //! The live stream: paced by its viewers, silent for hidden pages, and for surgeons without a trace of the policy.
 
 use futures_util::{SinkExt, StreamExt};
+use reqwest::header::AUTHORIZATION;
 use serde_json::{Value, json};
 use tokio::net::TcpStream;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
+use tokio_tungstenite::tungstenite::handshake::client::Request;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async, tungstenite};
 use tungstenite::Message;
@@ -46,10 +48,7 @@ impl Frame {
 
 impl Page {
     pub async fn open(server: &Server, role: &str) -> Self {
-        let address = format!("ws://{}/live?role={role}", server.address);
-        let mut request = address.into_client_request().unwrap();
-        let bearer = format!("Bearer {}", server.key(role)).parse().unwrap();
-        request.headers_mut().insert("authorization", bearer);
+        let request = upgrade(server, &format!("/live?role={role}"), role);
         Self { socket: connect_async(request).await.unwrap().0, heard: Vec::new() }
     }
 
@@ -132,6 +131,14 @@ impl Page {
             self.drawn(&frame).await;
         }
     }
+}
+
+/// A request for a WebSocket at `path`, with the key of `role`.
+pub fn upgrade(server: &Server, path: &str, role: &str) -> Request {
+    let mut request = format!("ws://{}{path}", server.address).into_client_request().unwrap();
+    let bearer = format!("Bearer {}", server.key(role)).parse().unwrap();
+    request.headers_mut().insert(AUTHORIZATION, bearer);
+    request
 }
 
 /// Header length (u16, little-endian), header, JPEG.
@@ -228,10 +235,8 @@ async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
 #[tokio::test]
 async fn a_role_that_is_not_held_is_not_served() {
     let server = Server::with(&["--bind", "0.0.0.0:0"]);
-    let mut request = format!("ws://{}/live?role=operator", server.address).into_client_request().unwrap();
-    let bearer = format!("Bearer {}", server.key("surgeon")).parse().unwrap();
-    request.headers_mut().insert("authorization", bearer);
-    let error = connect_async(request).await.expect_err("a surgeon is no operator");
+    let error =
+        connect_async(upgrade(&server, "/live?role=operator", "surgeon")).await.expect_err("a surgeon is no operator");
     assert!(matches!(error, tungstenite::Error::Http(response) if response.status() == 403));
 }
 

@@ -2,7 +2,6 @@
 //! it, on brains that the benchmark does not use, judged by `fixed` and the hill-climbers alone against the paper's robotic
 //! column. The least largest deviation wins; the last line is the benchmark itself. `cargo bench --bench calibrate_recorded`, with
 //! `-- frozen` for that line alone.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at the first surprise")]
 
 use std::sync::Arc;
 

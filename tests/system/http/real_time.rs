@@ -8,7 +8,7 @@ use std::time::Duration;
 use rustix::process::Signal;
 use serde_json::json;
 
-use crate::live::Page;
+use super::live::Page;
 use crate::support::{Server, client, command};
 
 const OTHER: u32 = 0;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use crate::disk::{SmallDisk, as_nobody};
+use crate::support::disk::{SmallDisk, as_nobody};
 use crate::support::{Server, client, command, refusal, refused};
 
 const LISTEN: [&str; 2] = ["--bind", "127.0.0.1:0"];

@@ -1,14 +1,11 @@
 //! What a focus step costs: the metrics, each policy's step, and a whole step of the control loop; and how long the loop
 //! takes from exposure to lens command. `cargo bench --features aravis --bench control loop` measures the loop alone, with
 //! the phantom, and with Aravis's fake GigE Vision camera and the emulated lens driver.
-#![allow(missing_docs, clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "a benchmark")]
+#![allow(missing_docs, reason = "`criterion_group!` makes a public function")]
 
 #[cfg(feature = "aravis")]
-#[path = "control/devices.rs"]
 mod devices;
 #[cfg(feature = "aravis")]
-#[allow(dead_code, reason = "shared with tests")]
-#[path = "../tests/support/fake_camera.rs"]
 mod fake_camera;
 
 use std::hint::black_box;

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{ConnectOptions, Connection};
 
-use crate::live::Page;
+use super::live::Page;
 use crate::support::{Server, client};
 
 /// A step of the loop in the telemetry: run, policy, focal power asked of the lens.
@@ -20,7 +20,7 @@ struct Stage {
 
 impl Stage {
     fn start(data: Arc<tempfile::TempDir>) -> Server {
-        let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/http");
+        let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/http");
         Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "20", "--protocols", protocols])
     }
 

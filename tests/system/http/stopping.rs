@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{ConnectOptions, Connection};
 
-use crate::disk::SmallDisk;
-use crate::live::Page;
+use super::live::Page;
+use crate::support::disk::SmallDisk;
 use crate::support::{Server, client};
 
 /// What keeps the server from writing.
@@ -171,7 +171,7 @@ impl Stage {
 
 fn start(data: Arc<tempfile::TempDir>, emulator: &Emulator) -> Server {
     let lens = format!("optotune:{}", emulator.path().display());
-    let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/http");
+    let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/http");
     Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "20", "--lens", &lens, "--protocols", protocols])
 }
 

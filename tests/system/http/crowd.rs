@@ -9,7 +9,7 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::io::AsyncReadExt;
 use tokio::net::{TcpSocket, TcpStream};
 
-use crate::live::Page;
+use super::live::Page;
 use crate::support::{Server, command};
 
 /// More than the server has files for, and so than it could ever keep open.

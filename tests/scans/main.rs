@@ -1,14 +1,8 @@
 //! Recorded focal-time scans from outside: recorded, interrupted, resumed, damaged, imported, played and evaluated on.
 
-#![allow(missing_docs, reason = "tests")]
-
-#[path = "scans/bench.rs"]
 mod bench;
-#[path = "scans/evaluation.rs"]
 mod evaluation;
-#[path = "scans/from_stack.rs"]
 mod from_stack;
-#[path = "scans/import.rs"]
 mod import;
 
 use std::fs;

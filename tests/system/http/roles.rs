@@ -3,7 +3,9 @@
 use reqwest::header::{COOKIE, HOST, LOCATION, ORIGIN, SET_COOKIE};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
+use tokio_tungstenite::{connect_async, tungstenite};
 
+use super::live::upgrade;
 use crate::support::{Server, client};
 
 const ROLES: [&str; 3] = ["surgeon", "operator", "researcher"];
@@ -20,11 +22,16 @@ async fn enter(server: &Server, key: &str) -> Response {
     server.get(&format!("/enter?key={key}")).send().await.unwrap()
 }
 
-/// The cookie of `role`, as a browser sends it back.
+/// The cookie of `role`.
 async fn cookie(server: &Server, role: &str) -> String {
     let response = enter(server, server.key(role)).await;
-    let cookie = response.headers()[SET_COOKIE].to_str().unwrap();
-    cookie.split(';').next().unwrap().to_owned()
+    sent_back(&response)
+}
+
+/// The cookie that `response` sets, as a browser sends it back.
+fn sent_back(response: &Response) -> String {
+    let cookie = response.cookies().next().expect("a cookie");
+    format!("{}={}", cookie.name(), cookie.value())
 }
 
 /// Every endpoint: path, method, first tag.
@@ -102,7 +109,7 @@ async fn each_role_opens_its_own_endpoints_and_no_others() {
 async fn a_cookie_is_no_key_and_a_key_no_cookie() {
     let server = open_server();
     let cookie = cookie(&server, "operator").await;
-    let token = cookie.split('=').nth(1).unwrap();
+    let (_, token) = cookie.split_once('=').unwrap();
     assert_eq!(enter(&server, token).await.status(), StatusCode::FORBIDDEN);
     let forged = format!("parfocal-operator={}", server.key("operator"));
     assert_eq!(ask(&server, "/operator", Method::GET, &forged).await, StatusCode::FORBIDDEN);
@@ -117,10 +124,10 @@ async fn a_link_becomes_a_strict_cookie_and_leaves_the_address() {
         let response = enter(&server, server.key(role)).await;
         assert_eq!(response.status(), StatusCode::SEE_OTHER);
         assert_eq!(response.headers()[LOCATION], format!("/{role}"));
-        let cookie = response.headers()[SET_COOKIE].to_str().unwrap();
-        assert!(cookie.contains("; HttpOnly") && cookie.contains("; SameSite=Strict"), "{cookie}");
-        assert!(!cookie.contains(server.key(role)));
-        let home = server.get("/").header(COOKIE, cookie.split(';').next().unwrap()).send().await.unwrap();
+        let header = response.headers()[SET_COOKIE].to_str().unwrap();
+        assert!(response.cookies().all(|cookie| cookie.http_only() && cookie.same_site_strict()), "{header}");
+        assert!(!header.contains(server.key(role)));
+        let home = server.get("/").header(COOKIE, sent_back(&response)).send().await.unwrap();
         assert_eq!(home.headers()[LOCATION], format!("/{role}"));
     }
     let wrong = server.get("/enter?key=0123456789abcdef0123456789abcdef").header("accept", "text/html");
@@ -168,11 +175,17 @@ async fn other_sites_change_nothing_and_hear_nothing() {
     assert_eq!(post("origin", ours.clone()).await, StatusCode::METHOD_NOT_ALLOWED);
     assert_eq!(post("sec-fetch-site", "same-origin".into()).await, StatusCode::METHOD_NOT_ALLOWED);
 
-    let upgrade = server.get_as("operator", "/live").header("connection", "upgrade").header("upgrade", "websocket");
-    let upgrade = upgrade.header("sec-websocket-version", "13").header("sec-websocket-key", "dGhlIHNhbXBsZSBub25jZQ==");
-    let evil = upgrade.try_clone().unwrap().header(ORIGIN, "http://evil.example");
-    assert_eq!(evil.send().await.unwrap().status(), StatusCode::FORBIDDEN);
-    assert_eq!(upgrade.header(ORIGIN, ours).send().await.unwrap().status(), StatusCode::SWITCHING_PROTOCOLS);
+    let stream = async |origin: &str| {
+        let mut request = upgrade(&server, "/live", "operator");
+        request.headers_mut().insert(ORIGIN, origin.parse().unwrap());
+        match connect_async(request).await {
+            Ok((_, response)) => response.status(),
+            Err(tungstenite::Error::Http(response)) => response.status(),
+            Err(error) => panic!("{error}"),
+        }
+    };
+    assert_eq!(stream("http://evil.example").await, StatusCode::FORBIDDEN);
+    assert_eq!(stream(&ours).await, StatusCode::SWITCHING_PROTOCOLS);
 }
 
 #[tokio::test]

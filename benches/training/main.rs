@@ -1,12 +1,5 @@
 //! What training costs: environment steps, replay memory, and updates beside the same loop in `PyTorch` (`peer.py`).
 //! `cargo bench --bench training`; for the peer, set PYTHON to a Python that has `PyTorch` 2.11.
-#![allow(
-    clippy::unwrap_used,
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    missing_docs,
-    reason = "a benchmark may stop at the first surprise"
-)]
 
 use std::hint::black_box;
 use std::process::Command;
@@ -114,7 +107,7 @@ fn main() {
     });
     trainings(&clips);
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    match Command::new(&python).arg("benches/peer.py").status() {
+    match Command::new(&python).arg("benches/training/peer.py").status() {
         Ok(status) if status.success() => {}
         _ => println!("no peer: '{python}' has no PyTorch; set PYTHON to one that has"),
     }

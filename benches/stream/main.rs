@@ -5,18 +5,8 @@
 //! worth comparing is compared within one run. Ages are exact: the server's record of each frame's exposure and the
 //! viewers' clock are the same monotonic clock.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    clippy::cast_sign_loss,
-    reason = "figures for a table"
-)]
-
-#[path = "stream/link.rs"]
 mod link;
-#[path = "stream/process.rs"]
 mod process;
-#[path = "stream/viewer.rs"]
 mod viewer;
 
 use std::collections::HashMap;

@@ -1,0 +1,14 @@
+//! The server over HTTP: who may do what, what every response carries, and how it starts and ends.
+
+mod blinding;
+mod crowd;
+mod failing_disk;
+mod finality;
+mod live;
+mod privacy;
+mod real_time;
+mod restart;
+mod roles;
+mod seed;
+mod service;
+mod stopping;
