@@ -54,9 +54,9 @@ pub trait Clock: Send + Sync {
 pub struct SystemClock;
 
 impl Clock for SystemClock {
-    #[allow(clippy::cast_sign_loss, reason = "the kernel's monotonic clock is never negative")]
     fn now(&self) -> Moment {
         let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+        // The kernel's monotonic clock is never negative.
         Moment(now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64)
     }
 

@@ -55,7 +55,6 @@ pub struct Panel<'a> {
 
 impl Plot {
     /// Begins a panel below those that are there.
-    #[allow(clippy::cast_precision_loss, reason = "a handful of panels")]
     pub fn panel<'a>(&'a mut self, across: Axis<'a>, up: Axis<'a>) -> Panel<'a> {
         let top = 20.0 + self.panels as f64 * (PANEL + GAP);
         self.panels += 1;
@@ -77,7 +76,6 @@ impl Plot {
 
     /// The whole plot as an SVG document.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "a handful of panels")]
     pub fn svg(mut self) -> String {
         let mut x = LEFT;
         let mut y = 20.0 + self.panels as f64 * (PANEL + GAP) + ROW - 10.0;
@@ -133,7 +131,6 @@ impl Panel<'_> {
     }
 
     /// A line through `values`, one at each whole number across, from the axis's beginning on.
-    #[allow(clippy::cast_precision_loss, reason = "frame numbers are small")]
     pub fn values(&mut self, name: &str, colour: &str, values: &[f64]) {
         let from = self.across.from;
         self.line(name, colour, values.iter().enumerate().map(|(index, &value)| (from + index as f64, value)));
@@ -162,7 +159,6 @@ impl Panel<'_> {
 }
 
 /// Room for a key: swatch, gaps, and 7.5 a character, wider than sans-serif letters of 12 are on average.
-#[allow(clippy::cast_precision_loss, reason = "a hundred characters at most")]
 fn key_width(name: &str) -> f64 {
     30.0 + 7.5 * name.chars().count() as f64
 }

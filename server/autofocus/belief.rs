@@ -1,12 +1,5 @@
 //! The policy `parfocal`: tracks a belief about where the optimum is, goes where the lens is most likely in focus, and looks around
 //! where that is in doubt.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "indices of 41 bins"
-)]
 
 use std::sync::LazyLock;
 

@@ -1,5 +1,4 @@
 //! The paper's learned policies: action values from the latest eight frames, the best action taken.
-#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "small numbers in single precision")]
 
 use std::collections::VecDeque;
 

@@ -3,7 +3,6 @@
 //! Both are computed on the 0..255 gray scale with borders replicated, as in Budd et al., MICCAI 2023 (doi
 //! 10.1007/978-3-031-43996-4_63). They run in every control step and millions of times in training, so the inner loops
 //! go over whole rows of 32 values, which the compiler turns into vector instructions for the machine at hand.
-#![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "small image sizes and weights")]
 
 use std::sync::LazyLock;
 
@@ -69,7 +68,6 @@ fn gradient_magnitude_sums(patch: &[f32; PIXELS]) -> Row {
 
 /// The row with its first and last values repeated.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "must be compiled for the same instruction set as its caller")]
 fn padded(row: &Row) -> [f32; PADDED] {
     let mut out = [0.0; PADDED];
     out[0] = row[0];
@@ -96,7 +94,6 @@ fn local_ratio_sums(patch: &[f32; PIXELS], blur_rows: &Square, blur_columns: &Sq
 
 /// Matrix product.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "must be compiled for the same instruction set as its caller")]
 fn product(left: &Square, right: &Square) -> Square {
     let mut out = [[0.0; PATCH_SIDE]; PATCH_SIDE];
     for (out, left) in out.iter_mut().zip(left) {

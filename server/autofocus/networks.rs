@@ -1,5 +1,4 @@
 //! The learned policies' networks: the paper's two (Budd et al., MICCAI 2023), and the belief tracker's.
-#![allow(clippy::cast_possible_wrap, reason = "tensor sizes are small")]
 
 use tch::nn::{self, Module, ModuleT, RNN};
 use tch::{Device, Kind, Tensor};
@@ -149,13 +148,11 @@ mod tests {
     }
 
     /// The same sines as there.
-    #[allow(clippy::cast_precision_loss, reason = "small indices")]
     fn wave(count: usize, rate: f64, scale: f64, offset: f64) -> Tensor {
         let values: Vec<f64> = (0..count).map(|index| offset + scale * (rate * index as f64).sin()).collect();
         Tensor::from_slice(&values).to_kind(Kind::Float)
     }
 
-    #[allow(clippy::cast_precision_loss, reason = "small indices")]
     fn fill(store: &nn::VarStore) {
         let mut variables: Vec<_> = store.variables().into_iter().collect();
         variables.sort_by(|a, b| a.0.cmp(&b.0));

@@ -3,13 +3,6 @@
 //!
 //! Texture passes under the patch from frame to frame, and its own energy varies more than that of a slightly blurred one; the
 //! ratio of energies over the same texture does not.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "indices of a 32x32 patch"
-)]
 
 use std::f64::consts::TAU;
 use std::ops::Range;

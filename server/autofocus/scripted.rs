@@ -4,7 +4,6 @@
 //! and the focal powers that they were exposed at, `[8]` (0..=1). It returns the values of the three actions, `[3]`: a step
 //! down, none, a step up. Before eight frames were seen, the first stands for those missing. Each instance has a module of its own, in
 //! evaluation mode.
-#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "small numbers in single precision")]
 
 use std::collections::VecDeque;
 use std::fs;

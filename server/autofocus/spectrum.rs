@@ -2,12 +2,6 @@
 //!
 //! A Gaussian of standard deviation s multiplies the energy at angular frequency w by exp(-(s w)²), so a change of blur
 //! shifts each band's logarithm by an amount that depends on neither contrast nor texture.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "indices and weights of a 32x32 transform"
-)]
 
 use std::f64::consts::TAU;
 use std::ops::Range;

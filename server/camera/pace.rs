@@ -46,8 +46,8 @@ impl Pace {
 
     /// The next frame to make at `now`, and when it is due. A frame less than half a period late is still made; older
     /// ones are skipped.
-    #[allow(clippy::cast_possible_truncation, reason = "584 years of nanoseconds fit u64")]
     fn next(&self, now: Moment) -> (u64, Moment) {
+        // 584 years of nanoseconds fit `u64`.
         let period = self.period.as_nanos() as u64;
         let earliest = (now.since(self.start).as_nanos() as u64 + period / 2) / period;
         let index = self.number.max(earliest);
@@ -64,7 +64,6 @@ impl Pace {
 
     /// Frames a second, as measured over the second before `now`.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "at most a thousand frames")]
     pub fn rate(&self, now: Moment) -> f64 {
         let recent = self.delivered.iter().filter(|at| now.since(**at) <= Duration::from_secs(1));
         let (count, first) = recent.fold((0_usize, None), |(count, first), at| (count + 1, first.or(Some(*at))));

@@ -23,7 +23,6 @@ pub fn bands(path: &Path) -> Result<[Band; BANDS], Failure> {
 }
 
 /// The correction in `path`: 16 lines of 16.
-#[allow(clippy::cast_possible_truncation, reason = "factors of about one")]
 pub fn correction(path: &Path) -> Result<[[f32; BANDS]; BANDS], Failure> {
     let rows = rows(path, BANDS)?;
     if rows.len() != BANDS {

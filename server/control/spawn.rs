@@ -257,7 +257,6 @@ impl Worker {
             held,
             held_for: self.held_since.map_or(Duration::ZERO, |(_, since)| now.since(since)),
             message,
-            #[allow(clippy::cast_precision_loss, reason = "a few hundred at most")]
             steps_per_second: figures.steps as f64,
             steps: self.steps,
             telemetry_dropped: self.telemetry_dropped,

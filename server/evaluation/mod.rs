@@ -1,5 +1,4 @@
 //! Evaluation: every policy on the same focal-time scans, figures over all of them, and tests between any two.
-#![allow(clippy::cast_precision_loss, reason = "counts of scans and frames are small")]
 
 pub mod report;
 pub mod rollout;

@@ -282,7 +282,6 @@ pub fn figure(outcomes: &[Outcome], index: usize) -> String {
 }
 
 /// Mean of up to five values around each.
-#[allow(clippy::cast_precision_loss, reason = "at most five values")]
 fn moving_average(values: &[f64]) -> Vec<f64> {
     let around = |i: usize| &values[i.saturating_sub(2)..(i + 3).min(values.len())];
     (0..values.len()).map(|i| around(i).iter().sum::<f64>() / around(i).len() as f64).collect()

@@ -1,5 +1,4 @@
 //! One policy on one focal-time scan: where it went, and how well that was.
-#![allow(clippy::cast_precision_loss, reason = "counts of frames are small")]
 
 use serde::{Deserialize, Serialize};
 

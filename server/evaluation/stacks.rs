@@ -1,11 +1,5 @@
 //! The benchmark of real glass: photographed focal stacks, each at two scales and three seeds, and how each policy does there beside
 //! the MGM hill-climber.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "counts of stacks, planes and pixels are small"
-)]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

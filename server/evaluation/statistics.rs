@@ -1,10 +1,4 @@
 //! Statistics of evaluations: bootstrap confidence intervals and the paired Wilcoxon signed-rank test.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "counts of scans are small"
-)]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -34,7 +34,6 @@ fn make_whole(value: &mut Value) {
         Value::Number(number) => {
             let whole = number.as_f64().filter(|float| number.is_f64() && float.fract() == 0.0 && float.abs() < EXACT);
             if let Some(whole) = whole {
-                #[allow(clippy::cast_possible_truncation, reason = "whole and small enough")]
                 let whole = whole as i64;
                 *value = whole.into();
             }

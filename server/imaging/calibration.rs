@@ -123,7 +123,6 @@ impl Calibration {
 impl Reference {
     /// Mean count of each band.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of 16 bit fit f32")]
     pub fn band_means(&self) -> [f32; BANDS] {
         let frame = match self {
             Self::PerBand(counts) => return *counts,

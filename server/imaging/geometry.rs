@@ -65,13 +65,8 @@ impl PatchArea {
 }
 
 /// First pixel of a patch around `centre` that keeps inside `0..length`.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "a place inside a picture; a cast of anything beyond saturates"
-)]
 fn start(centre: f64, length: usize) -> usize {
+    // The cast makes 0 of what is negative.
     let first = (centre - PATCH_SIDE as f64 / 2.0).round() as usize;
     first.min(length - PATCH_SIDE)
 }

@@ -1,10 +1,4 @@
-//! Gray pictures made smaller by area means.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "positions within pictures of 16384 pixels a side at most"
-)]
+//! Gray pictures, of at most 16384 pixels a side, made smaller by area means.
 
 use std::ops::Range;
 

@@ -1,12 +1,5 @@
 //! Reference exposures, dark and white: several frames averaged, and refused where they could not calibrate a sensor.
 
-#![allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "counts of 16 bit and numbers of pixels"
-)]
-
 pub use super::bad_reference::BadReference;
 use super::calibration::BANDS;
 use super::content_area;

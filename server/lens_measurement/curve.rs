@@ -1,7 +1,5 @@
 //! Sharpness over focal power at rest: the scale by which a moving lens is read from the picture.
 
-#![allow(clippy::cast_precision_loss, reason = "a handful of stops")]
-
 use super::BenchError;
 
 /// Least change of sharpness along the flank, as a share of the greatest sharpness.

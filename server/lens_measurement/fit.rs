@@ -66,7 +66,6 @@ impl Fit {
         LensDynamics { delay: seconds(self.delay), settling: seconds(self.settling) }
     }
 
-    #[allow(clippy::cast_precision_loss, reason = "some thousand samples")]
     fn scatter(&self, samples: &[Sample]) -> f64 {
         let squares = samples.iter().map(|sample| (sample.share - self.share(sample.at)).powi(2));
         (squares.sum::<f64>() / samples.len().max(1) as f64).sqrt()

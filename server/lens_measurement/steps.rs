@@ -127,7 +127,6 @@ impl Stand<'_> {
         let seen = self.watch(commanded, flank)?;
         let settled_from = SETTLED_BY * self.plan.watch.as_secs_f64();
         let at_rest: Vec<f64> = seen.iter().filter(|(at, _)| *at >= settled_from).map(|(_, power)| *power).collect();
-        #[allow(clippy::cast_precision_loss, reason = "a handful of frames")]
         let end = at_rest.iter().sum::<f64>() / at_rest.len().max(1) as f64;
         samples.extend(seen.into_iter().map(|(at, power)| Sample { at, share: (power - start) / (end - start) }));
         Ok(())

@@ -49,7 +49,6 @@ impl View {
     }
 
     /// Mean sharpness of `frames` frames exposed at `from` or later.
-    #[allow(clippy::cast_precision_loss, reason = "a handful of frames")]
     pub(super) fn mean(&mut self, from: Moment, frames: usize) -> Result<f64, BenchError> {
         let (mut sum, mut seen) = (0.0, 0);
         while seen < frames {

@@ -40,7 +40,6 @@ pub fn warning(blank: usize, count: usize) -> Result<Option<String>, NothingToFo
     if blank == count {
         return Err(NothingToFocusOn(count));
     }
-    #[allow(clippy::cast_precision_loss, reason = "counts of scans")]
     let percent = 100.0 * blank as f64 / count as f64;
     let words =
         || format!("in {percent:.1} % of the scans ({blank} of {count}) even the sharpest patch shows no detail");
@@ -101,10 +100,8 @@ mod tests {
     fn walls_shaded_or_noisy_have_nothing_to_focus_on_and_textures_have() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         assert!((share(picture(|_| 255.0)) - 1.0).abs() < 1e-9, "white");
-        #[allow(clippy::cast_precision_loss, reason = "small numbers")]
         let shaded = picture(|i| 40.0 + (i % SIDE) as f32);
         assert!((share(shaded) - 1.0).abs() < 1e-9, "shaded");
-        #[allow(clippy::cast_possible_truncation, reason = "gray levels")]
         let noisy = picture(|_| (100.0 + 2.0 * standard_normal(&mut rng)) as f32);
         assert!(share(noisy) > 0.8, "noisy");
 

@@ -133,7 +133,6 @@ fn clip(frames: Vec<Arc<GrayImage>>) -> Result<Clip, ClipError> {
 }
 
 /// The square that fits into the circle with a little to spare; what of it lies outside the picture is cut by the clip.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of a picture, from 0 on")]
 fn within(circle: &ContentArea) -> Area {
     let half = 0.68 * circle.radius;
     let pixel = |place: f64| place.max(0.0) as usize;

@@ -1,7 +1,5 @@
 //! Which sharp pictures training, validation and the reference benchmark are made of: never the same ones.
 
-#![allow(clippy::cast_precision_loss, reason = "a few strengths of contrast")]
-
 use std::sync::Arc;
 
 use super::clip::{Clip, ClipError};

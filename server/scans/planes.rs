@@ -1,10 +1,4 @@
 //! Focal stacks in memory: one scene at several positions of the focal plane, and where each patch of it is sharpest.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel arithmetic on small numbers"
-)]
 
 use multiversion::multiversion;
 

@@ -67,7 +67,6 @@ impl Stack {
 
 /// `count` focal powers evenly spread over the lens's range, at least 2.
 #[must_use]
-#[allow(clippy::cast_precision_loss, reason = "some hundreds at most")]
 pub fn evenly_spread(count: usize) -> Vec<FocalPower> {
     let last = count.max(2) - 1;
     (0..=last).map(|index| FocalPower::nearest(index as f64 / last as f64)).collect()
@@ -167,7 +166,6 @@ fn frozen(
 
 /// The patch of a gray picture at `area`, rounded; black where `area` leaves the picture.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels; what is beyond saturates")]
 pub fn levels_at(picture: &GrayImage, area: PatchArea) -> [u8; PIXELS] {
     std::array::from_fn(|i| {
         let (x, y) = (area.x + i % PATCH_SIDE, area.y + i / PATCH_SIDE);
@@ -182,12 +180,11 @@ pub fn as_patch(levels: &[u8; PIXELS]) -> Patch {
     Patch(levels.map(f32::from))
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels; what is beyond saturates")]
+/// Rounded; what is beyond 0..=255 becomes its end.
 fn as_levels(patch: &Patch) -> [u8; PIXELS] {
     patch.0.map(|value| value.round() as u8)
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "a share")]
 fn mixed(low: &[u8; PIXELS], high: &[u8; PIXELS], part: f64) -> Patch {
     let part = part as f32;
     Patch(std::array::from_fn(|i| (f32::from(low[i]) + part * (f32::from(high[i]) - f32::from(low[i]))).round()))

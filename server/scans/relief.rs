@@ -3,12 +3,6 @@
 //!
 //! Heights and positions of the focal plane are in pixels of blur: a place at height `h` is blurred by a spot of standard
 //! deviation `|p - h|` with the focal plane at `p`.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel arithmetic on small numbers"
-)]
 
 use std::sync::Arc;
 

@@ -1,12 +1,5 @@
 //! Simulated focal-time scans: a crop walks over sharp pictures, the optimal focal power walks too, and what is seen at
 //! another focal power is blurred in proportion to the distance (Budd et al., MICCAI 2023).
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel arithmetic on small numbers"
-)]
 
 use super::FocalTimeScan;
 use std::sync::Arc;

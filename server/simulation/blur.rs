@@ -23,7 +23,6 @@ pub fn gaussian_blur(image: &GrayImage, sigma: f64) -> GrayImage {
 }
 
 /// One half of the kernel, its middle first; it sums to 1 with its mirror image.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a radius of pixels is small and positive")]
 fn gaussian_kernel(sigma: f64) -> Vec<f32> {
     if !(sigma > 0.0 && sigma.is_finite()) {
         return vec![1.0];
@@ -67,7 +66,6 @@ fn blur_columns(data: &[f32], width: usize, kernel: &[f32], blurred: &mut [f32])
 
 /// Adds `weight` times the sum of two rows to `out`.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
 fn add_pair(out: &mut [f32], one: &[f32], other: &[f32], weight: f32) {
     for ((out, &one), &other) in out.iter_mut().zip(one).zip(other) {
         *out += weight * (one + other);
@@ -92,7 +90,6 @@ mod tests {
         let upright = gaussian_blur(&step(80, 70, |x, _| x >= 40), 4.0);
         let level = gaussian_blur(&step(70, 80, |_, y| y >= 40), 4.0);
         for (sigmas, expected) in NORMAL_CDF {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
             let right = (40.0 + 4.0 * sigmas) as usize;
             let across = f32::midpoint(upright.data[35 * 80 + right - 1], upright.data[35 * 80 + right]) / 200.0;
             let down = f32::midpoint(level.data[(right - 1) * 70 + 35], level.data[right * 70 + 35]) / 200.0;

@@ -1,5 +1,4 @@
 //! What now and then covers the view in training: a glove, an instrument, glare; nothing can be seen to focus on.
-#![allow(clippy::cast_possible_truncation, reason = "some hundred frames at most")]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

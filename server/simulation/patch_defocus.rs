@@ -1,11 +1,4 @@
 //! Defocus of one patch of a sharp picture: only the patch's own 32x32 pixels are computed.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel arithmetic on small, checked numbers"
-)]
 
 use multiversion::multiversion;
 

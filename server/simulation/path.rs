@@ -43,7 +43,6 @@ impl<const N: usize> Path<N> {
     }
 
     /// Where it is at `time` after the start.
-    #[allow(clippy::cast_precision_loss, reason = "steps since the start, far below 2^52")]
     pub fn at(&mut self, time: Duration) -> [f64; N] {
         let place = time.as_secs_f64() * self.rate;
         while self.steps as f64 <= place {

@@ -1,11 +1,4 @@
 //! Blur of whole pictures by the spots that lenses make of a point: a Gaussian, a disc, a disc with a brighter rim or core.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel arithmetic on small numbers"
-)]
 
 use multiversion::multiversion;
 

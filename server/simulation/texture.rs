@@ -1,11 +1,5 @@
 //! Sharp pictures out of nothing, of many kinds, for policies to train on: overlapping discs ("dead leaves", whose
 //! statistics are those of natural pictures: Lee, Mumford and Huang 2001), fractal noise, vessels, highlights.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel arithmetic on small numbers"
-)]
 
 use std::ops::Range;
 

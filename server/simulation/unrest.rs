@@ -1,12 +1,5 @@
 //! A scene that does not keep still under the crop: it stretches, turns and shears, and its contrast comes and goes from
 //! place to place. Between two frames of tissue much the same is seen, but never quite the same.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel arithmetic on small numbers"
-)]
 
 use multiversion::multiversion;
 use rand::Rng;

@@ -1,6 +1,5 @@
 //! Trains the belief tracker: in simulation the optimum is known at every frame, so the posterior is learned directly,
 //! by cross-entropy, on scans that the tracker itself steers.
-#![allow(clippy::cast_possible_wrap, clippy::cast_precision_loss, reason = "small counts as tensor sizes and shares")]
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

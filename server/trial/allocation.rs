@@ -152,7 +152,6 @@ impl Words {
         }
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "orders have at most a few dozen places")]
     fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             items.swap(i, self.below(i as u32 + 1) as usize);

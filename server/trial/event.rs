@@ -156,7 +156,6 @@ impl EventKind {
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "segments last at most an hour")]
 fn seconds(milliseconds: u64) -> String {
     format!("{:.1} s", milliseconds as f64 / 1000.0)
 }

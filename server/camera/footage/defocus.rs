@@ -1,12 +1,5 @@
 //! Gaussian defocus of a window of a colour picture, fast enough for every frame.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "bytes of pixels, and kernels of a few dozen taps"
-)]
-
 use multiversion::multiversion;
 
 use crate::imaging::RgbImage;
@@ -91,7 +84,6 @@ fn blur_down(data: &mut [u8], across: &[f32], row: usize, kernel: &[f32]) {
 }
 
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
 fn weigh(out: &mut [f32], values: &[f32], weight: f32) {
     for (out, value) in out.iter_mut().zip(values) {
         *out = weight * value;
@@ -99,7 +91,6 @@ fn weigh(out: &mut [f32], values: &[f32], weight: f32) {
 }
 
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
 fn add_pair(out: &mut [f32], one: &[f32], other: &[f32], weight: f32) {
     for ((out, one), other) in out.iter_mut().zip(one).zip(other) {
         *out += weight * (one + other);

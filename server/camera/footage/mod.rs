@@ -73,25 +73,17 @@ impl View for Footage {
 }
 
 /// Walk of the window over `room` pixels: 1 pixel a frame at 25 frames a second, remembered for 30 frames.
-#[allow(clippy::cast_precision_loss, reason = "pixels of a picture")]
 fn crop(room: usize) -> Habit {
     Habit { range: (0.0, room as f64), speed: RATE, memory: 30.0 / RATE }
 }
 
 /// Width and height of the window on a picture of this size, and how far it can move right and down.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixels of a picture"
-)]
 fn window(width: usize, height: usize) -> ([usize; 2], [usize; 2]) {
     let window = [width, height].map(|length| (WINDOW * length as f64) as usize);
     (window, [width - window[0], height - window[1]])
 }
 
 /// A walk's place as a whole number of pixels within `room`.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of a picture; never negative")]
 fn place(walked: f64, room: usize) -> usize {
     (walked.max(0.0) as usize).min(room)
 }

@@ -63,7 +63,6 @@ impl Stills {
         Ok(Self { files, shown: 0, picture })
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "a remainder of the number of files")]
     fn at(&mut self, time: Duration) -> Result<&RgbImage, FootageError> {
         let turn = (time.as_nanos() / STILL.as_nanos() % self.files.len() as u128) as usize;
         if turn != self.shown {
@@ -92,12 +91,8 @@ fn still(file: &Path) -> Result<RgbImage, FootageError> {
         return Err(FootageError::unreadable(file, reason));
     }
     let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
-    let scaled = if fits {
-        picture
-    } else {
-        #[allow(clippy::cast_possible_truncation, reason = "small constants")]
-        picture.resize(WIDTH as u32, HEIGHT as u32, image::imageops::FilterType::Triangle)
-    };
+    let scaled =
+        if fits { picture } else { picture.resize(WIDTH as u32, HEIGHT as u32, image::imageops::FilterType::Triangle) };
     let rgb = scaled.to_rgb8();
     let (width, height) = (rgb.width() as usize, rgb.height() as usize);
     large_enough(file, width, height)?;

@@ -69,7 +69,6 @@ impl Shared {
     }
 
     /// How the camera does.
-    #[allow(clippy::cast_precision_loss, reason = "some hundred frames")]
     pub fn health(&self) -> CameraHealth {
         let now = self.clock.now();
         let state = self.state();

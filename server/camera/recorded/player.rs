@@ -37,14 +37,12 @@ impl View for ScanFolder {
 }
 
 /// The pose after `steps`: 1, 2, .. `count`, `count - 1`, .. 2, 1, 2, ..
-#[allow(clippy::cast_possible_truncation, reason = "below the number of poses")]
 fn there_and_back(steps: u128, count: usize) -> usize {
     let last = count.max(1) as u128 - 1;
     let phase = steps % (2 * last).max(1);
     1 + phase.min(2 * last - phase) as usize
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole gray levels")]
 fn in_colour(gray: &GrayImage) -> RgbImage {
     let data = gray.data.iter().flat_map(|&value| [value as u8; 3]).collect();
     RgbImage { width: gray.width, height: gray.height, data }

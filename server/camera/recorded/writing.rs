@@ -185,7 +185,6 @@ fn pretty(header: &Header) -> Vec<u8> {
 }
 
 /// A gray picture as 8-bit PNG; levels are rounded.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels and sizes of pictures")]
 fn png(picture: &GrayImage) -> io::Result<Vec<u8>> {
     let levels: Vec<u8> = picture.data.iter().map(|value| value.round() as u8).collect();
     let mut bytes = Vec::with_capacity(levels.len());

@@ -1,13 +1,5 @@
 //! The picture that `parfocal inspect --out` writes: content area, patch and metrics drawn in.
 
-#![allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    reason = "places and gray levels of pictures"
-)]
-
 use super::report::Report;
 use crate::imaging::{ContentArea, GrayImage, PatchArea, RgbImage};
 

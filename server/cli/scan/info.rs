@@ -127,7 +127,6 @@ fn path(scan: &ScanFolder) -> Vec<f64> {
     scan.poses().values().map(|pose| pose.optimum.get()).collect()
 }
 
-#[allow(clippy::cast_precision_loss, reason = "counts of poses")]
 fn optimum(path: &[f64]) -> Optimum {
     let steps = path.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     Optimum {
@@ -138,7 +137,6 @@ fn optimum(path: &[f64]) -> Optimum {
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "counts of poses")]
 fn deviation(scan: &ScanFolder) -> Option<Deviation> {
     let poses = scan.poses().values();
     let known: Vec<_> = poses.filter_map(|pose| Some((pose.pose, pose.optimum.distance(pose.truth?)))).collect();
@@ -216,7 +214,6 @@ pub(super) fn optics(optics: &Optics, unit: &str) -> String {
 }
 
 /// A curve as a line of bars, from 0 to its greatest value.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "one of eight bars")]
 fn bars(curve: &[f64]) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let most = curve.iter().copied().fold(1e-9, f64::max);

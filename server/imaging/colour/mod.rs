@@ -24,7 +24,6 @@ type BandMatrix = SMatrix<f64, BANDS, BANDS>;
 /// Three rows that make linear sRGB red, green and blue from white-balanced bands: least squares over
 /// [`reflectances::reflectances`] of band responses (Gaussians) against XYZ under D65, ridge-regularised by
 /// [`BAND_NOISE`], then scaled so that white bands give white.
-#[allow(clippy::cast_possible_truncation, reason = "weights near 1")]
 pub(super) fn linear_srgb_from_bands(bands: &[Band; BANDS]) -> [[f32; BANDS]; 3] {
     let xyz = xyz_from_bands(bands);
     let to_rgb = Matrix3::from_fn(|row, column| srgb::FROM_XYZ[row][column]);

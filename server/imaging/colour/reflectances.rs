@@ -64,7 +64,6 @@ pub(super) fn tissue(blood_fraction: f64, saturation: f64, scattering: f64) -> S
     })
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the table")]
 fn extinction(nm: f64) -> [f64; 2] {
     let place = ((nm - 400.0) / 10.0).clamp(0.0, 29.999_999);
     let (index, part) = (place as usize, place.fract());

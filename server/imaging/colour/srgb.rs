@@ -18,7 +18,6 @@ impl Encoder {
     /// What a linear component of 1 is multiplied by to become an index.
     pub(crate) const SCALE: f32 = 4095.0;
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=255 fits u8")]
     #[allow(clippy::large_stack_arrays, reason = "64 KiB, once, on its way to the heap")]
     pub(crate) fn new() -> Self {
         let mut table = Box::new([255; 1 << 16]);
@@ -31,15 +30,12 @@ impl Encoder {
     /// The encoded value of a linear component times [`Self::SCALE`], rounded; anything above is as 1. The table has an
     /// entry for any index, so that none need be checked.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
     pub(crate) fn at(&self, index: u16) -> u8 {
         self.0[usize::from(index)]
     }
 
     /// The index of a linear component times [`Self::SCALE`]; what is out of range is brought into it.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
-    #[allow(clippy::cast_possible_truncation, reason = "the lowest 16 bits are wanted")]
     pub(crate) fn index(scaled: f32) -> u16 {
         // Adding 2^23 leaves the number, rounded, in the lowest bits: cheaper than a cast, which must mind NaN.
         (scaled.clamp(0.0, Self::SCALE) + 8_388_608.0).to_bits() as u16
@@ -59,7 +55,6 @@ mod tests {
     }
 
     #[test]
-    #[allow(clippy::cast_possible_truncation, reason = "f32 is fine enough")]
     fn the_table_is_at_most_one_step_off() {
         let encoder = Encoder::new();
         for step in 0..=100_000 {

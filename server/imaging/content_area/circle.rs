@@ -54,7 +54,6 @@ fn attempt(edges: &[Edge], mut inliers: Vec<Edge>) -> Option<(Circle, f64)> {
 
 /// The circle with the least sum of (x^2 + y^2 - 2ax - 2by - c)^2 (Kasa's fit), which goes through all points where there
 /// are three; none for points on a line. About the points' mean, c is the mean of x^2 + y^2 and two unknowns are left.
-#[allow(clippy::cast_precision_loss, reason = "at most 32 points")]
 fn fit(points: &[Edge]) -> Option<Circle> {
     let count = points.len() as f64;
     let mean = points.iter().map(|point| Vector2::new(point.x, point.y) / count).sum::<Vector2<f64>>();

@@ -33,7 +33,6 @@ pub(super) struct Edge {
 }
 
 /// Every candidate that scores enough; at most one a side of a strip.
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixel places")]
 pub(super) fn find(gray: &GrayImage) -> Vec<Edge> {
     if gray.width <= 2 * BORDER || gray.height < 3 {
         return Vec::new();
@@ -51,7 +50,6 @@ pub(super) fn find(gray: &GrayImage) -> Vec<Edge> {
 }
 
 /// The best-scoring point of row `y` on the way along `columns`, which leads from a border to the middle.
-#[allow(clippy::cast_precision_loss, reason = "pixel places")]
 fn best(gray: &GrayImage, y: usize, columns: impl Iterator<Item = usize>) -> Option<Edge> {
     let mut found = None;
     let mut least = LEAST_SCORE;
@@ -80,7 +78,6 @@ fn best(gray: &GrayImage, y: usize, columns: impl Iterator<Item = usize>) -> Opt
 }
 
 /// How much the point is an edge that faces the picture's centre, 0..=1; 0 where that is less than `least`.
-#[allow(clippy::cast_precision_loss, reason = "pixel places")]
 fn edge_score(gray: &GrayImage, x: usize, y: usize, least: f64) -> f64 {
     let (across, down) = gradient(gray, x, y);
     let strength = across.hypot(down);

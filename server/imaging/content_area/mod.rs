@@ -23,7 +23,6 @@ const RADIUS: (f64, f64) = (0.2, 0.8);
 ///
 /// The same picture always gives the same answer.
 #[must_use]
-#[allow(clippy::cast_precision_loss, reason = "sizes of pictures")]
 pub fn detect(gray: &GrayImage) -> Option<ContentArea> {
     let (width, height) = (gray.width as f64, gray.height as f64);
     let valid = |circle: &Circle| {
@@ -37,7 +36,6 @@ pub fn detect(gray: &GrayImage) -> Option<ContentArea> {
 }
 
 #[cfg(test)]
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "sizes of pictures")]
 mod tests {
     use super::*;
 

@@ -4,12 +4,9 @@
 //! * `Kernel::row` calls a function compiled for AVX2 and FMA; a `Kernel` can only be made where both were detected.
 //! * `reinterpreted` turns arrays of numbers into vectors and back: both sides have the same size (checked when
 //!   compiled) and every bit pattern is a valid value of either.
+//!
+//! Weights are scaled to fit 16 bits, and their sums 32.
 #![allow(unsafe_code, reason = "see above: the processor's vector instructions, after detection")]
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    reason = "weights are scaled to fit 16 bits, and their sums 32"
-)]
 
 use std::arch::x86_64::{
     __m256, __m256i, _mm_max_ps, _mm_min_ps, _mm_set1_ps, _mm_setzero_ps, _mm256_add_epi32, _mm256_castpd_ps,
@@ -123,7 +120,6 @@ fn row(
 
 /// Numbers as vectors, or vectors as numbers.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it is one move, in a loop")]
 fn reinterpreted<A: Copy, B>(from: A) -> B {
     const { assert!(size_of::<A>() == size_of::<B>()) }
     // SAFETY: of one size; numbers and vectors of numbers have no bits that are not a value.

@@ -1,5 +1,4 @@
 //! White balance by references per pixel, in whole numbers: [`DARK`] for dark, [`WHITE`] for white.
-#![allow(clippy::cast_possible_truncation, reason = "the lowest 16 bits are wanted")]
 
 use crate::imaging::calibration::{BANDS, Calibration, Reference};
 use crate::imaging::frame::{CELL, MosaicFrame};
@@ -59,7 +58,6 @@ impl PixelBalance {
     /// White-balances the samples from column `x` on of the row of cells `y` into `balanced`, which is four rows one
     /// after another.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
     pub(super) fn apply(&self, rows: [&[u16]; CELL], x: usize, y: usize, balanced: &mut [u16]) {
         let length = rows[0].len();
         for (row, (samples, balanced)) in rows.into_iter().zip(balanced.chunks_exact_mut(length)).enumerate() {

@@ -1,7 +1,5 @@
 //! Weighted sums over the 16 samples of each mosaic cell.
 
-#![allow(clippy::inline_always, reason = "these take on the instruction set of the function that they are called from")]
-
 use crate::imaging::calibration::BANDS;
 use crate::imaging::frame::CELL;
 

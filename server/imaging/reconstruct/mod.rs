@@ -190,7 +190,6 @@ fn quarters(values: &[u16]) -> [&[u16]; CELL] {
 
 /// Makes one row of pixels and of gray values from four rows of samples: in integers as far as whole vectors go.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
 fn picture_row(
     mixes: &Mixes,
     rows: [&[u16]; CELL],
@@ -219,7 +218,6 @@ fn picture_row(
 }
 
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function that it is called from")]
 fn clamp_gray(gray: &mut [f32]) {
     for value in gray {
         *value = value.clamp(0.0, 255.0);

@@ -1,10 +1,4 @@
 //! Pictures from mosaics, against closed forms.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    clippy::cast_sign_loss,
-    reason = "test pictures"
-)]
 
 use super::*;
 use crate::imaging::Reference;

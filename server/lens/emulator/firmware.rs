@@ -251,7 +251,6 @@ impl Firmware {
         (self.units(LENS_DIOPTRES.0 + lost), self.units(LENS_DIOPTRES.1 - lost))
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "a few thousand units")]
     fn units(&self, dioptre: f64) -> i16 {
         let offset = if self.model.firmware == b'A' { 5.0 } else { 0.0 };
         ((dioptre + offset) * 200.0).round() as i16
@@ -336,7 +335,6 @@ fn spoil_checksum(answer: &mut [u8]) {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "a lens's temperature")]
 fn sixteenths(celsius: f64) -> i16 {
     (celsius * 16.0).round() as i16
 }

@@ -132,7 +132,6 @@ fn confused() -> Trouble {
     LensError::Refused("its reply does not match the request".into()).into()
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "held within the bounds of i16")]
 fn sixteenths(celsius: f64) -> i16 {
     (celsius * 16.0).round().clamp(f64::from(i16::MIN), f64::from(i16::MAX)) as i16
 }

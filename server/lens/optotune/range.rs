@@ -90,7 +90,7 @@ impl Range {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "rounded and within the bounds of i16 by its callers")]
+/// Callers round `value` and keep it within the bounds of `i16`.
 const fn whole(value: f64) -> i16 {
     value as i16
 }

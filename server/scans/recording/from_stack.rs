@@ -1,12 +1,5 @@
 //! A recorded scan out of a focal stack: windows that drift over it, in each of which the optimum walks as the paper's
 //! simulation lets it walk. Every picture shown was really taken.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixels and planes of a stack"
-)]
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::path::Path;

@@ -1,5 +1,4 @@
 //! Whether pictures are a focal stack of one still scene: what can be told from the pictures alone.
-#![allow(clippy::cast_precision_loss, reason = "counts of pictures and pixels")]
 
 use super::{FocalStack, Plane, StackError};
 

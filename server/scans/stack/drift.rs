@@ -4,13 +4,6 @@
 //! The optimum's focal power and the window walk as in simulated scans. At each frame, `planes` neighbouring pictures of the stack
 //! become the range 0..=1, laid so that the plane in which the middle patch is sharpest, smoothed over the way, stands
 //! at the walking focal power as nearly as the stack allows. The true optimum is where the patch's mean gradient magnitude peaks.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "indices of planes and pixels"
-)]
 
 use std::sync::Arc;
 

@@ -1,10 +1,4 @@
 //! A focal stack: pictures of one still scene in order of focus, read from a folder and checked.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "counts of pictures and pixels"
-)]
 
 pub mod check;
 pub mod drift;

@@ -1,6 +1,5 @@
 //! What a focal stack shows of its optic: focus curves of several places, how fast blur grows with the distance to the focus,
 //! how soft the sharpest picture is, and how magnification changes.
-#![allow(clippy::cast_precision_loss, reason = "counts of pictures and pixels")]
 
 use serde::Serialize;
 
@@ -232,7 +231,6 @@ mod tests {
         let sample = |x: f64, y: f64| {
             let clamped = |v: f64| v.clamp(0.0, SIDE as f64 - 1.001);
             let (x, y) = (clamped(x), clamped(y));
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels")]
             let (left, top) = (x as usize, y as usize);
             let at = |dx, dy| f64::from(sharp.data[(top + dy) * SIDE + left + dx]);
             let (fx, fy) = (x - left as f64, y - top as f64);
@@ -242,7 +240,6 @@ mod tests {
             let zoom = 1.004f64.powf(index as f64);
             let centre = SIDE as f64 / 2.0;
             let place = |v: usize| centre + (v as f64 - centre) / zoom;
-            #[allow(clippy::cast_possible_truncation, reason = "gray levels")]
             let data = (0..SIDE * SIDE).map(|i| sample(place(i % SIDE), place(i / SIDE)) as f32).collect();
             GrayImage { width: SIDE, height: SIDE, data }
         };

@@ -1,7 +1,5 @@
 //! The phantom's relief: gyri and sulci, the fissure, and the rim of the craniotomy.
 
-#![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "sizes here are far below 2^24")]
-
 use std::f32::consts::{PI, TAU};
 
 use multiversion::multiversion;
@@ -117,7 +115,6 @@ fn shape_row(shape: &Shape<'_>, out: [&mut [f32]; 4]) {
 
 /// 1 at 0, falling as 1 / (1 + x^2).
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "must be compiled within the caller's instruction set")]
 fn falloff(x: f32) -> f32 {
     1.0 / (1.0 + x * x)
 }

@@ -1,12 +1,5 @@
 //! Defocus: the surface as seen through discs of confusion of rising radius, ready to be looked up per pixel.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "places on the surface, clamped to it"
-)]
-
 use multiversion::multiversion;
 
 use super::spectra::ENDMEMBERS;
@@ -64,7 +57,6 @@ impl Stack {
     /// The surface at a place (in texels), through a disc of the given squared radius: between the two nearest levels
     /// such that the second moment is exact.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     pub(super) fn at(&self, u: f32, v: f32, square: f32) -> [f32; ENDMEMBERS] {
         let index = ((square * (1.0 / SQUARE_STEP)) as usize).min(self.below.len() - 1);
         let below = usize::from(self.below[index]);
@@ -101,7 +93,6 @@ impl Level {
 
     /// Bilinear look-up; the border's value beyond it.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     fn at(&self, u: f32, v: f32) -> [f32; ENDMEMBERS] {
         let last = (self.side - 1) as f32 - 0.001;
         let x = ((u + 0.5) * self.scale - 0.5).clamp(0.0, last);

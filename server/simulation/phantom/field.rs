@@ -1,7 +1,5 @@
 //! Square fields of numbers over the phantom's surface: smooth noise, spline upsampling, slopes.
 
-#![allow(clippy::cast_precision_loss, reason = "sizes here are far below 2^24")]
-
 use multiversion::multiversion;
 use rand::{Rng, RngExt};
 
@@ -36,7 +34,6 @@ impl Field {
     }
 
     /// Value nearest to a place; the border's beyond it.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the grid")]
     pub(super) fn near(&self, x: f32, y: f32) -> f32 {
         let last = (self.side - 1) as f32;
         self.data[y.clamp(0.0, last) as usize * self.side + x.clamp(0.0, last) as usize]

@@ -1,12 +1,5 @@
 //! The brain phantom: a generated brain surface seen by a hand-held hyperspectral camera, for work without a device.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    clippy::cast_sign_loss,
-    reason = "pixels of the patch, and focal power in f32"
-)]
-
 mod cortex;
 mod defocus;
 mod field;

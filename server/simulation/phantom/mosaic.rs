@@ -13,7 +13,6 @@ pub(super) struct Bands([[f32; ENDMEMBERS]; BANDS]);
 
 impl Bands {
     /// The bands of a sensor whose white is full scale, as the default calibration has it.
-    #[allow(clippy::cast_possible_truncation, reason = "reflectances")]
     pub(super) fn new(calibration: &Calibration) -> Self {
         Self(
             calibration.bands.map(|band| {
@@ -23,7 +22,6 @@ impl Bands {
     }
 
     /// Mean response over the bands, for a gray value on the 0..255 scale.
-    #[allow(clippy::cast_precision_loss, reason = "a handful of bands")]
     pub(super) fn gray(&self) -> [f32; ENDMEMBERS] {
         let share = 255.0 / FULL_SCALE / BANDS as f32;
         std::array::from_fn(|k| share * self.0.iter().map(|band| band[k]).sum::<f32>())

@@ -1,12 +1,5 @@
 //! A brain's surface in a craniotomy, generated from a seed: what it is made of at each texel, and its relief.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "texel values, clamped to their range"
-)]
-
 use multiversion::multiversion;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,12 +1,5 @@
 //! The sensor that the phantom is seen with: shot noise, read noise, unequal pixels, saturation, and auto-exposure.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "10-bit counts, clamped to their range"
-)]
-
 use multiversion::multiversion;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -121,12 +121,6 @@ pub fn endmembers_in_band(centre: f64, fwhm: f64) -> [f64; ENDMEMBERS] {
 }
 
 /// Extinction at a wavelength, linear between the table's entries.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "clamped to the table"
-)]
 fn extinction(nanometres: f64) -> [f64; 2] {
     let last = (EXTINCTION.len() - 1) as f64;
     let place = ((nanometres - FIRST_NM) / STEP_NM).clamp(0.0, last);

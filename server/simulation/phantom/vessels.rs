@@ -1,12 +1,5 @@
 //! Pial vessels: arteries and veins that branch over the surface by Murray's law.
 
-#![allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "places on the surface, clamped to it"
-)]
-
 use std::f32::consts::TAU;
 
 use rand::{Rng, RngExt};

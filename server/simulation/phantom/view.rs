@@ -1,7 +1,5 @@
 //! The camera's view: which place of the surface each mosaic cell sees, how far out of focus, and in what light.
 
-#![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "places on the surface, in f32")]
-
 use std::ops::Range;
 
 use multiversion::multiversion;
@@ -152,7 +150,6 @@ impl Mapping {
 
     /// Place on the surface that a pixel sees, texels.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     pub(super) fn place(&self, x: f32, y: f32) -> (f32, f32) {
         let (x, y) = (x - self.centre[0], y - self.centre[1]);
         let [cos, sin] = self.across;
@@ -161,7 +158,6 @@ impl Mapping {
 
     /// Focal power that would be sharp at a pixel that sees a place of this height; may lie outside 0..=1.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
     pub(super) fn sharp_at(&self, x: f32, y: f32, height: f32) -> f32 {
         let (x, y) = (x - self.centre[0], y - self.centre[1]);
         self.focus[0] + self.focus[1] * x + self.focus[2] * y + self.per_height * height
@@ -170,8 +166,6 @@ impl Mapping {
 
 /// Height of the surface at a place, from the relief of every second texel.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
-#[allow(clippy::cast_sign_loss, reason = "clamped to the surface")]
 pub(super) fn height_at(relief: &Field, u: f32, v: f32) -> f32 {
     let last = (relief.side - 1) as f32;
     let (x, y) = ((0.5 * u).clamp(0.0, last) as u32, (0.5 * v).clamp(0.0, last) as u32);
@@ -201,7 +195,6 @@ pub(super) fn look(
 
 /// What one cell sees at `focal_power`: abundances times light.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "it takes on the instruction set of the function around it")]
 pub(super) fn look_at(
     x: usize,
     y: usize,

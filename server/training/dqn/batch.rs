@@ -1,10 +1,4 @@
 //! A batch of windows of consecutive frames, and what the action values of its states are fitted to.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_precision_loss,
-    reason = "small counts as tensor sizes and shares"
-)]
 
 use tch::{Device, Tensor};
 
@@ -206,7 +200,6 @@ mod tests {
     }
 
     /// In ten thousandths.
-    #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
     fn rounded(value: f64) -> i32 {
         (1e4 * value).round() as i32
     }

@@ -1,11 +1,5 @@
 //! Deep Q-learning on simulated focal-time scans (Mnih et al. 2015; double: van Hasselt et al. 2016), on windows of
 //! consecutive frames, so that each patch is encoded once for all the states that hold it.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_precision_loss,
-    reason = "small counts as tensor sizes and shares"
-)]
 
 mod batch;
 mod encoder;

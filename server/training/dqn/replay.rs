@@ -1,5 +1,4 @@
 //! Replay memory: the latest frames of every seat, patches as bytes, from which windows of consecutive frames are drawn.
-#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels are whole numbers, 0..=255")]
 
 use rand::{Rng, RngExt};
 

@@ -1,6 +1,5 @@
 //! A value network as training runs it: on frames in their compact form, its head's gradient by hand, and on the processor its
 //! encoder's too.
-#![allow(clippy::cast_possible_wrap, reason = "small counts as tensor sizes")]
 
 use tch::{Device, Kind, Tensor, nn};
 

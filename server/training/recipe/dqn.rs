@@ -1,5 +1,4 @@
 //! How a DQN policy is trained: what a recipe's `[dqn]` section holds.
-#![allow(clippy::cast_precision_loss, reason = "counts of frames")]
 
 use serde::{Deserialize, Serialize};
 

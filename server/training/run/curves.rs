@@ -1,5 +1,4 @@
 //! A training's curves: as lines of text, and as a picture.
-#![allow(clippy::cast_precision_loss, reason = "counts of updates")]
 
 use crate::plot::{Axis, Plot};
 

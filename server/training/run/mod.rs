@@ -1,6 +1,5 @@
 //! One training from beginning to end: legs of updates, validations, checkpoints, and the best weights so far, in a run
 //! folder.
-#![allow(clippy::cast_possible_truncation, reason = "event files hold single precision")]
 
 mod begin;
 pub mod checkpoint;

@@ -51,7 +51,6 @@ impl EventFile {
 }
 
 /// An event's beginning: field 1, the wall clock in seconds.
-#[allow(clippy::cast_precision_loss, reason = "milliseconds since 1970 fit 53 bits")]
 fn seconds(clock: &dyn Clock) -> Vec<u8> {
     let mut event = vec![1 << 3 | 1];
     event.extend((clock.wall().as_millisecond() as f64 / 1000.0).to_le_bytes());
@@ -64,7 +63,6 @@ fn put_bytes(message: &mut Vec<u8>, field: u8, bytes: &[u8]) {
     message.extend_from_slice(bytes);
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "seven bits at a time")]
 fn put_varint(message: &mut Vec<u8>, mut value: u64) {
     while value >= 0x80 {
         message.push(value as u8 | 0x80);

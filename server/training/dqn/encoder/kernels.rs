@@ -1,10 +1,5 @@
 //! The encoder's arithmetic, forward and backward, a patch at a time. Its eight filters lie side by side in one 256-bit
 //! register, and what a patch needs fits the first-level cache: that is what libtorch, made for wide layers, cannot use.
-#![allow(
-    clippy::inline_always,
-    reason = "each must be compiled anew for each instruction set that its caller is compiled for"
-)]
-#![allow(clippy::cast_precision_loss, reason = "sums of gray levels")]
 #![allow(clippy::needless_range_loop, reason = "plain index loops of fixed length are what compiles to vector code")]
 
 use multiversion::multiversion;

@@ -15,7 +15,6 @@ fn patches(count: usize, rng: &mut impl Rng) -> Vec<u8> {
         for pixel in 0..1024u16 {
             let ramp = slope * f32::from(pixel % 32);
             let level = 20.0 + ramp + f32::from(rng.random_range(0..noise));
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a gray level")]
             levels.push(if patch == 0 { 77 } else { level as u8 });
         }
     }
