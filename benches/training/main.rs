@@ -14,8 +14,8 @@ use parfocal::scans::pictures::{Split, varied};
 use parfocal::scans::scenery::Scenery;
 use parfocal::scans::variety::Variety;
 use parfocal::training::dqn::DqnTrainer;
-use parfocal::training::dqn::replay::{Replay, Seen, Step};
-use parfocal::training::environment::Session;
+use parfocal::training::dqn::replay::{Replay, Seen, Transition};
+use parfocal::training::environment::Environment;
 use parfocal::training::recipe::{Recipe, shipped};
 use parfocal::training::trainer::Trainer;
 use rand::SeedableRng;
@@ -36,12 +36,13 @@ fn environment(clips: &[Arc<Clip>]) {
     let scenery = Scenery::from(clips.to_vec());
     for (name, share) in [("reference scans", 0.0), ("varied scans", 1.0)] {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut sessions: Vec<_> = (0..64).map(|_| Session::draw(&scenery, Variety { share }, 0.0, &mut rng)).collect();
+        let mut environments: Vec<_> =
+            (0..64).map(|_| Environment::draw(&scenery, Variety { share }, 0.0, &mut rng)).collect();
         let rounds = rate(200, || {
-            for session in &mut sessions {
-                black_box(session.observe());
-                let target = session.focal_power().get() + 0.01;
-                session.advance(target);
+            for environment in &mut environments {
+                black_box(environment.observe());
+                let target = environment.focal_power().get() + 0.01;
+                environment.advance(target);
             }
         });
         println!("environment, {name}: {:.0} steps a second", 64.0 * rounds);
@@ -84,7 +85,7 @@ fn memory() {
     let mut replay = Replay::new(FRAMES, 8);
     let seen = Seen::patch(&Patch([7.0; PATCH_SIDE * PATCH_SIDE]));
     for index in 0..FRAMES {
-        replay.push(index % 8, &seen, Step::default());
+        replay.push(index % 8, &seen, Transition::default());
     }
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let resident: f64 =

@@ -13,7 +13,7 @@ use crate::notices::tell;
 use crate::training::recipe::LEG;
 use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
 use crate::training::run::comparison::{TrainedRun, markdown};
-use crate::training::run::resume::Asked;
+use crate::training::run::resume::ResumeRequest;
 use crate::training::run::{Progress, Run};
 
 /// Where to compute.
@@ -164,14 +164,14 @@ fn begin(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
 }
 
 fn resume(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
-    let asked = Asked {
+    let request = ResumeRequest {
         name: arguments.policy.clone(),
         recipe: own_recipe(arguments)?,
         updates: arguments.updates,
         seed: arguments.seed,
         footage: arguments.footage.clone(),
     };
-    Ok(Run::resume(&arguments.out, &asked, device)?)
+    Ok(Run::resume(&arguments.out, &request, device)?)
 }
 
 /// The recipe in the file that `--config` names.

@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tch::{Device, Kind, Tensor, nn};
 
-use super::environment::{Session, lead_astray};
+use super::environment::{Environment, lead_astray};
 use super::optimiser::{Optimiser, half_cosine};
 use super::recipe::belief::BeliefRecipe;
 use super::run::checkpoint::{Checkpoint, CheckpointError};
@@ -22,14 +22,14 @@ pub struct BeliefTrainer {
     store: nn::VarStore,
     network: BeliefNetwork,
     optimiser: Optimiser,
-    seats: Vec<Seat>,
+    actors: Vec<Actor>,
     memory: Tensor,
     rng: ChaCha8Rng,
     updates: u64,
 }
 
-struct Seat {
-    session: Session,
+struct Actor {
+    environment: Environment,
     trace: Trace,
     windows_left: usize,
 }
@@ -49,23 +49,23 @@ impl BeliefTrainer {
         let store = nn::VarStore::new(device);
         let network = BeliefNetwork::new(&store.root());
         let optimiser = Optimiser::new(recipe.optimiser, &store);
-        let seats = Vec::new();
+        let actors = Vec::new();
         let memory = network.blank(recipe.scans, device);
-        let mut trainer = Self { recipe, scenery, store, network, optimiser, seats, memory, rng, updates: 0 };
+        let mut trainer = Self { recipe, scenery, store, network, optimiser, actors, memory, rng, updates: 0 };
         trainer.begin_leg(seed);
         trainer
     }
 
     fn collect(&mut self) -> Batch {
-        let (count, window, device) = (self.seats.len(), self.recipe.window, self.store.device());
+        let (count, window, device) = (self.actors.len(), self.recipe.window, self.store.device());
         let mut inputs = vec![0.0f32; count * window * BELIEF_INPUT];
         let mut beliefs = vec![0.0f32; count * window * BINS];
         let mut now = vec![0.0f32; count * BELIEF_INPUT];
         let mut believed = vec![0.0f32; count * BINS];
         for t in 0..window {
-            for (index, seat) in self.seats.iter_mut().enumerate() {
-                let patch = seat.session.observe();
-                let input = seat.trace.input(&patch, seat.session.focal_power().get());
+            for (index, actor) in self.actors.iter_mut().enumerate() {
+                let patch = actor.environment.observe();
+                let input = actor.trace.input(&patch, actor.environment.focal_power().get());
                 now[index * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
                 inputs[(index * window + t) * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
             }
@@ -73,15 +73,15 @@ impl BeliefTrainer {
             let (logits, memory) = tch::no_grad(|| self.network.forward(&tensor, &self.memory));
             self.memory = memory;
             logits.view([-1, BINS as i64]).softmax(-1, Kind::Float).copy_data(&mut believed, count * BINS);
-            for (index, seat) in self.seats.iter_mut().enumerate() {
-                let stands = seat.session.focal_power().get();
-                let mut aim = seat.trace.aim(stands, &believed[index * BINS..][..BINS]);
-                if seat.session.wanders {
+            for (index, actor) in self.actors.iter_mut().enumerate() {
+                let stands = actor.environment.focal_power().get();
+                let mut aim = actor.trace.aim(stands, &believed[index * BINS..][..BINS]);
+                if actor.environment.wanders {
                     aim = lead_astray(aim, &mut self.rng);
                 }
-                seat.trace.ask(aim.clamp(0.0, 1.0));
-                seat.session.advance(aim);
-                let place = seat.session.optimum().get();
+                actor.trace.ask(aim.clamp(0.0, 1.0));
+                actor.environment.advance(aim);
+                let place = actor.environment.optimum().get();
                 spread_over_bins(place, &mut beliefs[(index * window + t) * BINS..][..BINS]);
             }
         }
@@ -93,10 +93,10 @@ impl BeliefTrainer {
     }
 
     fn replace_finished(&mut self) {
-        for (index, seat) in self.seats.iter_mut().enumerate() {
-            seat.windows_left -= 1;
-            if seat.windows_left == 0 {
-                *seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
+        for (index, actor) in self.actors.iter_mut().enumerate() {
+            actor.windows_left -= 1;
+            if actor.windows_left == 0 {
+                *actor = Actor::draw(&self.recipe, &self.scenery, &mut self.rng);
                 let _ = self.memory.select(1, index as i64).fill_(0.0);
             }
         }
@@ -115,12 +115,12 @@ impl Trainer for BeliefTrainer {
     fn begin_leg(&mut self, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = |index| {
-            let mut seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
+            let mut actor = Actor::draw(&self.recipe, &self.scenery, &mut self.rng);
             // Scans end one after another, not all at once.
-            seat.windows_left = 1 + index % self.recipe.windows_a_scan;
-            seat
+            actor.windows_left = 1 + index % self.recipe.windows_a_scan;
+            actor
         };
-        self.seats = (0..self.recipe.scans).map(&mut draw).collect();
+        self.actors = (0..self.recipe.scans).map(&mut draw).collect();
         self.memory = self.network.blank(self.recipe.scans, self.store.device());
     }
 
@@ -152,9 +152,9 @@ impl Trainer for BeliefTrainer {
     }
 }
 
-impl Seat {
+impl Actor {
     fn draw(recipe: &BeliefRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
-        let session = Session::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
-        Self { session, trace: Trace::default(), windows_left: recipe.windows_a_scan }
+        let environment = Environment::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
+        Self { environment, trace: Trace::default(), windows_left: recipe.windows_a_scan }
     }
 }

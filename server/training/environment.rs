@@ -17,7 +17,7 @@ const MOST_DELAY: usize = 2;
 
 /// One of the many scans that run side by side in training.
 #[derive(Debug, Clone)]
-pub struct Session {
+pub struct Environment {
     scan: Scan,
     focal_power: FocalPower,
     /// Share of the way to its target that the lens goes within a frame.
@@ -30,8 +30,8 @@ pub struct Session {
     pub wanders: bool,
 }
 
-impl Session {
-    /// A session on a scan over a scene that `rng` draws from `scenery`.
+impl Environment {
+    /// An environment on a scan over a scene that `rng` draws from `scenery`.
     pub fn draw(scenery: &Scenery, variety: Variety, wandering: f64, rng: &mut ChaCha8Rng) -> Self {
         let scene = scenery.draw(rng);
         let settings = variety.draw(&scene, rng);
@@ -77,7 +77,7 @@ impl Session {
     }
 }
 
-/// A target in the place of `target` where a wandering session is led astray: now and then, by up to 0.3.
+/// A target in the place of `target` where a wandering environment is led astray: now and then, by up to 0.3.
 pub fn lead_astray(target: f64, rng: &mut impl Rng) -> f64 {
     if rng.random_bool(0.04) { target + rng.random_range(-0.3..0.3) } else { target }
 }

@@ -19,7 +19,7 @@ use parfocal::training::recipe::LEG;
 use parfocal::training::recipe::{Recipe, shipped};
 use parfocal::training::run::Run;
 use parfocal::training::run::checkpoint::Checkpoint;
-use parfocal::training::run::resume::Asked;
+use parfocal::training::run::resume::ResumeRequest;
 
 /// The recipe that ships for `policy`, small.
 fn small(policy: &str, updates: u64) -> Recipe {
@@ -42,7 +42,7 @@ fn begin(recipe: &Recipe, folder: &Path) -> Run {
 }
 
 fn resume(policy: &str, folder: &Path) -> Run {
-    let asked = Asked { name: policy.to_owned(), ..Asked::default() };
+    let asked = ResumeRequest { name: policy.to_owned(), ..ResumeRequest::default() };
     Run::resume(folder, &asked, tch::Device::Cpu).unwrap()
 }
 
@@ -166,7 +166,7 @@ fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
     assert!(!train(begun, 1));
     let again = |footage: &[&PathBuf], seed: Option<u64>| {
         let footage = footage.iter().copied().cloned().collect();
-        let asked = Asked { name: "mgm-learned".to_owned(), footage, seed, ..Asked::default() };
+        let asked = ResumeRequest { name: "mgm-learned".to_owned(), footage, seed, ..ResumeRequest::default() };
         Run::resume(&run, &asked, tch::Device::Cpu).map(|run| run.updates()).map_err(|error| error.to_string())
     };
     assert_eq!(again(&[], Some(7)), Ok(LEG));

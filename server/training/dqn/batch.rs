@@ -2,7 +2,7 @@
 
 use tch::{Device, Tensor};
 
-use super::replay::{Frames, Step};
+use super::replay::{Frames, Transition};
 use crate::autofocus::learned::{action_step, scaled_focal_power};
 use crate::autofocus::networks::{ACTIONS, HISTORY};
 use crate::autofocus::{IN_FOCUS, STEP};
@@ -16,32 +16,32 @@ pub(super) struct Batch {
     pub history: Tensor,
     /// `[S, 8]`: the scaled focal powers at these.
     pub focal_powers: Tensor,
-    pub steps: Vec<Step>,
+    pub transitions: Vec<Transition>,
     /// Frames that are states: their history lies in their window.
     pub states: Vec<usize>,
 }
 
 impl Batch {
     /// A batch of `frames`, `window` of them in each window, for a network on `device`.
-    pub fn new(frames: Frames, steps: Vec<Step>, window: usize, device: Device) -> Self {
-        let states: Vec<usize> = (0..steps.len()).filter(|&at| at % window >= reach(&steps[at])).collect();
+    pub fn new(frames: Frames, transitions: Vec<Transition>, window: usize, device: Device) -> Self {
+        let states: Vec<usize> = (0..transitions.len()).filter(|&at| at % window >= reach(&transitions[at])).collect();
         let latest = |&at: &usize| {
-            let reach = reach(&steps[at]);
+            let reach = reach(&transitions[at]);
             (0..HISTORY).rev().map(move |back| at - back.min(reach))
         };
         let history: Vec<usize> = states.iter().flat_map(latest).collect();
         let focal_powers: Vec<f32> =
-            history.iter().map(|&at| scaled_focal_power(f64::from(steps[at].focal_power))).collect();
+            history.iter().map(|&at| scaled_focal_power(f64::from(transitions[at].focal_power))).collect();
         let history: Vec<i64> = history.into_iter().map(|at| at as i64).collect();
         let history = Tensor::from_slice(&history).to_device(device);
         let focal_powers = Tensor::from_slice(&focal_powers).view([-1, HISTORY as i64]).to_device(device);
-        Self { frames, history, focal_powers, steps, states }
+        Self { frames, history, focal_powers, transitions, states }
     }
 }
 
-/// Frames of its own scan that a step's state reaches back.
-fn reach(step: &Step) -> usize {
-    usize::from(step.age).min(HISTORY - 1)
+/// Frames of its own scan that a transition's state reaches back.
+fn reach(transition: &Transition) -> usize {
+    usize::from(transition.age).min(HISTORY - 1)
 }
 
 /// What moving earns by itself, in steps: the fields of [`crate::training::recipe::dqn::Target::Lookahead`].
@@ -51,14 +51,14 @@ pub(super) struct Bonus {
     pub turning: f64,
 }
 
-/// What each action would gain at the frame after the last of `steps` over standing still, in steps; and what moving earns by itself
+/// What each action would gain at the frame after the last of `transitions` over standing still, in steps; and what moving earns by itself
 /// where the picture is well out of focus: only who moves learns where to go.
-pub(super) fn gains(steps: &[Step], bonus: Bonus) -> [f32; ACTIONS] {
-    let Some(step) = steps.last() else { return [0.0; ACTIONS] };
-    let (stands, best) = (FocalPower::nearest(f64::from(step.focal_power)), f64::from(step.next_optimum));
+pub(super) fn gains(transitions: &[Transition], bonus: Bonus) -> [f32; ACTIONS] {
+    let Some(transition) = transitions.last() else { return [0.0; ACTIONS] };
+    let (stands, best) = (FocalPower::nearest(f64::from(transition.focal_power)), f64::from(transition.next_optimum));
     let error = (stands.get() - best).abs();
     let lost = (error / IN_FOCUS - 0.5).clamp(0.0, 1.0);
-    let heading = heading(steps);
+    let heading = heading(transitions);
     std::array::from_fn(|action| {
         let goes = stands.moved(action_step(action)).get();
         let moved = goes - stands.get();
@@ -73,9 +73,9 @@ pub(super) fn gains(steps: &[Step], bonus: Bonus) -> [f32; ACTIONS] {
     })
 }
 
-/// The latest change of focal power that the state of the last of `steps` shows; 0 for none.
-fn heading(steps: &[Step]) -> f64 {
-    let changes = steps.windows(2).rev().take(HISTORY - 1).take_while(|pair| pair[1].age > pair[0].age);
+/// The latest change of focal power that the state of the last of `transitions` shows; 0 for none.
+fn heading(transitions: &[Transition]) -> f64 {
+    let changes = transitions.windows(2).rev().take(HISTORY - 1).take_while(|pair| pair[1].age > pair[0].age);
     let mut changes = changes.map(|pair| f64::from(pair[1].focal_power - pair[0].focal_power));
     changes.find(|change| change.abs() > 1e-6).unwrap_or(0.0)
 }
@@ -90,10 +90,10 @@ pub(super) struct Returns {
 
 impl Returns {
     /// The return of the frames from `at` on, up to the state `steps` later, whose value is `next_value`.
-    fn of(&self, steps: &[Step], at: usize, next_value: f64) -> f64 {
+    fn of(&self, transitions: &[Transition], at: usize, next_value: f64) -> f64 {
         let end = at + self.steps;
         let mut sum = 0.0;
-        for (ahead, pair) in steps[at..=end].windows(2).enumerate() {
+        for (ahead, pair) in transitions[at..=end].windows(2).enumerate() {
             let error = f64::from((pair[0].next_optimum - pair[1].focal_power).abs());
             sum -= self.discount.powi(ahead as i32) * error;
         }
@@ -101,14 +101,14 @@ impl Returns {
         if !self.regret {
             return later.mul_add(next_value, sum);
         }
-        let shaped = sum + later * self.oracle(&steps[end]) - self.oracle(&steps[at]);
+        let shaped = sum + later * self.oracle(&transitions[end]) - self.oracle(&transitions[at]);
         // Mean regret a frame, roughly, whatever the horizon.
         later.mul_add(next_value, shaped * (1.0 - self.discount) / STEP)
     }
 
-    /// What an oracle that steps towards the optimum would yet get from where `step` stands, were the optimum to stay.
-    fn oracle(&self, step: &Step) -> f64 {
-        let mut error = f64::from((step.next_optimum - step.focal_power).abs());
+    /// What an oracle that steps towards the optimum would yet get from where `transition` stands, were the optimum to stay.
+    fn oracle(&self, transition: &Transition) -> f64 {
+        let mut error = f64::from((transition.next_optimum - transition.focal_power).abs());
         let (mut sum, mut weight) = (0.0, 1.0);
         while error > STEP {
             error -= STEP;
@@ -120,62 +120,63 @@ impl Returns {
 }
 
 /// What values should be: `None` where nothing is known of an action's.
-pub(super) type Wanted = Vec<[Option<f32>; ACTIONS]>;
+pub(super) type Targets = Vec<[Option<f32>; ACTIONS]>;
 
 /// What the lookahead wants of each state: all actions' [`gains`].
-pub(super) fn lookahead(batch: &Batch, bonus: Bonus) -> Wanted {
-    batch.states.iter().map(|&at| gains(&batch.steps[..=at], bonus).map(Some)).collect()
+pub(super) fn lookahead(batch: &Batch, bonus: Bonus) -> Targets {
+    batch.states.iter().map(|&at| gains(&batch.transitions[..=at], bonus).map(Some)).collect()
 }
 
 /// What Bellman's equation wants of the action taken in each state whose successor some steps on is in the batch.
 /// `next_values` are the states' own, by row.
-pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Returns, window: usize) -> Wanted {
-    let mut row_of = vec![None; batch.steps.len()];
+pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Returns, window: usize) -> Targets {
+    let mut row_of = vec![None; batch.transitions.len()];
     for (row, &at) in batch.states.iter().enumerate() {
         row_of[at] = Some(row);
     }
-    let wanted = |&at: &usize| {
-        let mut wanted = [None; ACTIONS];
+    let targets = |&at: &usize| {
+        let mut targets = [None; ACTIONS];
         let end = at + returns.steps;
         let same_scan = end / window == at / window
-            && usize::from(batch.steps[end].age) == usize::from(batch.steps[at].age) + returns.steps;
+            && usize::from(batch.transitions[end].age) == usize::from(batch.transitions[at].age) + returns.steps;
         if let Some(last) = same_scan.then(|| row_of[end]).flatten() {
-            let value = returns.of(&batch.steps, at, f64::from(next_values[last]));
-            wanted[usize::from(batch.steps[at].action)] = Some(value as f32);
+            let value = returns.of(&batch.transitions, at, f64::from(next_values[last]));
+            targets[usize::from(batch.transitions[at].action)] = Some(value as f32);
         }
-        wanted
+        targets
     };
-    batch.states.iter().map(wanted).collect()
+    batch.states.iter().map(targets).collect()
 }
 
-/// The mean smooth L1 loss of `values` (`[S, 3]`, row by row) where something is wanted of them, and its gradient by them:
+/// The mean smooth L1 loss of `values` (`[S, 3]`, row by row) where something is targets of them, and its gradient by them:
 /// Huber's (1964), quadratic within 1.
-pub(super) fn smooth_l1(values: &[f32], wanted: &Wanted) -> (f64, Vec<f32>) {
-    let wanted = wanted.as_flattened();
-    let count = wanted.iter().flatten().count().max(1) as f64;
+pub(super) fn smooth_l1(values: &[f32], targets: &Targets) -> (f64, Vec<f32>) {
+    let targets = targets.as_flattened();
+    let count = targets.iter().flatten().count().max(1) as f64;
     let mut loss = 0.0;
-    let slope = |(value, wanted): (&f32, &Option<f32>)| {
-        let difference = wanted.map_or(0.0, |wanted| f64::from(value - wanted));
+    let slope = |(value, targets): (&f32, &Option<f32>)| {
+        let difference = targets.map_or(0.0, |targets| f64::from(value - targets));
         let size = difference.abs();
         loss += if size < 1.0 { 0.5 * size * size } else { size - 0.5 };
         (difference.clamp(-1.0, 1.0) / count) as f32
     };
-    let slopes = values.iter().zip(wanted).map(slope).collect();
-    (loss / count, slopes)
+    let grad_output = values.iter().zip(targets).map(slope).collect();
+    (loss / count, grad_output)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn steps(focal_powers: &[f32], next_optimum: f32) -> Vec<Step> {
-        let step = |(age, &focal_power): (usize, &f32)| Step { focal_power, next_optimum, action: 1, age: age as u16 };
-        focal_powers.iter().enumerate().map(step).collect()
+    fn transitions(focal_powers: &[f32], next_optimum: f32) -> Vec<Transition> {
+        let transition =
+            |(age, &focal_power): (usize, &f32)| Transition { focal_power, next_optimum, action: 1, age: age as u16 };
+        focal_powers.iter().enumerate().map(transition).collect()
     }
 
     /// In thousandths of a step.
     fn gained(focal_powers: &[f32], next_optimum: f32, restless: f64, turning: f64) -> [i32; ACTIONS] {
-        gains(&steps(focal_powers, next_optimum), Bonus { restless, turning })
+        gains(&transitions(focal_powers, next_optimum), Bonus { restless, turning })
             .map(|gain| (1000.0 * gain).round() as i32)
     }
 
@@ -206,32 +207,32 @@ mod tests {
 
     #[test]
     fn returns_by_hand() {
-        let mut steps = steps(&[0.5, 0.55, 0.6], 0.6);
-        (steps[0].next_optimum, steps[1].next_optimum) = (0.62, 0.5);
+        let mut transitions = transitions(&[0.5, 0.55, 0.6], 0.6);
+        (transitions[0].next_optimum, transitions[1].next_optimum) = (0.62, 0.5);
         let plain = Returns { discount: 0.5, steps: 2, regret: false };
         // -(0.62 - 0.55) - 0.5 * (0.6 - 0.5), and a quarter of what the last state is worth.
-        assert_eq!(rounded(plain.of(&steps, 0, 4.0)), 8800);
+        assert_eq!(rounded(plain.of(&transitions, 0, 4.0)), 8800);
         // An oracle at 0.5 is 0.07, then 0.02 away from 0.62; at the end, 0. In steps, over the horizon of two frames.
         let regret = Returns { regret: true, ..plain };
-        assert_eq!(rounded(regret.of(&steps, 0, 4.0)), 6000);
+        assert_eq!(rounded(regret.of(&transitions, 0, 4.0)), 6000);
     }
 
     #[test]
     fn returns_stay_within_a_window_and_a_scan() {
         // Two windows of four frames, a scan's end in the middle of the first.
         let ages = [0, 1, 0, 1, 0, 1, 2, 3];
-        let step = |(at, age): (usize, u16)| Step {
+        let transition = |(at, age): (usize, u16)| Transition {
             focal_power: 0.5,
             next_optimum: 0.5 + at as f32 / 10.0,
             action: 1 + (at % 2) as u8,
             age,
         };
-        let steps: Vec<Step> = ages.into_iter().enumerate().map(step).collect();
-        let batch = Batch::new(Frames::default(), steps, 4, Device::Cpu);
+        let transitions: Vec<Transition> = ages.into_iter().enumerate().map(transition).collect();
+        let batch = Batch::new(Frames::default(), transitions, 4, Device::Cpu);
         assert_eq!(batch.states, [0, 1, 2, 3, 4, 5, 6, 7]);
         let values = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
-        let wanted = bellman(&batch, &values, Returns { discount: 0.5, steps: 1, regret: false }, 4);
-        let told: Vec<_> = wanted
+        let targets = bellman(&batch, &values, Returns { discount: 0.5, steps: 1, regret: false }, 4);
+        let told: Vec<_> = targets
             .iter()
             .map(|row| row.iter().enumerate().find_map(|(action, value)| value.map(|v| (action, rounded(v.into())))))
             .collect();
@@ -246,13 +247,13 @@ mod tests {
             None,
         ];
         assert_eq!(told, by_hand);
-        assert!(wanted.iter().all(|row| row.iter().flatten().count() <= 1), "of the action taken alone");
+        assert!(targets.iter().all(|row| row.iter().flatten().count() <= 1), "of the action taken alone");
     }
 
     #[test]
     fn smooth_l1_by_hand() {
-        let (loss, slopes) = smooth_l1(&[0.5, 9.0, -2.0], &vec![[Some(0.1), None, Some(1.0)]]);
+        let (loss, grad_output) = smooth_l1(&[0.5, 9.0, -2.0], &vec![[Some(0.1), None, Some(1.0)]]);
         assert!((loss - 1.29).abs() < 1e-6);
-        assert_eq!(slopes.iter().map(|slope| (1000.0 * slope).round() as i32).collect::<Vec<_>>(), [200, 0, -500]);
+        assert_eq!(grad_output.iter().map(|slope| (1000.0 * slope).round() as i32).collect::<Vec<_>>(), [200, 0, -500]);
     }
 }

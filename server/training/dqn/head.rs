@@ -38,14 +38,14 @@ impl Pass {
     }
 
     /// Writes to `gradient`, which has the shapes of the head's variables in the order of their names, the gradient of a loss
-    /// whose gradient by the values is `slopes` (`[S, 3]`). Returns its gradient by the states, `[S, input]`.
-    pub fn back(self, slopes: &Tensor, gradient: &[Tensor]) -> Tensor {
-        let parts = self.parts.into_iter().zip(split(slopes)).enumerate().map(|(index, (part, slopes))| {
+    /// whose gradient by the values is `grad_output` (`[S, 3]`). Returns its gradient by the states, `[S, input]`.
+    pub fn back(self, grad_output: &Tensor, gradient: &[Tensor]) -> Tensor {
+        let parts = self.parts.into_iter().zip(split(grad_output)).enumerate().map(|(index, (part, grad_output))| {
             let first = index == 0;
             let own = gradient.iter().map(|sum| if first { sum.shallow_clone() } else { sum.empty_like() });
-            (part, slopes, own.collect::<Vec<_>>())
+            (part, grad_output, own.collect::<Vec<_>>())
         });
-        let found = on_all_cores(parts.collect(), |(part, slopes, own)| (part.back(slopes, &own), own));
+        let found = on_all_cores(parts.collect(), |(part, grad_output, own)| (part.back(grad_output, &own), own));
         for (_, own) in found.iter().skip(1) {
             for (sum, own) in gradient.iter().zip(own) {
                 let _ = tch::no_grad(|| sum.shallow_clone().g_add_(own));
@@ -67,18 +67,18 @@ impl Part {
         })
     }
 
-    fn back(&self, mut slopes: Tensor, gradient: &[Tensor]) -> Tensor {
+    fn back(&self, mut grad_output: Tensor, gradient: &[Tensor]) -> Tensor {
         tch::no_grad(|| {
             for (index, (layer, input)) in self.layers.iter().zip(&self.inputs).enumerate().rev() {
-                let _ = slopes.sum_intlist_out(&gradient[2 * index], 0, false, None);
-                let _ = slopes.tr().mm_out(&gradient[2 * index + 1], input);
-                slopes = slopes.mm(&layer.ws);
+                let _ = grad_output.sum_intlist_out(&gradient[2 * index], 0, false, None);
+                let _ = grad_output.tr().mm_out(&gradient[2 * index + 1], input);
+                grad_output = grad_output.mm(&layer.ws);
                 if index > 0 {
                     // What a ReLU let through is above zero.
-                    slopes = input.threshold_backward(&slopes, 0);
+                    grad_output = input.threshold_backward(&grad_output, 0);
                 }
             }
-            slopes
+            grad_output
         })
     }
 }
@@ -128,7 +128,7 @@ mod tests {
             let _ = tch::no_grad(|| variable.g_add_(&(variable.randn_like() * 0.1)));
         }
         let states = Tensor::randn([count, 16], (Kind::Float, Device::Cpu)).set_requires_grad(true);
-        let slopes = Tensor::randn([count, 3], (Kind::Float, Device::Cpu));
+        let grad_output = Tensor::randn([count, 3], (Kind::Float, Device::Cpu));
         let expected = reference.forward(&states);
         let pass = Pass::through(&reference, &states.detach());
         assert!(pass.values.allclose(&expected, 1e-5, 1e-6, false));
@@ -136,10 +136,10 @@ mod tests {
         let mut variables: Vec<(String, Tensor)> = store.variables().into_iter().collect();
         variables.sort_by(|a, b| a.0.cmp(&b.0));
         let gradient: Vec<Tensor> = variables.iter().map(|(_, variable)| variable.detach().zeros_like()).collect();
-        let by_states = pass.back(&slopes, &gradient);
+        let by_states = pass.back(&grad_output, &gradient);
         let mut by: Vec<&Tensor> = variables.iter().map(|(_, variable)| variable).collect();
         by.push(&states);
-        let loss = (expected * slopes).sum(Kind::Float);
+        let loss = (expected * grad_output).sum(Kind::Float);
         let expected = Tensor::run_backward(&[loss], &by, false, false);
         for (found, expected) in gradient.iter().chain([&by_states]).zip(&expected) {
             assert!(found.allclose(expected, 1e-4, 1e-5, false));

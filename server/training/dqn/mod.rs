@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tch::{Device, Tensor, nn};
 
-use super::environment::{Session, lead_astray};
+use super::environment::{Environment, lead_astray};
 use super::optimiser::{Flat, Optimiser, half_cosine};
 use super::recipe::dqn::{DqnRecipe, Target};
 use super::run::checkpoint::{Checkpoint, CheckpointError};
@@ -22,8 +22,8 @@ use crate::autofocus::networks::{ACTIONS, HISTORY};
 use crate::autofocus::weights::{self, WeightsError, floats};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
-use batch::{Batch, Bonus, Returns, Wanted, bellman, lookahead, smooth_l1};
-use replay::{Frames, Replay, Seen, Step};
+use batch::{Batch, Bonus, Returns, Targets, bellman, lookahead, smooth_l1};
+use replay::{Frames, Replay, Seen, Transition};
 use values::Values;
 
 /// A training in progress.
@@ -34,16 +34,16 @@ pub struct DqnTrainer {
     target: Values,
     target_variables: Flat,
     optimiser: Optimiser,
-    seats: Vec<Seat>,
+    actors: Vec<Actor>,
     replay: Replay,
     rng: ChaCha8Rng,
     updates: u64,
     frames: u64,
 }
 
-/// A session and the encodings of its latest frames, oldest first.
-struct Seat {
-    session: Session,
+/// An environment and the encodings of its latest frames, oldest first.
+struct Actor {
+    environment: Environment,
     age: u16,
     frames_left: u16,
     history: Vec<f32>,
@@ -62,9 +62,9 @@ impl DqnTrainer {
         let mut target_variables = Flat::of(&target.store);
         target_variables.approach(optimiser.flat(), 1.0);
         let replay = Replay::new(recipe.replay, recipe.scans);
-        let (seats, updates, frames) = (Vec::new(), 0, 0);
+        let (actors, updates, frames) = (Vec::new(), 0, 0);
         let mut trainer =
-            Self { recipe, scenery, online, target, target_variables, optimiser, seats, replay, rng, updates, frames };
+            Self { recipe, scenery, online, target, target_variables, optimiser, actors, replay, rng, updates, frames };
         trainer.begin_leg(seed);
         trainer
     }
@@ -73,14 +73,14 @@ impl DqnTrainer {
         self.online.store.device()
     }
 
-    /// Every seat sees a frame, acts, and goes on.
+    /// Every actor sees a frame, acts, and goes on.
     fn play_a_frame(&mut self) {
         let sight = self.online.network.sight;
         let seen: Vec<Seen> = self
-            .seats
+            .actors
             .par_iter_mut()
-            .map(|seat| {
-                let patch = seat.session.observe();
+            .map(|actor| {
+                let patch = actor.environment.observe();
                 sight.metric(&patch).map_or_else(|| Seen::patch(&patch), |metric| Seen::Metric(sight.scaled(metric)))
             })
             .collect();
@@ -89,58 +89,58 @@ impl DqnTrainer {
             frames.push(seen);
         }
         let encodings = self.online.encode(&frames);
-        let count = self.seats.len() as i64;
-        for (seat, encoding) in self.seats.iter_mut().zip(floats(&encodings).chunks_exact(sight.width())) {
-            seat.remember(encoding);
+        let count = self.actors.len() as i64;
+        for (actor, encoding) in self.actors.iter_mut().zip(floats(&encodings).chunks_exact(sight.width())) {
+            actor.remember(encoding);
         }
         let device = self.device();
-        let gather = |part: fn(&Seat) -> &Vec<f32>| {
-            let all: Vec<f32> = self.seats.iter().flat_map(|seat| part(seat).iter().copied()).collect();
+        let gather = |part: fn(&Actor) -> &Vec<f32>| {
+            let all: Vec<f32> = self.actors.iter().flat_map(|actor| part(actor).iter().copied()).collect();
             Tensor::from_slice(&all).view([count, -1]).to_device(device)
         };
-        let values = self.online.network.values(&gather(|seat| &seat.history), &gather(|seat| &seat.focal_powers));
+        let values = self.online.network.values(&gather(|actor| &actor.history), &gather(|actor| &actor.focal_powers));
         let epsilon = self.recipe.epsilon(self.frames);
         for (index, values) in floats(&values).chunks_exact(ACTIONS).enumerate() {
             let explore = self.rng.random_bool(epsilon);
             let action = if explore { self.rng.random_range(0..ACTIONS) } else { best_action(values) };
             self.finish_frame(index, &seen[index], action);
         }
-        self.frames += self.seats.len() as u64;
+        self.frames += self.actors.len() as u64;
     }
 
     fn finish_frame(&mut self, index: usize, seen: &Seen, action: usize) {
-        let seat = &mut self.seats[index];
-        let stood = seat.session.focal_power();
+        let actor = &mut self.actors[index];
+        let stood = actor.environment.focal_power();
         let mut target = stood.moved(action_step(action)).get();
-        if seat.session.wanders {
+        if actor.environment.wanders {
             target = lead_astray(target, &mut self.rng);
         }
-        seat.session.advance(target);
-        let next_optimum = seat.session.optimum().get() as f32;
-        let (focal_power, age) = (stood.get() as f32, seat.age);
-        self.replay.push(index, seen, Step { focal_power, next_optimum, action: action as u8, age });
-        seat.age += 1;
-        seat.frames_left -= 1;
-        if seat.frames_left == 0 {
-            *seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
+        actor.environment.advance(target);
+        let next_optimum = actor.environment.optimum().get() as f32;
+        let (focal_power, age) = (stood.get() as f32, actor.age);
+        self.replay.push(index, seen, Transition { focal_power, next_optimum, action: action as u8, age });
+        actor.age += 1;
+        actor.frames_left -= 1;
+        if actor.frames_left == 0 {
+            *actor = Actor::draw(&self.recipe, &self.scenery, &mut self.rng);
         }
     }
 
     fn batch(&mut self) -> Batch {
         let length = self.recipe.window;
-        let (mut frames, mut steps) = (Frames::default(), Vec::new());
+        let (mut frames, mut transitions) = (Frames::default(), Vec::new());
         let mut left = self.recipe.windows;
         while left > 0 {
             if let Some(window) = self.replay.draw(length, &mut self.rng) {
-                self.replay.read(window, length, &mut frames, &mut steps);
+                self.replay.read(window, length, &mut frames, &mut transitions);
                 left -= 1;
             }
         }
-        Batch::new(frames, steps, length, self.device())
+        Batch::new(frames, transitions, length, self.device())
     }
 
     /// What the values of the batch's states, which are `values` (`[S, 3]`, row by row), should be.
-    fn wanted(&self, batch: &Batch, values: &[f32]) -> Wanted {
+    fn targets(&self, batch: &Batch, values: &[f32]) -> Targets {
         match self.recipe.target {
             Target::Lookahead { restless, turning } => lookahead(batch, Bonus { restless, turning }),
             Target::Bellman { discount, steps, double, regret } => {
@@ -169,12 +169,12 @@ impl Trainer for DqnTrainer {
     fn begin_leg(&mut self, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = |_| {
-            let mut seat = Seat::draw(&self.recipe, &self.scenery, &mut self.rng);
+            let mut actor = Actor::draw(&self.recipe, &self.scenery, &mut self.rng);
             // Scans end one after another, not all at once.
-            seat.frames_left = self.rng.random_range(1..=self.recipe.frames_a_scan);
-            seat
+            actor.frames_left = self.rng.random_range(1..=self.recipe.frames_a_scan);
+            actor
         };
-        self.seats = (0..self.recipe.scans).map(&mut draw).collect();
+        self.actors = (0..self.recipe.scans).map(&mut draw).collect();
     }
 
     fn update(&mut self) -> f64 {
@@ -186,9 +186,9 @@ impl Trainer for DqnTrainer {
         let encodings = self.online.encode(&batch.frames);
         let pass = self.online.pass(&batch, &encodings);
         let values = floats(&pass.values);
-        let (loss, slopes) = smooth_l1(&values, &self.wanted(&batch, &values));
-        let slopes = Tensor::from_slice(&slopes).view_as(&pass.values).to_device(self.device());
-        let gradient = self.online.gradient(self.optimiser.flat(), &batch, &encodings, pass, &slopes);
+        let (loss, grad_output) = smooth_l1(&values, &self.targets(&batch, &values));
+        let grad_output = Tensor::from_slice(&grad_output).view_as(&pass.values).to_device(self.device());
+        let gradient = self.online.gradient(self.optimiser.flat(), &batch, &encodings, pass, &grad_output);
         let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.descend(gradient, self.recipe.clip, rate);
         if matches!(self.recipe.target, Target::Bellman { .. }) {
@@ -228,11 +228,11 @@ impl Trainer for DqnTrainer {
     }
 }
 
-impl Seat {
+impl Actor {
     fn draw(recipe: &DqnRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
-        let session = Session::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
+        let environment = Environment::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
         Self {
-            session,
+            environment,
             age: 0,
             frames_left: recipe.frames_a_scan.max(1),
             history: Vec::new(),
@@ -241,7 +241,7 @@ impl Seat {
     }
 
     fn remember(&mut self, encoding: &[f32]) {
-        let focal_power = scaled_focal_power(self.session.focal_power().get());
+        let focal_power = scaled_focal_power(self.environment.focal_power().get());
         if self.focal_powers.is_empty() {
             self.history = encoding.repeat(HISTORY);
             self.focal_powers = vec![focal_power; HISTORY];

@@ -1,4 +1,4 @@
-//! Replay memory: the latest frames of every seat, patches as bytes, from which windows of consecutive frames are drawn.
+//! Replay memory: the latest frames of every actor, patches as bytes, from which windows of consecutive frames are drawn.
 
 use rand::{Rng, RngExt};
 
@@ -11,7 +11,7 @@ const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
 
 /// What one frame leaves behind, besides what was seen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Step {
+pub struct Transition {
     /// Focal power the frame was seen at.
     pub focal_power: f32,
     /// Optimum at the next frame.
@@ -58,26 +58,26 @@ impl Frames {
     }
 }
 
-/// Frames of many scans, each seat's in a ring of its own.
+/// Frames of many scans, each actor's in a ring of its own.
 #[derive(Debug)]
 pub struct Replay {
-    seats: Vec<Ring>,
+    actors: Vec<Ring>,
     capacity: usize,
 }
 
 #[derive(Debug, Default)]
 struct Ring {
-    steps: Vec<Step>,
+    transitions: Vec<Transition>,
     patches: Vec<u8>,
     metrics: Vec<f32>,
     /// Where the next frame goes once the ring is full; the oldest frame.
     head: usize,
 }
 
-/// Consecutive frames of one seat: positions in its ring, oldest first.
+/// Consecutive frames of one actor: positions in its ring, oldest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    seat: usize,
+    actor: usize,
     start: usize,
 }
 
@@ -85,7 +85,7 @@ impl Ring {
     /// Makes room for `more` frames like those held: growing bit by bit would hold all twice at times. What is never filled
     /// costs no memory.
     fn reserve(&mut self, more: usize) {
-        self.steps.reserve_exact(more);
+        self.transitions.reserve_exact(more);
         if self.metrics.is_empty() {
             self.patches.reserve_exact(more * PIXELS);
         } else {
@@ -95,16 +95,16 @@ impl Ring {
 }
 
 impl Replay {
-    /// A memory of at most `frames` frames for `seats` seats.
+    /// A memory of at most `frames` frames for `actors` actors.
     #[must_use]
-    pub fn new(frames: usize, seats: usize) -> Self {
-        Self { seats: (0..seats).map(|_| Ring::default()).collect(), capacity: (frames / seats.max(1)).max(1) }
+    pub fn new(frames: usize, actors: usize) -> Self {
+        Self { actors: (0..actors).map(|_| Ring::default()).collect(), capacity: (frames / actors.max(1)).max(1) }
     }
 
     /// Frames held.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.seats.iter().map(|ring| ring.steps.len()).sum()
+        self.actors.iter().map(|ring| ring.transitions.len()).sum()
     }
 
     /// Whether nothing is held.
@@ -113,23 +113,23 @@ impl Replay {
         self.len() == 0
     }
 
-    /// Adds a frame of `seat`, in place of its oldest when full.
-    pub fn push(&mut self, seat: usize, seen: &Seen, step: Step) {
+    /// Adds a frame of `actor`, in place of its oldest when full.
+    pub fn push(&mut self, actor: usize, seen: &Seen, transition: Transition) {
         let capacity = self.capacity;
-        let ring = &mut self.seats[seat];
-        if ring.steps.len() < capacity {
-            ring.steps.push(step);
+        let ring = &mut self.actors[actor];
+        if ring.transitions.len() < capacity {
+            ring.transitions.push(transition);
             match seen {
                 Seen::Patch(bytes) => ring.patches.extend_from_slice(bytes),
                 Seen::Metric(metric) => ring.metrics.push(*metric),
             }
-            if ring.steps.len() == 1 {
+            if ring.transitions.len() == 1 {
                 ring.reserve(capacity - 1);
             }
             return;
         }
         let at = ring.head;
-        ring.steps[at] = step;
+        ring.transitions[at] = transition;
         match seen {
             Seen::Patch(bytes) => ring.patches[at * bytes.len()..(at + 1) * bytes.len()].copy_from_slice(bytes),
             Seen::Metric(metric) => ring.metrics[at] = *metric,
@@ -139,13 +139,17 @@ impl Replay {
 
     /// Adds all frames to a checkpoint: patches as they lie in memory, since a copy of them would take as much again.
     pub fn save<'a>(&'a self, checkpoint: &mut Checkpoint<'a>) {
-        for (index, ring) in self.seats.iter().enumerate() {
+        for (index, ring) in self.actors.iter().enumerate() {
             let name = |part: &str| format!("replay.{index}.{part}");
-            let steps = || ring.steps.iter();
-            checkpoint.put_floats(&name("focal_power"), steps().map(|step| step.focal_power));
-            checkpoint.put_floats(&name("next_optimum"), steps().map(|step| step.next_optimum));
-            checkpoint.put_bytes(&name("action"), steps().map(|step| step.action).collect::<Vec<u8>>());
-            checkpoint.put_bytes(&name("age"), steps().flat_map(|step| step.age.to_le_bytes()).collect::<Vec<u8>>());
+            let transitions = || ring.transitions.iter();
+            checkpoint.put_floats(&name("focal_power"), transitions().map(|transition| transition.focal_power));
+            checkpoint.put_floats(&name("next_optimum"), transitions().map(|transition| transition.next_optimum));
+            checkpoint
+                .put_bytes(&name("action"), transitions().map(|transition| transition.action).collect::<Vec<u8>>());
+            checkpoint.put_bytes(
+                &name("age"),
+                transitions().flat_map(|transition| transition.age.to_le_bytes()).collect::<Vec<u8>>(),
+            );
             checkpoint.put_bytes(&name("patches"), &ring.patches);
             checkpoint.put_floats(&name("metrics"), ring.metrics.iter().copied());
             checkpoint.notes.insert(name("head"), ring.head.to_string());
@@ -158,13 +162,13 @@ impl Replay {
     /// When the checkpoint is damaged or of another training.
     pub fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
         let capacity = self.capacity;
-        for (index, ring) in self.seats.iter_mut().enumerate() {
+        for (index, ring) in self.actors.iter_mut().enumerate() {
             let name = |part: &str| format!("replay.{index}.{part}");
             let focal_powers = checkpoint.floats(&name("focal_power"))?;
             let optima = checkpoint.floats(&name("next_optimum"))?;
             let patches = checkpoint.take_bytes(&name("patches"))?;
             let metrics = checkpoint.floats(&name("metrics"))?;
-            // Of a seat that had not wrapped, and in checkpoints older than the note: the oldest is the first.
+            // Of a actor that had not wrapped, and in checkpoints older than the note: the oldest is the first.
             let head =
                 if checkpoint.notes.contains_key(&name("head")) { checkpoint.number(&name("head"))? } else { 0 };
             let (actions, ages) = (checkpoint.bytes(&name("action"))?, checkpoint.bytes(&name("age"))?);
@@ -175,17 +179,17 @@ impl Replay {
             let known = [optima.len(), actions.len(), ages.len()] == [count; 3];
             let fits = count <= capacity && (head == 0 || count == capacity && head < count);
             if !(seen && known && fits && actions.iter().all(|&action| usize::from(action) < ACTIONS)) {
-                return Err(checkpoint.damaged(format!("frames of seat {index} are missing")));
+                return Err(checkpoint.damaged(format!("frames of actor {index} are missing")));
             }
-            let steps = focal_powers.into_iter().zip(optima).zip(actions.iter().zip(ages)).map(
-                |((focal_power, next_optimum), (&action, &age))| Step {
+            let transitions = focal_powers.into_iter().zip(optima).zip(actions.iter().zip(ages)).map(
+                |((focal_power, next_optimum), (&action, &age))| Transition {
                     focal_power,
                     next_optimum,
                     action,
                     age: u16::from_le_bytes(age),
                 },
             );
-            *ring = Ring { steps: steps.collect(), patches, metrics, head };
+            *ring = Ring { transitions: transitions.collect(), patches, metrics, head };
             if count > 0 {
                 ring.reserve(capacity - count);
             }
@@ -193,20 +197,20 @@ impl Replay {
         Ok(())
     }
 
-    /// A window of `length` frames, uniformly drawn; `None` before a drawn seat holds as many.
+    /// A window of `length` frames, uniformly drawn; `None` before a drawn actor holds as many.
     pub fn draw(&self, length: usize, rng: &mut impl Rng) -> Option<Window> {
-        let seat = rng.random_range(0..self.seats.len());
-        let held = self.seats[seat].steps.len();
-        (held >= length).then(|| Window { seat, start: rng.random_range(0..=held - length) })
+        let actor = rng.random_range(0..self.actors.len());
+        let held = self.actors[actor].transitions.len();
+        (held >= length).then(|| Window { actor, start: rng.random_range(0..=held - length) })
     }
 
-    /// Appends what was seen in `window`, and its steps, to the given lists.
-    pub fn read(&self, window: Window, length: usize, frames: &mut Frames, steps: &mut Vec<Step>) {
-        let ring = &self.seats[window.seat];
-        let patch = ring.patches.len() / ring.steps.len().max(1);
+    /// Appends what was seen in `window`, and its transitions, to the given lists.
+    pub fn read(&self, window: Window, length: usize, frames: &mut Frames, transitions: &mut Vec<Transition>) {
+        let ring = &self.actors[window.actor];
+        let patch = ring.patches.len() / ring.transitions.len().max(1);
         for offset in 0..length {
-            let at = (ring.head + window.start + offset) % ring.steps.len();
-            steps.push(ring.steps[at]);
+            let at = (ring.head + window.start + offset) % ring.transitions.len();
+            transitions.push(ring.transitions[at]);
             frames.patches.extend_from_slice(&ring.patches[at * patch..(at + 1) * patch]);
             frames.metrics.extend(ring.metrics.get(at));
         }
@@ -223,34 +227,34 @@ mod tests {
     fn a_window_is_consecutive_after_the_ring_has_wrapped() {
         let mut replay = Replay::new(20, 2);
         for time in 0..37u16 {
-            replay.push(0, &Seen::Metric(f32::from(time)), Step { age: time, ..Step::default() });
+            replay.push(0, &Seen::Metric(f32::from(time)), Transition { age: time, ..Transition::default() });
         }
         assert_eq!(replay.len(), 10);
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let mut oldest = u16::MAX;
         for _ in 0..200 {
             let Some(window) = replay.draw(4, &mut rng) else { continue };
-            let (mut frames, mut steps) = (Frames::default(), Vec::new());
-            replay.read(window, 4, &mut frames, &mut steps);
-            assert!(steps.windows(2).all(|pair| pair[1].age == pair[0].age + 1));
-            let mut pairs = steps.iter().zip(&frames.metrics);
-            assert!(pairs.all(|(step, metric)| (f32::from(step.age) - *metric).abs() < f32::EPSILON));
-            oldest = oldest.min(steps[0].age);
+            let (mut frames, mut transitions) = (Frames::default(), Vec::new());
+            replay.read(window, 4, &mut frames, &mut transitions);
+            assert!(transitions.windows(2).all(|pair| pair[1].age == pair[0].age + 1));
+            let mut pairs = transitions.iter().zip(&frames.metrics);
+            assert!(pairs.all(|(transition, metric)| (f32::from(transition.age) - *metric).abs() < f32::EPSILON));
+            oldest = oldest.min(transitions[0].age);
         }
         assert_eq!(oldest, 27);
     }
-    /// Eleven frames a seat, so that rings of ten have wrapped; and what a replay memory restored from it holds.
+    /// Eleven frames a actor, so that rings of ten have wrapped; and what a replay memory restored from it holds.
     fn saved(seen: impl Fn(u16) -> Seen) -> (Replay, tempfile::TempDir) {
         let mut replay = Replay::new(20, 2);
         for time in 0..13u16 {
-            replay.push(0, &seen(time), Step { age: time, ..Step::default() });
+            replay.push(0, &seen(time), Transition { age: time, ..Transition::default() });
         }
-        replay.push(1, &seen(40), Step { age: 40, ..Step::default() });
+        replay.push(1, &seen(40), Transition { age: 40, ..Transition::default() });
         let folder = tempfile::tempdir().unwrap();
         let mut checkpoint = Checkpoint::default();
         replay.save(&mut checkpoint);
         // What a checkpoint borrows it does not copy.
-        assert_eq!(checkpoint.bytes("replay.0.patches").unwrap().as_ptr(), replay.seats[0].patches.as_ptr());
+        assert_eq!(checkpoint.bytes("replay.0.patches").unwrap().as_ptr(), replay.actors[0].patches.as_ptr());
         checkpoint.write(&folder.path().join("a")).unwrap();
         (replay, folder)
     }
@@ -266,15 +270,15 @@ mod tests {
             back.restore(&mut Checkpoint::read(&folder.path().join("a")).unwrap()).unwrap();
             for time in 50..53 {
                 for memory in [&mut replay, &mut back] {
-                    memory.push(1, &seen(time), Step { age: time, ..Step::default() });
-                    memory.push(0, &seen(time), Step { age: time, ..Step::default() });
+                    memory.push(1, &seen(time), Transition { age: time, ..Transition::default() });
+                    memory.push(0, &seen(time), Transition { age: time, ..Transition::default() });
                 }
             }
-            for (one, other) in replay.seats.iter().zip(&back.seats) {
-                assert_eq!((&one.steps, one.head), (&other.steps, other.head));
+            for (one, other) in replay.actors.iter().zip(&back.actors) {
+                assert_eq!((&one.transitions, one.head), (&other.transitions, other.head));
                 assert!(one.patches == other.patches && one.metrics == other.metrics);
             }
-            assert!(!patches || back.seats[1].patches.capacity() == 10 * PIXELS);
+            assert!(!patches || back.actors[1].patches.capacity() == 10 * PIXELS);
         }
     }
 
@@ -292,7 +296,7 @@ mod tests {
             let mut checkpoint = Checkpoint::read(&path).unwrap();
             damage(&mut checkpoint);
             let error = Replay::new(20, 2).restore(&mut checkpoint).unwrap_err().to_string();
-            assert!(error.contains("is damaged: frames of seat"), "{error}");
+            assert!(error.contains("is damaged: frames of actor"), "{error}");
         }
     }
 }

@@ -55,14 +55,14 @@ impl Values {
         Pass::through(&self.network.head, &states)
     }
 
-    /// The gradient by all variables, which are `flat`, of a loss whose gradient by the values of `pass` is `slopes`
+    /// The gradient by all variables, which are `flat`, of a loss whose gradient by the values of `pass` is `grad_output`
     /// (`[S, 3]`).
-    pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: Pass, slopes: &Tensor) -> Tensor {
+    pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: Pass, grad_output: &Tensor) -> Tensor {
         let gradient = flat.values.empty_like();
         let parts = parts(&gradient, &flat.variables);
         // By name, the encoder's variables come before the head's, a bias and a weight a layer.
         let (encoder, head) = parts.split_at(parts.len() - 2 * self.network.head.layers.len());
-        let by_states = pass.back(slopes, head);
+        let by_states = pass.back(grad_output, head);
         if encoder.is_empty() {
             return gradient;
         }
@@ -91,7 +91,7 @@ mod tests {
 
     use super::*;
     use crate::autofocus::networks::compute_on_this_thread;
-    use crate::training::dqn::replay::Step;
+    use crate::training::dqn::replay::Transition;
 
     /// Windows of twelve frames of noise, of which every other begins a scan; in the others the first states' histories begin
     /// before it.
@@ -99,10 +99,10 @@ mod tests {
         const WINDOW: u16 = 12;
         let mut frames = Frames::default();
         frames.patches.extend((0..usize::from(windows * WINDOW) * PIXELS).map(|_| rng.random_range(20..220u8)));
-        let step = |age| Step { focal_power: f32::from(age) / 50.0, next_optimum: 0.5, action: 1, age };
+        let transition = |age| Transition { focal_power: f32::from(age) / 50.0, next_optimum: 0.5, action: 1, age };
         let begins = (0..windows).map(|window| 30 * (window % 2));
-        let steps = begins.flat_map(|begin| (begin..begin + WINDOW).map(step)).collect();
-        Batch::new(frames, steps, usize::from(WINDOW), Device::Cpu)
+        let transitions = begins.flat_map(|begin| (begin..begin + WINDOW).map(transition)).collect();
+        Batch::new(frames, transitions, usize::from(WINDOW), Device::Cpu)
     }
 
     #[test]
@@ -113,11 +113,11 @@ mod tests {
         assert!(batch.states.len() > 12, "the first window's states reach back as far as the scan goes");
         let mut values = Values::new(Sight::Patch, Device::Cpu);
         let flat = Flat::of(&values.store);
-        let slopes = Tensor::randn([batch.states.len() as i64, 3], (Kind::Float, Device::Cpu));
+        let grad_output = Tensor::randn([batch.states.len() as i64, 3], (Kind::Float, Device::Cpu));
 
         let histories = values.network.encode(&as_floats(&batch)).index_select(0, &batch.history);
         let found = values.network.values(&histories.view([batch.states.len() as i64, -1]), &batch.focal_powers);
-        let expected = flat.gradient(&(&slopes * found).sum(Kind::Float));
+        let expected = flat.gradient(&(&grad_output * found).sum(Kind::Float));
 
         for by_hand in [true, false] {
             if !by_hand {
@@ -125,7 +125,7 @@ mod tests {
             }
             let encodings = values.encode(&batch.frames);
             let pass = values.pass(&batch, &encodings);
-            let gradient = values.gradient(&flat, &batch, &encodings, pass, &slopes);
+            let gradient = values.gradient(&flat, &batch, &encodings, pass, &grad_output);
             let difference = (&gradient - &expected).abs().max().double_value(&[]);
             let scale = expected.abs().max().double_value(&[]);
             assert!(difference < 1e-4 * scale, "encoder by hand {by_hand}: {difference} of {scale}");
@@ -143,8 +143,8 @@ mod tests {
                 let flat = Flat::of(&values.store);
                 let encodings = values.encode(&batch.frames);
                 let pass = values.pass(&batch, &encodings);
-                let slopes = pass.values.shallow_clone();
-                floats(&values.gradient(&flat, &batch, &encodings, pass, &slopes))
+                let grad_output = pass.values.shallow_clone();
+                floats(&values.gradient(&flat, &batch, &encodings, pass, &grad_output))
             };
             rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
         };

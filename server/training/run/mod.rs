@@ -34,7 +34,7 @@ use curves::Point;
 use folder::RunFolder;
 use material::Material;
 use model_card::Made;
-use resume::Asked;
+use resume::ResumeRequest;
 use tensorboard::EventFile;
 
 const RECIPE: &str = "recipe.toml";
@@ -98,18 +98,18 @@ impl Run {
         Ok(run)
     }
 
-    /// The training in `folder` from its checkpoint on, which must be the one `asked` for.
+    /// The training in `folder` from its checkpoint on, which must be the one of `request`.
     ///
     /// # Errors
     /// When there is no checkpoint, it is damaged or of another training, or its footage is no more.
-    pub fn resume(folder: &Path, asked: &Asked, device: Device) -> Result<Self, TrainError> {
+    pub fn resume(folder: &Path, request: &ResumeRequest, device: Device) -> Result<Self, TrainError> {
         let (folder, mut checkpoint) = RunFolder::go_on(folder)?;
         let text = checkpoint.notes.get("recipe").map_or("", String::as_str);
         let recipe = Recipe::parse(text).map_err(|error| checkpoint.damaged(format!("its recipe: {error}")))?;
         let seed = checkpoint.number("seed")?;
-        asked.check(folder.path(), &recipe, seed)?;
+        request.check(folder.path(), &recipe, seed)?;
         let design = recipe.design()?;
-        let material = Material::again(&checkpoint, &asked.footage, recipe.pictures)?;
+        let material = Material::again(&checkpoint, &request.footage, recipe.pictures)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
         let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
         run.other_version = (version != VERSION).then(|| version.to_owned());

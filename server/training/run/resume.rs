@@ -1,13 +1,13 @@
-//! What whoever goes on with a training says of it: it must be what the training was begun with.
+//! Checks that the arguments of a resumed training match the original run.
 
 use std::path::{Path, PathBuf};
 
 use crate::training::error::TrainError;
 use crate::training::recipe::{Recipe, shipped};
 
-/// What is asked of a training that goes on. What is not given is as it was at the beginning.
+/// What `--resume` was asked to continue. What is not given stays as the training was begun.
 #[derive(Debug, Clone, Default)]
-pub struct Asked {
+pub struct ResumeRequest {
     /// The policy, or the name of a recipe that ships.
     pub name: String,
     /// The whole recipe.
@@ -20,8 +20,8 @@ pub struct Asked {
     pub footage: Vec<PathBuf>,
 }
 
-impl Asked {
-    /// That the training in `folder`, begun by `recipe` with `seed`, is the one asked for.
+impl ResumeRequest {
+    /// Checks that this is the training in `folder`, begun by `recipe` with `seed`.
     pub(super) fn check(&self, folder: &Path, recipe: &Recipe, seed: u64) -> Result<(), TrainError> {
         let (folder, made) = (folder.display(), &recipe.policy);
         let differs = |text: String| Err(TrainError::Differs(text));
@@ -41,11 +41,11 @@ impl Asked {
                 ));
             }
         }
-        let mut wanted = self.recipe.clone().unwrap_or_else(|| recipe.clone());
+        let mut requested = self.recipe.clone().unwrap_or_else(|| recipe.clone());
         if let Some(updates) = self.updates {
-            wanted = wanted.with_updates(updates);
+            requested = requested.with_updates(updates);
         }
-        if let Some((key, was, is)) = recipe.difference(&wanted) {
+        if let Some((key, was, is)) = recipe.difference(&requested) {
             return differs(format!(
                 "the training in {folder} was begun with {key} = {was}, not {is}; leave out --config and --updates to \
                  continue, or start again in another folder"
@@ -69,25 +69,25 @@ mod tests {
     fn what_differs_is_told_with_what_to_do() {
         let ships = |name: &str| Recipe::parse(shipped(name).unwrap()).unwrap();
         let recipe = ships("mgm-learned").with_updates(2000);
-        let asked = |name: &str| Asked { name: name.to_owned(), ..Asked::default() };
-        let check = |asked: &Asked| asked.check(Path::new("runs/a"), &recipe, 1);
-        let fits = Asked { recipe: Some(recipe.clone()), seed: Some(1), ..asked("mgm-learned") };
+        let request = |name: &str| ResumeRequest { name: name.to_owned(), ..ResumeRequest::default() };
+        let check = |request: &ResumeRequest| request.check(Path::new("runs/a"), &recipe, 1);
+        let fits = ResumeRequest { recipe: Some(recipe.clone()), seed: Some(1), ..request("mgm-learned") };
         check(&fits).unwrap();
-        check(&Asked { updates: Some(2000), ..asked("mgm-learned") }).unwrap();
-        Asked { name: "parfocal-refined".to_owned(), ..Asked::default() }
+        check(&ResumeRequest { updates: Some(2000), ..request("mgm-learned") }).unwrap();
+        ResumeRequest { name: "parfocal-refined".to_owned(), ..ResumeRequest::default() }
             .check(Path::new("runs/a"), &ships("parfocal-refined").with_updates(7), 1)
             .unwrap();
-        for (asked, told) in [
-            (asked("parfocal"), "runs/a holds a training of mgm-learned, not of parfocal"),
-            (asked("mgm-learned-paper"), "by another recipe than mgm-learned-paper; name mgm-learned"),
+        for (request, told) in [
+            (request("parfocal"), "runs/a holds a training of mgm-learned, not of parfocal"),
+            (request("mgm-learned-paper"), "by another recipe than mgm-learned-paper; name mgm-learned"),
             (
-                Asked { updates: Some(3000), ..asked("mgm-learned") },
+                ResumeRequest { updates: Some(3000), ..request("mgm-learned") },
                 "begun with dqn.updates = 2000, not 3000; leave out",
             ),
-            (Asked { recipe: Some(ships("mgm-learned-paper")), ..asked("mgm-learned") }, "begun with dqn."),
-            (Asked { seed: Some(2), ..asked("mgm-learned") }, "begun with seed 1, not 2; leave out --seed"),
+            (ResumeRequest { recipe: Some(ships("mgm-learned-paper")), ..request("mgm-learned") }, "begun with dqn."),
+            (ResumeRequest { seed: Some(2), ..request("mgm-learned") }, "begun with seed 1, not 2; leave out --seed"),
         ] {
-            let error = check(&asked).unwrap_err().to_string();
+            let error = check(&request).unwrap_err().to_string();
             assert!(error.contains(told), "{error}");
         }
     }

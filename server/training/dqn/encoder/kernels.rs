@@ -50,14 +50,14 @@ pub fn encode(weights: &Weights, patches: &[[u8; PIXELS]], encodings: &mut [Lane
     }
 }
 
-/// Adds to `gradients` what the slopes of a loss at the encodings of `patches` say of the weights. Encodes each patch again:
+/// Adds to `gradients` the gradients by the weights, from `grad_output`, the gradients of a loss by the encodings of `patches`. Encodes each patch again:
 /// that costs less than to keep 13 kB of each for later.
 #[multiversion(targets("x86_64+avx2+fma"))]
-pub fn add_gradients(weights: &Weights, patches: &[[u8; PIXELS]], slopes: &[Lanes], gradients: &mut Weights) {
+pub fn add_gradients(weights: &Weights, patches: &[[u8; PIXELS]], grad_output: &[Lanes], gradients: &mut Weights) {
     let turned = weights.later.map(|taps| taps.map(transposed));
     let mut layers = Layers::default();
     let (mut third, mut second, mut first) = (Plane::<3>::default(), Plane::<7>::default(), Plane::<15>::default());
-    for (patch, slope) in patches.iter().zip(slopes) {
+    for (patch, slope) in patches.iter().zip(grad_output) {
         forward(weights, patch, &mut layers);
         let [later_0, later_1, later_2] = &mut gradients.later;
         let [bias_0, bias_1, bias_2, bias_3] = &mut gradients.biases;
@@ -174,13 +174,13 @@ fn convolve<const IN: usize, const OUT: usize>(input: &Plane<IN>, taps: &Taps, b
     }
 }
 
-/// From the slopes at a layer's output: adds to the gradients by its weights and biases, and finds the slopes `below`, at
+/// From `grad_output`, the gradients at a layer's output: adds to the gradients by its weights and biases, and finds the gradients `below`, at
 /// what its (rectified) `input` was before it was rectified. `turned` are its weights by tap, then filter, then input channel.
 #[inline(always)]
 fn backward<const IN: usize, const OUT: usize>(
     input: &Plane<IN>,
     turned: &Taps,
-    slopes: &Plane<OUT>,
+    grad_output: &Plane<OUT>,
     taps: &mut Taps,
     bias: &mut Lanes,
     below: &mut Plane<IN>,
@@ -191,7 +191,7 @@ fn backward<const IN: usize, const OUT: usize>(
             let (mut sums, turned) = (taps[3 * dy + dx], turned[3 * dy + dx]);
             for y in 0..OUT {
                 for x in 0..OUT {
-                    let (slope, seen) = (slopes[y][x], input[2 * y + dy][2 * x + dx]);
+                    let (slope, seen) = (grad_output[y][x], input[2 * y + dy][2 * x + dx]);
                     let mut under = below[2 * y + dy][2 * x + dx];
                     for channel in 0..FILTERS {
                         add_product(&mut sums[channel], seen[channel], &slope);
@@ -203,7 +203,7 @@ fn backward<const IN: usize, const OUT: usize>(
             taps[3 * dy + dx] = sums;
         }
     }
-    slopes.as_flattened().iter().for_each(|slope| add(bias, slope));
+    grad_output.as_flattened().iter().for_each(|slope| add(bias, slope));
     for (under, seen) in below.as_flattened_mut().iter_mut().zip(input.as_flattened()) {
         for lane in 0..FILTERS {
             // Not a branch, which would be mispredicted half the time.
@@ -215,17 +215,17 @@ fn backward<const IN: usize, const OUT: usize>(
 
 /// The same for the first layer, below which there is nothing to learn.
 #[inline(always)]
-fn backward_first(gray: &Gray, slopes: &Plane<15>, taps: &mut [Lanes; TAPS], bias: &mut Lanes) {
+fn backward_first(gray: &Gray, grad_output: &Plane<15>, taps: &mut [Lanes; TAPS], bias: &mut Lanes) {
     let mut sums = *taps;
     for y in 0..15 {
         for x in 0..15 {
             for dy in 0..3 {
                 for dx in 0..3 {
-                    add_product(&mut sums[3 * dy + dx], gray[2 * y + dy][2 * x + dx], &slopes[y][x]);
+                    add_product(&mut sums[3 * dy + dx], gray[2 * y + dy][2 * x + dx], &grad_output[y][x]);
                 }
             }
         }
     }
     *taps = sums;
-    slopes.as_flattened().iter().for_each(|slope| add(bias, slope));
+    grad_output.as_flattened().iter().for_each(|slope| add(bias, slope));
 }

@@ -49,14 +49,14 @@ impl Encoder {
     }
 
     /// The gradient by all variables, laid out one after another in the order of their names, of a loss whose gradient by
-    /// the encodings `[N, 8]` of patches `[N, 1024]` is `slopes`.
+    /// the encodings `[N, 8]` of patches `[N, 1024]` is `grad_output`.
     #[must_use]
-    pub fn gradient(&self, patches: &[u8], slopes: &[f32]) -> Vec<f32> {
-        let (weights, patches, slopes) = (self.weights(), patches.as_chunks().0, slopes.as_chunks().0);
-        let parts = patches.par_chunks(SUMMED_AT_ONCE).zip(slopes.par_chunks(SUMMED_AT_ONCE));
-        let sum = |(patches, slopes): (&[_], &[_])| {
+    pub fn gradient(&self, patches: &[u8], grad_output: &[f32]) -> Vec<f32> {
+        let (weights, patches, grad_output) = (self.weights(), patches.as_chunks().0, grad_output.as_chunks().0);
+        let parts = patches.par_chunks(SUMMED_AT_ONCE).zip(grad_output.par_chunks(SUMMED_AT_ONCE));
+        let sum = |(patches, grad_output): (&[_], &[_])| {
             let mut gradient = Weights::default();
-            kernels::add_gradients(&weights, patches, slopes, &mut gradient);
+            kernels::add_gradients(&weights, patches, grad_output, &mut gradient);
             flat(&gradient)
         };
         let sums: Vec<Vec<f32>> = parts.map(sum).collect();

@@ -64,10 +64,11 @@ fn gradients_are_libtorchs() {
     let both = both(4);
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let patches = patches(40, &mut rng);
-    let slopes: Vec<f32> = (0..40 * 8).map(|_| rng.random_range(-1.0..1.0)).collect();
-    let loss = (both.torch.forward(&as_tensor(&patches)) * Tensor::from_slice(&slopes).view([-1, 8])).sum(Kind::Float);
+    let grad_output: Vec<f32> = (0..40 * 8).map(|_| rng.random_range(-1.0..1.0)).collect();
+    let loss =
+        (both.torch.forward(&as_tensor(&patches)) * Tensor::from_slice(&grad_output).view([-1, 8])).sum(Kind::Float);
     loss.backward();
-    let found = Tensor::from_slice(&both.ours.gradient(&patches, &slopes));
+    let found = Tensor::from_slice(&both.ours.gradient(&patches, &grad_output));
     let mut variables: Vec<_> = both.store.variables().into_iter().collect();
     variables.sort_by(|a, b| a.0.cmp(&b.0));
     assert_eq!(variables.len(), 8);
@@ -87,10 +88,11 @@ fn a_gradient_is_what_a_small_step_changes() {
     let both = both(5);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let patches = patches(8, &mut rng);
-    let slopes: Vec<f32> = (0..8 * 8).map(|_| rng.random_range(-1.0..1.0)).collect();
-    let loss =
-        || -> f64 { both.ours.encode(&patches).iter().zip(&slopes).map(|(e, s)| f64::from(*e) * f64::from(*s)).sum() };
-    let gradient = both.ours.gradient(&patches, &slopes);
+    let grad_output: Vec<f32> = (0..8 * 8).map(|_| rng.random_range(-1.0..1.0)).collect();
+    let loss = || -> f64 {
+        both.ours.encode(&patches).iter().zip(&grad_output).map(|(e, s)| f64::from(*e) * f64::from(*s)).sum()
+    };
+    let gradient = both.ours.gradient(&patches, &grad_output);
     // The second layer's weight [1][2][0][1] comes after both biases and the first layer's 72 weights.
     let expected = f64::from(gradient[8 + 72 + 8 + 72 + 2 * 9 + 1]);
     let step = |by: f64| {
