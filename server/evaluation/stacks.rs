@@ -13,11 +13,10 @@ use serde::Serialize;
 use super::report::figure;
 use super::{EvaluateError, ORACLE, Outcome, Row, evaluate};
 use crate::autofocus::{PolicyName, Registry};
-use crate::camera::footage::{self, pictures_in};
 use crate::files::replace;
-use crate::imaging::{Calibration, DecodeError, GrayImage, Reconstructor, decode};
 use crate::scans::planes::{PlaneStack, PlanesError};
 use crate::scans::stack::drift::{StackCourse, StackScans};
+use crate::scans::stack::{FocalStack, StackError, in_blocks};
 
 /// The policy that all others are set beside.
 pub const BASELINE: &str = "mgm-hill-climber";
@@ -29,37 +28,21 @@ pub const SEEDS: usize = 3;
 /// First of the seeds, unless another is asked for.
 pub const FIRST_SEED: u64 = 31;
 
-/// Why a folder's pictures cannot be used as a focal stack.
+/// Why a focal stack cannot be scanned.
 #[derive(Debug, thiserror::Error)]
-pub enum StackError {
-    /// The folder cannot be read, or holds no picture.
+pub enum UnfitStack {
+    /// It cannot be read, or its pictures make no stack.
     #[error(transparent)]
-    Source(#[from] footage::FootageError),
-    /// A picture cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Unreadable {
-        /// The picture.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A picture cannot be decoded.
-    #[error("cannot use {}: {source}", path.display())]
-    Undecodable {
-        /// The picture.
-        path: PathBuf,
-        /// Why.
-        source: DecodeError,
-    },
-    /// The pictures make no stack.
+    Stack(#[from] StackError),
+    /// Its pictures are too small or too many.
     #[error("{} is not a focal stack: {source}", folder.display())]
-    Unfit {
+    Planes {
         /// The folder.
         folder: PathBuf,
         /// Why.
         source: PlanesError,
     },
-    /// The stack has fewer planes than the range needs, or is too small.
+    /// It has fewer planes than the range needs, or is too small.
     #[error("{} cannot be scanned: it needs {planes} pictures of at least 128x128 pixels", folder.display())]
     TooSmall {
         /// The folder.
@@ -94,37 +77,6 @@ impl StackSource {
     }
 }
 
-/// Reads the pictures in `folder` as gray, in order of focus.
-///
-/// # Errors
-/// When the folder or a picture cannot be read.
-pub fn read(folder: &Path) -> Result<Vec<GrayImage>, StackError> {
-    let picture = |path: PathBuf| {
-        let bytes = std::fs::read(&path).map_err(|source| StackError::Unreadable { path: path.clone(), source })?;
-        let picture = decode(&bytes, false).map_err(|source| StackError::Undecodable { path, source })?;
-        Ok(picture.into_gray(&mut Reconstructor::new(&Calibration::default())))
-    };
-    pictures_in(folder)?.into_iter().map(picture).collect()
-}
-
-/// `picture` made smaller by means over blocks of `side` x `side` pixels; what is left at the right and below is dropped.
-#[must_use]
-pub fn reduced(picture: &GrayImage, side: usize) -> GrayImage {
-    let (width, height) = (picture.width / side, picture.height / side);
-    let mut data = vec![0.0; width * height];
-    for (row, line) in picture.data.chunks_exact(picture.width).take(height * side).enumerate() {
-        let out = &mut data[row / side * width..][..width];
-        for (sum, block) in out.iter_mut().zip(line.chunks_exact(side)) {
-            *sum += block.iter().sum::<f32>();
-        }
-    }
-    let share = 1.0 / (side * side) as f32;
-    for value in &mut data {
-        *value *= share;
-    }
-    GrayImage { width, height, data }
-}
-
 /// A stack at one scale, ready to be scanned.
 #[derive(Debug)]
 struct Item {
@@ -135,19 +87,22 @@ struct Item {
 }
 
 /// Reads `source` at both scales and lays three courses over each.
-fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, StackError> {
-    let pictures = read(&source.folder)?;
-    let planes = source.planes.unwrap_or((2 * pictures.len() / 5).max(6));
-    let width = pictures.first().map_or(0, |picture| picture.width);
+fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, UnfitStack> {
+    let stack = FocalStack::load(&source.folder, None, 1)?;
+    let planes = source.planes.unwrap_or((2 * stack.planes().len() / 5).max(6));
+    let (width, _) = stack.size();
     let item = |(scale, wide): (&'static str, usize)| {
         let side = ((width as f64 / wide as f64).round() as usize).max(1);
-        let reduced: Vec<_> = pictures.iter().enumerate().map(|(at, p)| (at as f32, reduced(p, side))).collect();
-        let unfit = |source_error| StackError::Unfit { folder: source.folder.clone(), source: source_error };
-        let stack = Arc::new(PlaneStack::new(&reduced).map_err(unfit)?);
-        let course = |seed| StackCourse::new(Arc::clone(&stack), planes, seed).map(Arc::new);
+        let pictures = stack.planes().iter().map(|plane| in_blocks(&plane.picture, side));
+        let numbered: Vec<_> = pictures.enumerate().map(|(at, picture)| (at as f32, picture)).collect();
+
+        let unfit = |error| UnfitStack::Planes { folder: source.folder.clone(), source: error };
+        let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes };
+        let focal = Arc::new(PlaneStack::new(&numbered).map_err(unfit)?);
+        let course = |seed| StackCourse::new(Arc::clone(&focal), planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
-        let too_small = StackError::TooSmall { folder: source.folder.clone(), planes };
-        Ok(Item { stack: source.name(), scale, planes, scans: StackScans(courses.ok_or(too_small)?) })
+        let scans = StackScans(courses.ok_or_else(too_small)?);
+        Ok(Item { stack: source.name(), scale, planes, scans })
     };
     SCALES.into_iter().map(item).collect()
 }
@@ -228,7 +183,7 @@ pub fn bench(
 pub enum StackBenchError {
     /// A stack cannot be used.
     #[error(transparent)]
-    Stack(#[from] StackError),
+    Stack(#[from] UnfitStack),
     /// A policy cannot run.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
@@ -343,13 +298,6 @@ mod tests {
     fn a_source_may_say_how_many_planes_make_the_range() {
         assert_eq!(StackSource::parse("a/b:21"), StackSource { folder: "a/b".into(), planes: Some(21) });
         assert_eq!(StackSource::parse("a:b/c"), StackSource { folder: "a:b/c".into(), planes: None });
-    }
-
-    #[test]
-    fn blocks_become_their_means() {
-        let picture = GrayImage { width: 5, height: 4, data: (0..20).map(|v| v as f32).collect() };
-        let small = reduced(&picture, 2);
-        assert_eq!((small.width, small.height, small.data), (2, 2, vec![3.0, 5.0, 13.0, 15.0]));
     }
 
     fn result(stack: &str, scale: &'static str, maes: [f64; 2]) -> StackResult {

@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::gaussian::half_kernel;
 use crate::imaging::GrayImage;
 
 /// Standard deviations after which the kernel is cut.
@@ -27,10 +28,8 @@ fn gaussian_kernel(sigma: f64) -> Vec<f32> {
     if !(sigma > 0.0 && sigma.is_finite()) {
         return vec![1.0];
     }
-    let radius = (CUT * sigma).ceil().min(f64::from(u16::MAX)) as u32;
-    let weights: Vec<f64> = (0..=radius).map(|x| (-0.5 * (f64::from(x) / sigma).powi(2)).exp()).collect();
-    let sum = 2.0 * weights.iter().sum::<f64>() - weights[0];
-    weights.into_iter().map(|weight| (weight / sum) as f32).collect()
+    let radius = (CUT * sigma).ceil().min(f64::from(u16::MAX)) as usize;
+    half_kernel(sigma, radius).into_iter().map(|weight| weight as f32).collect()
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]

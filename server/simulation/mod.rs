@@ -2,6 +2,7 @@
 
 pub mod blur;
 pub mod cover;
+pub mod gaussian;
 pub mod normal;
 pub mod patch_defocus;
 pub mod path;

@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::gaussian;
 use crate::imaging::{GrayImage, PATCH_SIDE, Patch};
 
 /// Widest supported reach of a kernel, in pixels either side: four times the largest sigma of the scans, 8.
@@ -59,7 +60,7 @@ impl Defocus {
         match spot {
             _ if reach == 0 => patch.0.copy_from_slice(&self.source[..PATCH_SIDE * PATCH_SIDE]),
             Spot::Gaussian => {
-                let kernel = gaussian_kernel(sigma, reach);
+                let kernel: Vec<f32> = gaussian::kernel(sigma, reach).into_iter().map(|weight| weight as f32).collect();
                 blur_rows(&self.source[..side * side], side, &kernel, &mut self.rows);
                 blur_columns(&self.rows[..side * PATCH_SIDE], &kernel, &mut patch.0);
             }
@@ -86,14 +87,6 @@ fn gather(image: &GrayImage, (left, top): (isize, isize), side: usize, source: &
             }
         }
     }
-}
-
-/// Samples of a Gaussian at whole pixels, `2 * reach + 1` of them, scaled to a sum of 1.
-fn gaussian_kernel(sigma: f64, reach: usize) -> Vec<f32> {
-    let weights: Vec<f64> =
-        (0..=2 * reach).map(|tap| (-0.5 * ((tap as f64 - reach as f64) / sigma).powi(2)).exp()).collect();
-    let sum: f64 = weights.iter().sum();
-    weights.iter().map(|weight| (weight / sum) as f32).collect()
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]

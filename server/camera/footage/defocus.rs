@@ -3,6 +3,7 @@
 use multiversion::multiversion;
 
 use crate::imaging::RgbImage;
+use crate::simulation::gaussian::half_kernel;
 
 /// Standard deviations after which the kernel is cut: what is left out weighs 0.05 %.
 const CUT: f64 = 3.5;
@@ -45,9 +46,7 @@ impl Defocus {
 /// One half of a Gaussian that sums to 1 with its mirror image, the middle first.
 fn kernel(sigma: f64) -> Vec<f32> {
     let reach = (CUT * sigma).ceil() as usize;
-    let weights: Vec<f64> = (0..=reach).map(|x| (-0.5 * (x as f64 / sigma).powi(2)).exp()).collect();
-    let sum = 2.0 * weights.iter().sum::<f64>() - weights[0];
-    weights.into_iter().map(|weight| (weight / sum) as f32).collect()
+    half_kernel(sigma, reach).into_iter().map(|weight| weight as f32).collect()
 }
 
 /// The pixels from `reach` left of `left` to `reach` right of `left + width`; beyond the row, its border goes on.

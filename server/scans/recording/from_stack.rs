@@ -13,6 +13,7 @@ use crate::camera::recorded::{FORMAT, Header, LEAST_SIDE, Order, Recording, Scan
 use crate::imaging::{GrayImage, PATCH_SIDE, PatchArea};
 use crate::scans::recorded::{as_patch, evenly_spread, levels_at};
 use crate::scans::stack::FocalStack;
+use crate::simulation::gaussian::smoothed;
 use crate::simulation::walk::{Motion, Walk};
 
 /// How the window drifts along each axis, in pixels a frame.
@@ -105,7 +106,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     }
 
     let sharpest: Vec<f64> = corners.iter().map(|&corner| sharpest(stack, corner, size) as f64).collect();
-    let followed = smoothed(&sharpest);
+    let followed = smoothed(&sharpest, SMOOTH);
     let window = |((&(left, top), optimum), at): ((&(usize, usize), &f64), &f64)| {
         let first = (at - optimum * (planes - 1) as f64).round().clamp(0.0, (of - planes) as f64);
         Window { left, top, plane: first as usize }
@@ -170,21 +171,6 @@ fn cropped(picture: &GrayImage, window: Window, size: usize) -> GrayImage {
     GrayImage { width: size, height: size, data }
 }
 
-/// Values under a Gaussian of [`SMOOTH`] frames, mirrored at both ends.
-fn smoothed(values: &[f64]) -> Vec<f64> {
-    let reach = (4.0 * SMOOTH) as isize;
-    let last = values.len() as isize - 1;
-    let mirrored = |index: isize| {
-        let period = 2 * last + 2;
-        let place = index.rem_euclid(period);
-        values[place.min(period - 1 - place) as usize]
-    };
-    let weights: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / SMOOTH).powi(2)).exp()).collect();
-    let total: f64 = weights.iter().sum();
-    let at = |index: isize| weights.iter().zip(index - reach..).map(|(w, k)| w * mirrored(k)).sum::<f64>() / total;
-    (0..=last).map(at).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,9 +215,9 @@ mod tests {
 
     #[test]
     fn smoothing_keeps_what_is_even_and_mirrors_at_the_ends() {
-        assert!(smoothed(&[3.0; 5]).iter().all(|value| (value - 3.0).abs() < 1e-12));
+        assert!(smoothed(&[3.0; 5], SMOOTH).iter().all(|value| (value - 3.0).abs() < 1e-12));
         let step: Vec<f64> = (0..200).map(|index| f64::from(u8::from(index >= 100))).collect();
-        let found = smoothed(&step);
+        let found = smoothed(&step, SMOOTH);
         assert!((found[99] + found[100] - 1.0).abs() < 1e-9 && found[0] < 1e-9 && found[199] > 1.0 - 1e-9);
     }
 }

@@ -16,6 +16,7 @@ use crate::lens::FocalPower;
 use crate::scans::FocalTimeScan;
 use crate::scans::ScanSet;
 use crate::scans::planes::PlaneStack;
+use crate::simulation::gaussian::smoothed;
 use crate::simulation::walk::{Motion, Walk};
 
 /// Frames of a scan: 20 s at 25 a second.
@@ -95,19 +96,6 @@ impl StackCourse {
     }
 }
 
-/// `values` smoothed by a Gaussian of `sigma` frames, cut at four of them; beyond the ends the values are mirrored.
-fn smoothed(values: &[f64], sigma: f64) -> Vec<f64> {
-    let reach = (4.0 * sigma).round() as i64;
-    let weight = |offset: i64| (-0.5 * (offset as f64 / sigma).powi(2)).exp();
-    let total: f64 = (-reach..=reach).map(weight).sum();
-    let count = values.len() as i64;
-    let mirrored = |index: i64| {
-        let index = index.rem_euclid(2 * count);
-        values[index.min(2 * count - 1 - index) as usize]
-    };
-    (0..count).map(|at| (-reach..=reach).map(|o| weight(o) * mirrored(at + o)).sum::<f64>() / total).collect()
-}
-
 /// A [`StackCourse`] being replayed; at its last frame it stays.
 struct Playing {
     course: Arc<StackCourse>,
@@ -143,20 +131,5 @@ impl ScanSet for StackScans {
 
     fn scan(&self, index: usize) -> (Box<dyn FocalTimeScan>, usize) {
         (Box::new(Playing { course: Arc::clone(&self.0[index]), frame: 0 }), FRAMES)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn smoothing_keeps_a_constant_and_spreads_a_spike_as_a_gaussian() {
-        assert!(smoothed(&[3.0; 40], 5.0).iter().all(|value| (value - 3.0).abs() < 1e-9));
-        let mut spike = [0.0; 101];
-        spike[50] = 1.0;
-        let out = smoothed(&spike, 5.0);
-        // The normal density at 0 and at one standard deviation, over 5.
-        assert!((out[50] - 0.079_79).abs() < 1e-4 && (out[55] - 0.048_39).abs() < 1e-4);
     }
 }

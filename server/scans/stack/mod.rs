@@ -203,7 +203,8 @@ impl FocalStack {
 }
 
 /// Means of whole blocks of `scale` x `scale` pixels; what is left over at the right and below is cut off.
-fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
+#[must_use]
+pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
     let scale = scale.max(1);
     let (width, height) = (picture.width / scale, picture.height / scale);
     if scale == 1 || width == 0 || height == 0 {
@@ -369,5 +370,12 @@ mod tests {
         assert!(told([five(), vec![plane(2.0, 0.0)]].concat()).contains("both at position 2"));
         let other = Plane { picture: GrayImage { width: 1, height: 4, data: vec![0.0; 4] }, ..plane(9.0, 0.0) };
         assert!(told([five(), vec![other]].concat()).contains("9.png is 1x4 pixels, but 4.png is 2x2"));
+    }
+
+    #[test]
+    fn blocks_become_their_means() {
+        let picture = GrayImage { width: 5, height: 4, data: (0..20).map(|v| v as f32).collect() };
+        let small = in_blocks(&picture, 2);
+        assert_eq!((small.width, small.height, small.data), (2, 2, vec![3.0, 5.0, 13.0, 15.0]));
     }
 }
