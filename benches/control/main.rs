@@ -19,7 +19,9 @@ use parfocal::clock::{Clock, SystemClock};
 use parfocal::control::{
     Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, StepRecord, Stepper,
 };
-use parfocal::imaging::{Calibration, GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage};
+use parfocal::imaging::{
+    Calibration, GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, View, WIDER,
+};
 use parfocal::lens::{FocalPower, Lens, SimulatedLens};
 
 fn texture(index: usize) -> usize {
@@ -28,6 +30,10 @@ fn texture(index: usize) -> usize {
 
 fn patch() -> Patch {
     Patch(std::array::from_fn(|index| texture(index) as f32))
+}
+
+fn view() -> View {
+    View { wider: [Some(patch()); WIDER.len()], ..View::from(patch()) }
 }
 
 fn metrics(criterion: &mut Criterion) {
@@ -41,13 +47,13 @@ fn available() -> impl Iterator<Item = PolicyName> {
 }
 
 fn policies(criterion: &mut Criterion) {
-    let patch = patch();
+    let view = view();
     for name in available() {
         let mut policy = Registry::standard().build(&name).expect("is available");
         let mut focal_power = FocalPower::MIDDLE;
         criterion.bench_function(&format!("policy/{name}"), |bench| {
             bench.iter(|| {
-                let decision = policy.step(&Observation { patch: black_box(&patch), focal_power });
+                let decision = policy.step(&Observation { view: black_box(&view), focal_power });
                 focal_power = FocalPower::nearest(decision.target);
             });
         });

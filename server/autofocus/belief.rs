@@ -5,12 +5,12 @@ use std::sync::LazyLock;
 
 use tch::{Device, Kind, Tensor, nn};
 
-use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
+use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, WIDER_INPUT};
 use super::registration::{CHANGES, changes};
 use super::spectrum::{FEATURES, SHARPNESS, Spectrum, features, spectrum};
 use super::weights::{self, WeightsError};
 use super::{Decision, IN_FOCUS, Observation, Policy};
-use crate::imaging::Patch;
+use crate::imaging::{Patch, View, WIDER};
 
 /// Most focal power a frame: a lens can jump, but a surgeon should not see it.
 pub const MAX_MOVE: f64 = 0.1;
@@ -72,36 +72,76 @@ impl Stand {
 
 #[derive(Debug, Clone)]
 struct Frame {
-    patch: Patch,
-    spectrum: Spectrum,
-    features: [f32; FEATURES],
+    near: Look,
+    wider: [Option<Look>; WIDER.len()],
     focal_power: f32,
 }
 
-impl Trace {
-    /// The network's input for a frame that shows `patch`, seen at `focal_power`.
-    pub fn input(&mut self, patch: &Patch, focal_power: f64) -> [f32; BELIEF_INPUT] {
+/// One patch and what it tells.
+#[derive(Debug, Clone)]
+struct Look {
+    patch: Patch,
+    spectrum: Spectrum,
+    features: [f32; FEATURES],
+}
+
+impl Look {
+    fn at(patch: &Patch) -> Self {
         let spectrum = spectrum(patch);
-        let features = features(patch, &spectrum);
-        let focal_power = focal_power as f32;
-        let now = Box::new(Frame { patch: *patch, spectrum, features, focal_power });
-        let before = self.last.as_ref().unwrap_or(&now);
-        let moved = self.last.is_none() || (focal_power - before.focal_power).abs() > STILL;
-        self.stand.see(features[SHARPNESS], moved);
-        let mut input = [0.0; BELIEF_INPUT];
+        Self { patch: *patch, features: features(patch, &spectrum), spectrum }
+    }
+
+    /// Puts the features of this patch, how they differ from those of the patch `before`, and how the blur changed over what both
+    /// show, into `input`; returns the rest of it.
+    fn describe<'a>(&self, before: &Self, input: &'a mut [f32]) -> &'a mut [f32] {
         let (appearance, rest) = input.split_at_mut(FEATURES);
-        appearance.copy_from_slice(&features);
+        appearance.copy_from_slice(&self.features);
         let (difference, rest) = rest.split_at_mut(FEATURES);
         for (index, change) in difference.iter_mut().enumerate() {
-            *change = 4.0 * (features[index] - before.features[index]);
+            *change = 4.0 * (self.features[index] - before.features[index]);
         }
         let (registered, rest) = rest.split_at_mut(CHANGES);
-        registered.copy_from_slice(&changes((&before.patch, &before.spectrum), (&now.patch, &now.spectrum)));
+        registered.copy_from_slice(&changes((&before.patch, &before.spectrum), (&self.patch, &self.spectrum)));
+        rest
+    }
+}
+
+impl Frame {
+    /// Whether a patch of any scale shows something that focus could be told by.
+    fn shows_detail(&self) -> bool {
+        let mut looks = std::iter::once(&self.near).chain(self.wider.iter().flatten());
+        looks.any(|look| look.spectrum.shows_detail())
+    }
+}
+
+impl Trace {
+    /// The network's input for a frame that shows `view`, seen at `focal_power`.
+    pub fn input(&mut self, view: &View, focal_power: f64) -> [f32; BELIEF_INPUT] {
+        let focal_power = focal_power as f32;
+        let look = |patch: &Patch| Look::at(patch);
+        let wider = view.wider.each_ref().map(|patch| patch.as_ref().map(look));
+        let now = Box::new(Frame { near: look(&view.patch), wider, focal_power });
+        let before = self.last.as_ref().unwrap_or(&now);
+        let moved = self.last.is_none() || (focal_power - before.focal_power).abs() > STILL;
+        self.stand.see(now.near.features[SHARPNESS], moved);
+
+        let mut input = [0.0; BELIEF_INPUT];
+        let (near, wider) = input.split_at_mut(NEAR_INPUT);
+        let rest = now.near.describe(&before.near, near);
         let (stands, moved) = rest.split_at_mut(BINS);
         spread_over_bins(f64::from(focal_power), stands);
         moved[0] = 2.0 * (focal_power - 0.5);
         moved[1] = 10.0 * (focal_power - before.focal_power);
         moved[2] = 10.0 * (self.asked.unwrap_or(focal_power) - focal_power);
+
+        for (index, part) in wider.chunks_exact_mut(WIDER_INPUT).enumerate() {
+            // Where there is no such patch all is 0, which the network meets in training too.
+            if let Some(look) = &now.wider[index] {
+                let before = before.wider[index].as_ref().unwrap_or(look);
+                let rest = look.describe(before, part);
+                rest[0] = 1.0;
+            }
+        }
         self.last = Some(now);
         input
     }
@@ -110,7 +150,7 @@ impl Trace {
     /// could be told by, such as a glove or glare.
     #[must_use]
     pub fn aim(&self, focal_power: f64, belief: &[f32]) -> f64 {
-        let blind = self.last.as_ref().is_some_and(|frame| !frame.spectrum.shows_detail());
+        let blind = self.last.as_ref().is_some_and(|frame| !frame.shows_detail());
         if blind {
             return focal_power;
         }
@@ -209,6 +249,15 @@ fn target(focal_power: f64, belief: &[f32]) -> f64 {
     if step.abs() < LEAST_MOVE { focal_power } else { focal_power + step }
 }
 
+/// Fills `store`, which holds a belief network, from safetensors `bytes`. Weights of a network that saw the patch alone are taken too:
+/// what is seen of wider patches then counts for nothing, and the network computes what it computed before.
+///
+/// # Errors
+/// When the bytes are damaged or another network's.
+pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
+    weights::load_widening(store, bytes, "memory.weight_ih_l0", NEAR_INPUT)
+}
+
 /// The belief tracker as a policy. One instance follows one scan.
 pub struct BeliefTracker {
     network: BeliefNetwork,
@@ -225,14 +274,14 @@ impl BeliefTracker {
     /// When the weights are damaged or another network's.
     pub fn new(bytes: &[u8]) -> Result<Self, WeightsError> {
         let store = nn::VarStore::new(Device::Cpu);
-        let network = BeliefNetwork::new(&store.root());
-        weights::load(&store, bytes)?;
+        let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
+        load(&store, bytes)?;
         let memory = network.blank(1, Device::Cpu);
         Ok(Self { network, memory, trace: Trace::default(), _store: store })
     }
 
     fn believe(&mut self, seen: &Observation<'_>) -> Vec<f32> {
-        let input = self.trace.input(seen.patch, seen.focal_power.get());
+        let input = self.trace.input(seen.view, seen.focal_power.get());
         let input = Tensor::from_slice(&input).view([1, 1, BELIEF_INPUT as i64]);
         let (logits, memory) = tch::no_grad(|| self.network.forward(&input, &self.memory));
         self.memory = memory;
@@ -304,7 +353,7 @@ mod tests {
         let mut trace = Trace::default();
         let mut aims = |contrast: f32, frames: usize| -> Vec<f64> {
             let aim = |_| {
-                trace.input(&stripes(contrast), 0.5);
+                trace.input(&stripes(contrast).into(), 0.5);
                 trace.aim(0.5, &certain(0.5))
             };
             (0..frames).map(aim).collect()
@@ -314,6 +363,49 @@ mod tests {
         // A third less sharp: once that shows, it looks aside.
         let after = aims(27.0, 10);
         assert!((after[0] - 0.5).abs() < 1e-9 && (after[9] - 0.5).abs() > 0.05, "{after:?}");
+    }
+
+    #[test]
+    fn it_stands_still_only_where_no_scale_shows_anything() {
+        let flat = Patch([90.0; 1024]);
+        let stripes = Patch(std::array::from_fn(|i| 128.0 + if i % 8 < 4 { 40.0 } else { -40.0 }));
+        let stands = |wider| {
+            let mut trace = Trace::default();
+            trace.input(&View { patch: flat, wider }, 0.5);
+            (trace.aim(0.5, &certain(0.9)) - 0.5).abs() < 1e-9
+        };
+        assert!(stands([None; 2]) && stands([Some(flat); 2]));
+        assert!(!stands([Some(flat), Some(stripes)]));
+    }
+
+    #[test]
+    fn what_is_absent_is_nothing_and_what_is_there_is_told_scale_by_scale() {
+        let stripes = |width: usize| Patch(std::array::from_fn(|i| if i % (2 * width) < width { 90.0 } else { 160.0 }));
+        let (fine, coarse) = (stripes(2), stripes(8));
+        let input = |wider| Trace::default().input(&View { patch: fine, wider }, 0.5);
+        let alone = input([None; 2]);
+        assert!(alone[NEAR_INPUT..].iter().all(|value| value.abs() < f32::EPSILON));
+        let both = input([Some(fine), Some(coarse)]);
+        assert_eq!(both[..NEAR_INPUT], alone[..NEAR_INPUT]);
+        // The same patch at the middle scale has the same features; another one at the coarsest has others.
+        assert_eq!(both[NEAR_INPUT..][..FEATURES], alone[..FEATURES]);
+        let coarsest = &both[NEAR_INPUT + WIDER_INPUT..];
+        assert!(coarsest[0] > alone[0] && (coarsest[WIDER_INPUT - 1] - 1.0).abs() < f32::EPSILON);
+    }
+
+    #[test]
+    fn weights_that_knew_the_patch_alone_compute_what_they_did() {
+        let [old, new] = [NEAR_INPUT, BELIEF_INPUT].map(|inputs| {
+            let store = nn::VarStore::new(Device::Cpu);
+            let network = BeliefNetwork::new(&store.root(), inputs);
+            (store, network)
+        });
+        load(&new.0, &weights::save(&old.0, "a test").unwrap()).unwrap();
+        let inputs = Tensor::randn([1, 4, BELIEF_INPUT as i64], (Kind::Float, Device::Cpu));
+        let near = inputs.narrow(2, 0, NEAR_INPUT as i64);
+        let blank = old.1.blank(1, Device::Cpu);
+        let (expected, found) = (old.1.forward(&near, &blank).0, new.1.forward(&inputs, &blank).0);
+        assert!(found.allclose(&expected, 1e-5, 1e-6, false));
     }
 
     #[test]

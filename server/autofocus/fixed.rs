@@ -28,7 +28,7 @@ mod tests {
         let mut fixed = Fixed::default();
         for seen in [0.3, 0.302, 0.9] {
             let focal_power = FocalPower::new(seen).unwrap();
-            let decision = fixed.step(&Observation { patch: &patch, focal_power });
+            let decision = fixed.step(&Observation { view: &patch.into(), focal_power });
             assert_eq!(decision, Decision { target: 0.3, metric: None, belief: None });
         }
     }

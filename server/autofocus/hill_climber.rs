@@ -29,7 +29,7 @@ impl HillClimber {
 
 impl Policy for HillClimber {
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
-        let metric = (self.metric)(seen.patch);
+        let metric = (self.metric)(&seen.view.patch);
         let focal_power = seen.focal_power.get();
         let inside = focal_power > ON_BOUND && focal_power < 1.0 - ON_BOUND;
         if !(inside && metric > self.last_metric) {
@@ -60,7 +60,7 @@ mod tests {
             .iter()
             .map(|&metric| {
                 let patch = Patch([metric; PATCH_SIDE * PATCH_SIDE]);
-                let decision = climber.step(&Observation { patch: &patch, focal_power });
+                let decision = climber.step(&Observation { view: &patch.into(), focal_power });
                 assert_eq!(decision.metric, Some(f64::from(metric)));
                 focal_power = FocalPower::new(decision.target).unwrap();
                 (focal_power.get() / STEP * 1e6).round() / 1e6

@@ -145,8 +145,8 @@ impl Learned {
 impl Policy for Learned {
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         tch::no_grad(|| {
-            let metric = self.network.sight.metric(seen.patch);
-            let encoding = self.encode(seen.patch, metric);
+            let metric = self.network.sight.metric(&seen.view.patch);
+            let encoding = self.encode(&seen.view.patch, metric);
             self.remember(&encoding, scaled_focal_power(seen.focal_power.get()));
             let encodings: Vec<f32> = self.encodings.iter().flatten().copied().collect();
             let focal_powers: Vec<f32> = self.focal_powers.iter().copied().collect();

@@ -20,7 +20,7 @@ pub use registry::{PolicyEntry, PolicyError, PolicyName, Registry};
 
 use std::sync::Arc;
 
-use crate::imaging::Patch;
+use crate::imaging::View;
 use crate::lens::FocalPower;
 
 /// Step of the paper's policies in focal power.
@@ -34,12 +34,12 @@ pub trait Policy: Send {
     fn step(&mut self, seen: &Observation<'_>) -> Decision;
 }
 
-/// What a policy sees: one patch, and the focal power that it was exposed at.
+/// What a policy sees: one view, and the focal power that it was exposed at.
 #[derive(Debug, Clone, Copy)]
 pub struct Observation<'a> {
-    /// The patch.
-    pub patch: &'a Patch,
-    /// Focal power the patch was exposed at.
+    /// The patch and what is around it. The paper's policies use the patch alone.
+    pub view: &'a View,
+    /// Focal power that it was exposed at.
     pub focal_power: FocalPower,
 }
 

@@ -5,7 +5,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::registration::CHANGES;
 use super::spectrum::FEATURES;
-use crate::imaging::PATCH_SIDE;
+use crate::imaging::{PATCH_SIDE, WIDER};
 
 /// Latest frames that the paper's networks see.
 pub const HISTORY: usize = 8;
@@ -17,9 +17,13 @@ pub const ENCODING: usize = 8;
 pub const BINS: usize = 41;
 /// Units of the belief tracker's memory.
 pub const MEMORY: usize = 192;
-/// What the belief tracker sees of a frame: features, their change, the change over what this frame and the last have in common,
-/// where the lens stood (softly, one in [`BINS`]), and three numbers on how it moved.
-pub const BELIEF_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
+/// What the belief tracker sees of the patch: features, their change, the change over what this frame and the last have in common;
+/// then where the lens stood (softly, one in [`BINS`]), and three numbers on how it moved.
+pub const NEAR_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
+/// What it sees of a wider patch: features and changes as of the patch, and whether there is one at all.
+pub const WIDER_INPUT: usize = 2 * FEATURES + CHANGES + 1;
+/// What it sees of a frame: the patch first, then the wider ones.
+pub const BELIEF_INPUT: usize = NEAR_INPUT + WIDER.len() * WIDER_INPUT;
 
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;
@@ -95,13 +99,13 @@ pub struct BeliefNetwork {
 }
 
 impl BeliefNetwork {
-    /// A fresh network whose weights live under `path`.
+    /// A fresh network of `inputs` numbers a frame whose weights live under `path`.
     #[must_use]
-    pub fn new(path: &nn::Path<'_>) -> Self {
+    pub fn new(path: &nn::Path<'_>, inputs: usize) -> Self {
         let units = MEMORY as i64;
         let dense = |name, from, to| nn::linear(path / name, from, to, nn::LinearConfig::default());
         Self {
-            memory: nn::gru(path / "memory", BELIEF_INPUT as i64, units, nn::RNNConfig::default()),
+            memory: nn::gru(path / "memory", inputs as i64, units, nn::RNNConfig::default()),
             head: [dense("head_0", units, units), dense("head_2", units, BINS as i64)],
         }
     }
@@ -111,7 +115,7 @@ impl BeliefNetwork {
         Tensor::zeros([1, i64::try_from(count).unwrap_or(i64::MAX), MEMORY as i64], (Kind::Float, device))
     }
 
-    /// Logits `[N, T, BINS]` of inputs `[N, T, BELIEF_INPUT]` from memory `[1, N, MEMORY]`, and the memory after them.
+    /// Logits `[N, T, BINS]` of inputs `[N, T, inputs]` from memory `[1, N, MEMORY]`, and the memory after them.
     pub fn forward(&self, inputs: &Tensor, memory: &Tensor) -> (Tensor, Tensor) {
         let (units, state) = self.memory.seq_init(inputs, &nn::GRUState(memory.shallow_clone()));
         let hidden = self.head[0].forward(&units).relu();
@@ -177,9 +181,9 @@ mod tests {
     #[test]
     fn the_belief_tracker_gives_what_pytorch_gives() {
         let store = nn::VarStore::new(Device::Cpu);
-        let network = BeliefNetwork::new(&store.root());
+        let network = BeliefNetwork::new(&store.root(), NEAR_INPUT);
         fill(&store);
-        let inputs = wave(2 * 5 * BELIEF_INPUT, 0.29, 1.0, 0.0).view([2, 5, BELIEF_INPUT as i64]);
+        let inputs = wave(2 * 5 * NEAR_INPUT, 0.29, 1.0, 0.0).view([2, 5, NEAR_INPUT as i64]);
         let (logits, _) = network.forward(&inputs, &network.blank(2, Device::Cpu));
         let found = logits.select(1, 4).contiguous().view([-1]);
         assert!(found.allclose(&from_pytorch("belief_logits"), 1e-4, 1e-5, false));
@@ -189,7 +193,7 @@ mod tests {
     fn the_belief_tracker_goes_frame_by_frame_as_over_a_whole_scan() {
         tch::manual_seed(1);
         let store = nn::VarStore::new(Device::Cpu);
-        let network = BeliefNetwork::new(&store.root());
+        let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
         let inputs = Tensor::randn([2, 6, BELIEF_INPUT as i64], (Kind::Float, Device::Cpu));
         let (whole, _) = network.forward(&inputs, &network.blank(2, Device::Cpu));
         let mut memory = network.blank(2, Device::Cpu);

@@ -204,7 +204,7 @@ mod tests {
         let patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
         for start in [0.2, 0.7] {
             let focal_power = FocalPower::new(start).unwrap();
-            let decision = registry.build(&fixed).unwrap().step(&Observation { patch: &patch, focal_power });
+            let decision = registry.build(&fixed).unwrap().step(&Observation { view: &patch.into(), focal_power });
             assert!((decision.target - start).abs() < f64::EPSILON);
         }
     }

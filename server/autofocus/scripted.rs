@@ -98,7 +98,7 @@ impl Scripted {
     fn remember(&mut self, seen: &Observation<'_>) {
         let missing = if self.focal_powers.is_empty() { HISTORY } else { 1 };
         for _ in 0..missing {
-            self.patches.extend(&seen.patch.0);
+            self.patches.extend(&seen.view.patch.0);
             self.focal_powers.push_back(seen.focal_power.get() as f32);
         }
         if self.focal_powers.len() > HISTORY {
@@ -148,7 +148,7 @@ mod tests {
     fn a_script_made_by_pytorch_sees_the_latest_frames_in_order() {
         let mut policy = policy("steepest-frame.pt").unwrap();
         let focal_power = FocalPower::new(0.5).unwrap();
-        let mut step = |height| policy.step(&Observation { patch: &stripes(height), focal_power }).target;
+        let mut step = |height| policy.step(&Observation { view: &stripes(height).into(), focal_power }).target;
         // It goes up where the latest frame is steeper than the one before, and else down; nothing is gained at first.
         for (height, expected) in [(10.0, 0.5), (20.0, 0.55), (5.0, 0.45), (6.0, 0.55), (6.0, 0.5)] {
             let target = step(height);
@@ -166,7 +166,8 @@ mod tests {
         let (registry, name) = registered("first-frame.pt");
         for _ in 0..2 {
             let mut policy = registry.build(&name).unwrap();
-            let targets = [(); 2].map(|()| policy.step(&Observation { patch: &stripes(9.0), focal_power }).target);
+            let targets =
+                [(); 2].map(|()| policy.step(&Observation { view: &stripes(9.0).into(), focal_power }).target);
             assert!((targets[0] - 0.55).abs() < 1e-9 && (targets[1] - 0.45).abs() < 1e-9, "{targets:?}");
         }
     }

@@ -21,6 +21,15 @@ pub enum WeightsError {
 /// # Errors
 /// When the bytes are damaged, or hold a different set of tensors than the network has.
 pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
+    load_widening(store, bytes, "", 0)
+}
+
+/// Like [`load`], for a network that sees more than it once did: where the matrix `widened` has `columns` columns in the file, they
+/// are the first of the network's, and the others become 0.
+///
+/// # Errors
+/// As for [`load`].
+pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, columns: usize) -> Result<(), WeightsError> {
     let file = SafeTensors::deserialize(bytes).map_err(|error| WeightsError::Damaged(error.to_string()))?;
     let variables = store.variables();
     if let Some(name) = file.names().into_iter().find(|name| !variables.contains_key(*name)) {
@@ -29,18 +38,24 @@ pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
     for (name, mut variable) in variables {
         let view = file.tensor(&name).map_err(|_| WeightsError::Mismatch(format!("tensor '{name}' is missing")))?;
         let shape: Vec<i64> = view.shape().iter().map(|&side| i64::try_from(side).unwrap_or(i64::MAX)).collect();
-        if view.dtype() != Dtype::F32 || shape != variable.size() {
-            return Err(WeightsError::Mismatch(format!(
-                "tensor '{name}' has shape {shape:?}, not {:?}",
-                variable.size()
-            )));
+        let size = variable.size();
+        let narrow = name == widened && size.len() == 2 && shape == [size[0], i64::try_from(columns).unwrap_or(0)];
+        if view.dtype() != Dtype::F32 || (shape != size && !narrow) {
+            return Err(WeightsError::Mismatch(format!("tensor '{name}' has shape {shape:?}, not {size:?}")));
         }
         let tensor = Tensor::f_from_data_size(view.data(), &shape, Kind::Float)
             .map_err(|error| WeightsError::Damaged(error.to_string()))?;
         if !bool::try_from(tensor.isfinite().all()).unwrap_or(false) {
             return Err(WeightsError::Damaged(format!("tensor '{name}' holds values that are no numbers")));
         }
-        tch::no_grad(|| variable.copy_(&tensor));
+        tch::no_grad(|| {
+            if narrow {
+                let _ = variable.zero_();
+                variable.narrow(1, 0, shape[1]).copy_(&tensor);
+            } else {
+                variable.copy_(&tensor);
+            }
+        });
     }
     Ok(())
 }
@@ -93,6 +108,21 @@ mod tests {
         let (from, to) = (store(3), store(3));
         load(&to, &save(&from, "a test").unwrap()).unwrap();
         assert_eq!(from.variables()["layer.weight"], to.variables()["layer.weight"]);
+    }
+
+    #[test]
+    fn narrow_weights_become_the_first_columns_of_wide_ones() {
+        let (narrow, wide) = (store(3), store(5));
+        let bytes = save(&narrow, "a test").unwrap();
+        load_widening(&wide, &bytes, "layer.weight", 3).unwrap();
+        let [from, to] = [&narrow, &wide].map(|store| store.variables()["layer.weight"].shallow_clone());
+        assert_eq!(to.narrow(1, 0, 3), from);
+        assert_eq!(floats(&to.narrow(1, 3, 2)), [0.0; 4]);
+        // Of another width, or of another matrix, they do not fit.
+        for (name, columns) in [("layer.weight", 4), ("layer.bias", 3)] {
+            let refused = load_widening(&store(5), &bytes, name, columns).unwrap_err();
+            assert!(matches!(refused, WeightsError::Mismatch(_)), "{refused}");
+        }
     }
 
     #[test]

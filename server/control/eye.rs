@@ -1,11 +1,11 @@
-//! The eye: the patch of a frame, whichever kind of picture it carries.
+//! The eye: what policies see of a frame, whichever kind of picture it carries.
 
 use super::Hold;
 use super::pilot::HoldReason;
 use crate::camera::FrameImage;
-use crate::imaging::{ContentArea, Patch, PatchArea, Reconstructor, rgb_patch};
+use crate::imaging::{ContentArea, PatchArea, Reconstructor, View, rgb_view};
 
-/// Finds and reconstructs the patch, and nothing else of the picture.
+/// Finds and reconstructs the patch and what is around it, and nothing else of the picture.
 pub struct Eye {
     reconstructor: Reconstructor,
 }
@@ -17,11 +17,11 @@ impl Eye {
         Self { reconstructor }
     }
 
-    /// The patch at the centre of `content`, or of the picture without one, and where it was.
+    /// The view at the centre of `content`, or of the picture without one, and where its patch was.
     ///
     /// # Errors
     /// When the picture is smaller than a patch.
-    pub fn look(&self, image: &FrameImage, content: Option<&ContentArea>) -> Result<(PatchArea, Patch), HoldReason> {
+    pub fn look(&self, image: &FrameImage, content: Option<&ContentArea>) -> Result<(PatchArea, View), HoldReason> {
         let (width, height) = match image {
             FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
             FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
@@ -29,10 +29,10 @@ impl Eye {
         let area = PatchArea::central(width, height, content).map_err(|error| {
             HoldReason::new(Hold::CameraFailed, &format!("the camera's picture is no use: {error}"))
         })?;
-        let patch = match image {
-            FrameImage::Mosaic(mosaic) => self.reconstructor.gray_patch(mosaic, area),
-            FrameImage::Rgb(rgb) => rgb_patch(rgb, area),
+        let view = match image {
+            FrameImage::Mosaic(mosaic) => self.reconstructor.gray_view(mosaic, area),
+            FrameImage::Rgb(rgb) => rgb_view(rgb, area),
         };
-        Ok((area, patch))
+        Ok((area, view))
     }
 }

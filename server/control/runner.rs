@@ -12,14 +12,14 @@ use rustix::thread::{Pid, gettid};
 
 use crate::autofocus::{Decision, Observation, Policy, PolicyError, PolicyName, Registry, networks};
 use crate::clock::{Clock, Moment};
-use crate::imaging::Patch;
+use crate::imaging::View;
 use crate::lens::FocalPower;
 use crate::priority::{self, Place};
 
 /// An observation of the thread's own.
 #[derive(Debug)]
 struct Question {
-    patch: Patch,
+    view: View,
     focal_power: FocalPower,
 }
 
@@ -82,7 +82,7 @@ impl Runner {
         self.hurry();
         self.asked_at = Some(now);
         // A thread that has ended leaves its reason among the answers.
-        let _ = self.questions.try_send(Question { patch: *seen.patch, focal_power: seen.focal_power });
+        let _ = self.questions.try_send(Question { view: *seen.view, focal_power: seen.focal_power });
     }
 
     /// When the open question was asked, if one is open.
@@ -163,7 +163,7 @@ fn serve(
 
 fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answer {
     let began = clock.now();
-    let seen = Observation { patch: &question.patch, focal_power: question.focal_power };
+    let seen = Observation { view: &question.view, focal_power: question.focal_power };
     match guarded(|| policy.step(&seen)) {
         Ok(decision) => Answer::Decided { decision, took: clock.now().since(began) },
         Err(message) => Answer::Panicked(message),

@@ -12,7 +12,7 @@ use crate::autofocus::{Observation, PolicyName, Registry};
 use crate::camera::Frame;
 use crate::clock::Clock;
 use crate::ids::SegmentId;
-use crate::imaging::{ContentArea, Patch};
+use crate::imaging::{ContentArea, View};
 use crate::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth};
 
 /// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation faster than time.
@@ -120,8 +120,8 @@ impl Stepper {
     pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
         // A lens that is away may be anywhere.
         let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
-        let (area, patch) = self.eye.look(&frame.image, self.content_area.as_ref())?;
-        let Choice { policy, outcome } = self.choose(&frame, &patch);
+        let (area, view) = self.eye.look(&frame.image, self.content_area.as_ref())?;
+        let Choice { policy, outcome } = self.choose(&frame, &view);
         let advice = self.act(outcome);
         let record = StepRecord {
             frame: frame.number,
@@ -146,7 +146,7 @@ impl Stepper {
         self.tell_lens();
     }
 
-    fn choose(&mut self, frame: &Frame, patch: &Patch) -> Choice {
+    fn choose(&mut self, frame: &Frame, view: &View) -> Choice {
         let unasked = |outcome| Choice { policy: None, outcome };
         match self.drive {
             Driver::Hand => unasked(Ok(None)),
@@ -161,7 +161,7 @@ impl Stepper {
                 }
                 self.drive = Driver::Policy { placed: true };
                 let focal_power = self.attribution.focal_power(frame.middle());
-                let outcome = self.pilot.ask(&Observation { patch, focal_power }).map(Some);
+                let outcome = self.pilot.ask(&Observation { view, focal_power }).map(Some);
                 Choice { policy: self.pilot.policy().cloned(), outcome }
             }
         }

@@ -84,10 +84,10 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: u
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();
     for frame in 1..=frames {
-        let patch = scan.observe(focal_power);
+        let view = scan.observe(focal_power);
         course.focal_power.push(focal_power.get());
         course.optimum.push(scan.optimum().get());
-        let target = policy.step(&Observation { patch: &patch, focal_power }).target;
+        let target = policy.step(&Observation { view: &view, focal_power }).target;
         if !target.is_finite() {
             return Err(NoTarget { frame, target });
         }

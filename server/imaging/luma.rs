@@ -2,6 +2,7 @@
 
 use super::frame::{GrayImage, RgbImage};
 use super::geometry::{PATCH_SIDE, Patch, PatchArea};
+use super::view::{Square, View};
 
 /// Makes `gray` from `rgb`: 0.2126 R + 0.7152 G + 0.0722 B of the encoded values (ITU-R BT.709 weights), as the
 /// content-area method does. `gray` is resized as needed.
@@ -25,6 +26,16 @@ pub fn rgb_patch(rgb: &RgbImage, area: PatchArea) -> Patch {
     }))
 }
 
+/// What policies see of `rgb` with the patch at `area`, computing just those pixels.
+#[must_use]
+pub fn rgb_view(rgb: &RgbImage, area: PatchArea) -> View {
+    let (pixels, _) = rgb.data.as_chunks::<3>();
+    View::around(rgb_patch(rgb, area), (area.x, area.y), (rgb.width, rgb.height), |Square { x, y, side }| {
+        let lines = pixels.chunks_exact(rgb.width).skip(y).take(side);
+        lines.flat_map(|line| line[x..x + side].iter().map(|pixel| luma(pixel.map(f32::from)))).collect()
+    })
+}
+
 pub(super) fn luma([red, green, blue]: [f32; 3]) -> f32 {
     0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
@@ -32,6 +43,7 @@ pub(super) fn luma([red, green, blue]: [f32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::block_means;
 
     #[test]
     fn weights_are_those_of_rec_709() {
@@ -56,5 +68,19 @@ mod tests {
         let beyond = rgb_patch(&rgb, PatchArea { x: 59, y: 49, width: 32, height: 32 });
         assert_eq!(beyond.0[0].to_bits(), gray.data[49 * 60 + 59].to_bits());
         assert!(beyond.0[1..].iter().all(|&value| value == 0.0));
+    }
+
+    #[test]
+    fn wider_patches_are_those_of_the_whole_gray_picture() {
+        let data = (0..160 * 140 * 3).map(|i| u8::try_from(i * 7 % 251).unwrap()).collect();
+        let rgb = RgbImage::new(160, 140, data).unwrap();
+        let area = PatchArea { x: 60, y: 50, width: 32, height: 32 };
+        let mut gray = GrayImage::default();
+        rgb_to_gray(&rgb, &mut gray);
+        let seen = rgb_view(&rgb, area);
+        assert_eq!(seen.patch, rgb_patch(&rgb, area));
+        for (patch, (scale, left, top)) in seen.wider.into_iter().zip([(2, 44, 34), (4, 12, 2)]) {
+            assert_eq!(patch.unwrap(), block_means(&gray.data[top * 160 + left..], 160, scale));
+        }
     }
 }

@@ -14,6 +14,7 @@ mod luma;
 mod reconstruct;
 mod reduce;
 mod references;
+mod view;
 
 pub use calibration::{BANDS, Band, Calibration, Reference};
 pub use calibration_toml::CalibrationError;
@@ -21,7 +22,8 @@ pub use decode::{DecodeError, Picture, SENSOR_SIZE, decode, decode_any, decode_r
 pub use frame::{CELL, FrameError, GrayImage, MosaicFrame, RgbImage};
 pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
 pub use jpeg::{JpegEncoder, JpegError};
-pub use luma::{rgb_patch, rgb_to_gray};
+pub use luma::{rgb_patch, rgb_to_gray, rgb_view};
 pub use reconstruct::Reconstructor;
 pub use reduce::reduced;
 pub use references::{Average, BadReference};
+pub use view::{Square, View, WIDER, block_means, fill_block_means};

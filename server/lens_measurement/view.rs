@@ -38,8 +38,8 @@ impl View {
         loop {
             match self.camera.next_frame(PATIENCE) {
                 Ok(frame) => {
-                    let (_, patch) = self.eye.look(&frame.image, None)?;
-                    return Ok((frame.middle(), mgm(&patch)));
+                    let (_, view) = self.eye.look(&frame.image, None)?;
+                    return Ok((frame.middle(), mgm(&view.patch)));
                 }
                 Err(error @ CameraError::BadSource(_)) => return Err(error.into()),
                 Err(error) if self.clock.now().since(begun) >= PATIENCE => return Err(error.into()),

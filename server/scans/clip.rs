@@ -1,16 +1,18 @@
 //! What simulated scans are made of: sharp pictures in order of time.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use sha2::{Digest, Sha256};
 
-use crate::imaging::GrayImage;
+use crate::imaging::{GrayImage, WIDER, reduced};
 
 /// Sharp pictures in order of time, one for a still, and where patches may lie on them.
 #[derive(Debug, Clone)]
 pub struct Clip {
     frames: Vec<Arc<GrayImage>>,
     area: Area,
+    /// The pictures at the scales of wider patches, made when they are first asked for.
+    coarse: Vec<OnceLock<[GrayImage; WIDER.len()]>>,
 }
 
 /// A rectangle of pixels: `left <= x < right`, `top <= y < bottom`.
@@ -67,7 +69,8 @@ impl Clip {
         if width < 64 || height < 64 {
             return Err(ClipError::TooSmall { width, height });
         }
-        Ok(Self { frames, area })
+        let coarse = vec![OnceLock::new(); frames.len()];
+        Ok(Self { frames, area, coarse })
     }
 
     /// A clip of one picture.
@@ -81,12 +84,25 @@ impl Clip {
     /// The picture at time `t`; after the end the clip runs backwards, and so on.
     #[must_use]
     pub fn at(&self, t: usize) -> &GrayImage {
+        &self.frames[self.index(t)]
+    }
+
+    /// The picture at time `t` at each scale of [`WIDER`]: means of whole blocks of pixels.
+    #[must_use]
+    pub fn coarse_at(&self, t: usize) -> &[GrayImage; WIDER.len()] {
+        let index = self.index(t);
+        let picture = &*self.frames[index];
+        self.coarse[index]
+            .get_or_init(|| WIDER.map(|scale| reduced(picture, picture.width / scale, picture.height / scale)))
+    }
+
+    fn index(&self, t: usize) -> usize {
         let last = self.frames.len() - 1;
         if last == 0 {
-            return &self.frames[0];
+            return 0;
         }
         let phase = t % (2 * last);
-        &self.frames[phase.min(2 * last - phase)]
+        phase.min(2 * last - phase)
     }
 
     /// Number of pictures, at least 1.

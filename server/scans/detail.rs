@@ -57,7 +57,7 @@ fn shows_detail(scan: &mut dyn FocalTimeScan, frames: usize) -> bool {
 
 fn frame_shows_detail(scan: &mut dyn FocalTimeScan) -> bool {
     let optimum = scan.optimum();
-    let sharpest = scan.observe(optimum);
+    let sharpest = scan.observe(optimum).patch;
     let spectrum = spectrum(&sharpest);
     if !spectrum.shows_detail() && spectrum.contrast() < MOST_NOISE {
         return false;
@@ -65,7 +65,7 @@ fn frame_shows_detail(scan: &mut dyn FocalTimeScan) -> bool {
 
     let farther = |a: &FocalPower, b: &FocalPower| a.distance(optimum).total_cmp(&b.distance(optimum));
     let far = [FocalPower::MIN, FocalPower::MAX].into_iter().max_by(farther).unwrap_or(FocalPower::MIN);
-    mgm(&sharpest) > LEAST_PEAK * mgm(&scan.observe(far))
+    mgm(&sharpest) > LEAST_PEAK * mgm(&scan.observe(far).patch)
 }
 
 #[cfg(test)]

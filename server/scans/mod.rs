@@ -15,13 +15,13 @@ pub mod simulated;
 pub mod stack;
 pub mod variety;
 
-use crate::imaging::Patch;
+use crate::imaging::View;
 use crate::lens::FocalPower;
 
 /// A focal-time scan that a policy can be run on, frame by frame.
 pub trait FocalTimeScan {
-    /// What the camera sees at this frame through a lens at `focal_power`: whole gray levels, 0..=255.
-    fn observe(&mut self, focal_power: FocalPower) -> Patch;
+    /// What the camera sees at this frame through a lens at `focal_power`; the patch has whole gray levels, 0..=255.
+    fn observe(&mut self, focal_power: FocalPower) -> View;
 
     /// The optimal focal power at this frame.
     fn optimum(&self) -> FocalPower;

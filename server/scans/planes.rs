@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use crate::imaging::{GrayImage, PATCH_SIDE, Patch};
+use crate::imaging::{GrayImage, PATCH_SIDE, Patch, Square, View};
 
 /// Pixels between two neighbouring places at which the sharpest position is known.
 const STRIDE: usize = 4;
@@ -94,24 +94,44 @@ impl PlaneStack {
     /// The patch with its corner at `(x, y)` with the focal plane at `position`: a mix of the two pictures around it. Beyond the
     /// first and the last picture, those; beyond the borders, the nearest patch within them.
     #[must_use]
-    pub fn patch(&self, (x, y): (usize, usize), position: f64) -> Patch {
+    pub fn patch(&self, corner: (usize, usize), position: f64) -> Patch {
+        let (x, y) = self.inside(corner);
+        let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
+        self.mix(Square { x, y, side: PATCH_SIDE }, position, &mut patch.0);
+        patch
+    }
+
+    /// What policies see with [`PlaneStack::patch`] as the patch.
+    #[must_use]
+    pub fn view(&self, corner: (usize, usize), position: f64) -> View {
+        let corner = self.inside(corner);
+        View::around(self.patch(corner, position), corner, self.size(), |square| {
+            let mut levels = vec![0.0; square.side * square.side];
+            self.mix(square, position, &mut levels);
+            levels
+        })
+    }
+
+    fn inside(&self, (x, y): (usize, usize)) -> (usize, usize) {
+        (x.min(self.width - PATCH_SIDE), y.min(self.height - PATCH_SIDE))
+    }
+
+    /// Fills `out` with what lies within `square`, with the focal plane at `position`.
+    fn mix(&self, square: Square, position: f64, out: &mut [f32]) {
         let position = position as f32;
         let last = self.positions.len() - 1;
         let above = self.positions.partition_point(|&at| at <= position).clamp(1, last);
         let (low, high) = (self.positions[above - 1], self.positions[above]);
         let share = ((position - low) / (high - low)).clamp(0.0, 1.0);
-        let corner = (x.min(self.width - PATCH_SIDE), y.min(self.height - PATCH_SIDE));
-        let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
-        mix(&self.planes[above - 1], &self.planes[above], share, self.width, corner, &mut patch.0);
-        patch
+        mix(&self.planes[above - 1], &self.planes[above], share, self.width, square, out);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn mix(low: &[u8], high: &[u8], share: f32, width: usize, (x, y): (usize, usize), out: &mut [f32]) {
-    for (row, line) in out.chunks_exact_mut(PATCH_SIDE).enumerate() {
+fn mix(low: &[u8], high: &[u8], share: f32, width: usize, Square { x, y, side }: Square, out: &mut [f32]) {
+    for (row, line) in out.chunks_exact_mut(side).enumerate() {
         let from = (y + row) * width + x;
-        let pairs = low[from..from + PATCH_SIDE].iter().zip(&high[from..from + PATCH_SIDE]);
+        let pairs = low[from..from + side].iter().zip(&high[from..from + side]);
         for (value, (&low, &high)) in line.iter_mut().zip(pairs) {
             let low = f32::from(low);
             *value = low + share * (f32::from(high) - low);
@@ -185,6 +205,8 @@ fn peak(positions: &[f32], curve: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::block_means;
+    use crate::training::texture::texture;
 
     #[test]
     fn a_parabola_peaks_at_its_vertex() {
@@ -212,6 +234,22 @@ mod tests {
         assert!((stack.sharpest((90, 8)) - 5.0).abs() < 1e-3);
         let mixed = stack.patch((0, 0), 0.5).0;
         assert!((mixed[0] - 153.0).abs() < 1e-4 && (mixed[4] - 103.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn wider_patches_are_means_of_what_is_mixed() {
+        let pictures: Vec<_> = (0..3u8).map(|index| (f32::from(index), texture(u64::from(index), 160))).collect();
+        let stack = PlaneStack::new(&pictures).unwrap();
+        let seen = stack.view((20, 70), 0.5);
+        assert_eq!(seen.patch, stack.patch((20, 70), 0.5));
+        let level = |index: usize, i: usize| pictures[index].1.data[i].round();
+        let mixed: Vec<f32> = (0..160 * 160).map(|i| 0.5 * (level(0, i) + level(1, i))).collect();
+        // The widest patch would begin 28 pixels to the left of the picture.
+        for (patch, (scale, left, top)) in seen.wider.into_iter().zip([(2, 4, 54), (4, 0, 22)]) {
+            let expected = block_means(&mixed[top * 160 + left..], 160, scale);
+            let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);
+            assert!(pairs.into_iter().all(|(one, other)| (one - other).abs() < 1e-3), "scale {scale}");
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Recorded focal-time scans, ready to be replayed: at each pose one patch for each of some discrete focal powers.
+//! Recorded focal-time scans, ready to be replayed: at each pose one view for each of some discrete focal powers.
 
 use std::sync::Arc;
 
@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::autofocus::mgm;
 use crate::camera::recorded::{Pose, ScanError, ScanFolder};
-use crate::imaging::{Calibration, GrayImage, MosaicFrame, PATCH_SIDE, Patch, PatchArea, Reconstructor};
+use crate::imaging::{
+    Calibration, GrayImage, MosaicFrame, PATCH_SIDE, Patch, PatchArea, Reconstructor, Square, View, WIDER,
+};
 use crate::lens::FocalPower;
 use crate::scans::FocalTimeScan;
 use crate::scans::ScanSet;
@@ -52,6 +54,30 @@ pub struct Stack {
     pub optimum: FocalPower,
     /// One patch for each focal power, in rising order.
     pub patches: Vec<Box<[u8; PIXELS]>>,
+    /// The wider patches of each, or nothing where only patches are known.
+    wider: Vec<[Option<Coarse>; WIDER.len()]>,
+}
+
+/// A wider patch, in steps of 1/256 of a gray level: its values are means, and finer than whole levels.
+#[derive(Debug, Clone, PartialEq)]
+struct Coarse(Box<[u16; PIXELS]>);
+
+impl Coarse {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels; what is beyond saturates")]
+    fn of(patch: &Patch) -> Self {
+        Self(Box::new(patch.0.map(|value| (256.0 * value).round() as u16)))
+    }
+
+    fn patch(&self) -> Patch {
+        Patch(self.0.map(|value| f32::from(value) / 256.0))
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a share")]
+    fn mixed(&self, high: &Self, part: f64) -> Patch {
+        let part = part as f32;
+        let (low, high) = (self.patch(), high.patch());
+        Patch(std::array::from_fn(|i| low.0[i] + part * (high.0[i] - low.0[i])))
+    }
 }
 
 impl Stack {
@@ -61,7 +87,14 @@ impl Stack {
     pub fn new(powers: &[FocalPower], patches: Vec<Box<[u8; PIXELS]>>) -> Self {
         let metrics = powers.iter().zip(&patches).map(|(&power, patch)| (power, mgm(&as_patch(patch))));
         let best = metrics.max_by(|a, b| a.1.total_cmp(&b.1));
-        Self { optimum: best.map_or(FocalPower::MIDDLE, |(power, _)| power), patches }
+        Self { optimum: best.map_or(FocalPower::MIDDLE, |(power, _)| power), patches, wider: Vec::new() }
+    }
+
+    /// This stack with the wider patches of `views`, one for each focal power.
+    fn with_wider_of<'a>(mut self, views: impl IntoIterator<Item = &'a View>) -> Self {
+        let coarse = |view: &View| view.wider.each_ref().map(|patch| patch.as_ref().map(Coarse::of));
+        self.wider = views.into_iter().map(coarse).collect();
+        self
     }
 }
 
@@ -100,10 +133,12 @@ impl RecordedScan {
         let read = |pose: Pose| {
             let mut images = pose.images.clone();
             images.sort_by(|a, b| a.focal_power.get().total_cmp(&b.focal_power.get()));
-            let patch = |image| folder.picture(&pose, image).map(|p| Box::new(levels_at(&p, pose.patch_area())));
-            let patches = images.iter().map(patch).collect::<Result<_, _>>()?;
+            let area = pose.patch_area();
+            let view = |image| folder.picture(&pose, image).map(|picture| gray_view(&picture, area));
+            let views = images.iter().map(view).collect::<Result<Vec<_>, _>>()?;
+            let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
             progress();
-            Ok(Stack { optimum: pose.optimum, patches })
+            Ok(Stack { optimum: pose.optimum, patches, wider: Vec::new() }.with_wider_of(&views))
         };
         let poses = poses.into_par_iter().map(read).collect::<Result<_, ScanError>>()?;
         Ok(Self { powers, poses })
@@ -134,15 +169,22 @@ impl RecordedScan {
 
     /// What is seen at pose `index` (the last, beyond it) through a lens at `focal_power`.
     #[must_use]
-    pub fn see(&self, index: usize, focal_power: FocalPower, between: Between) -> Patch {
-        let Some(pose) = self.poses.get(index).or(self.poses.last()) else { return Patch([0.0; PIXELS]) };
+    pub fn see(&self, index: usize, focal_power: FocalPower, between: Between) -> View {
+        let Some(pose) = self.poses.get(index).or(self.poses.last()) else { return Patch([0.0; PIXELS]).into() };
         let above = self.powers.partition_point(|&power| power <= focal_power).clamp(1, self.powers.len() - 1);
         let (low, high) = (self.powers[above - 1], self.powers[above]);
         let part = (low.distance(focal_power) / low.distance(high)).min(1.0);
-        match between {
-            Between::Nearest => as_patch(&pose.patches[if part < 0.5 { above - 1 } else { above }]),
+        let nearest = if part < 0.5 { above - 1 } else { above };
+        let patch = match between {
+            Between::Nearest => as_patch(&pose.patches[nearest]),
             Between::Interpolated => mixed(&pose.patches[above - 1], &pose.patches[above], part),
-        }
+        };
+        let coarse = |position: usize, index: usize| pose.wider.get(position)?[index].as_ref();
+        let wider = |index: usize| match between {
+            Between::Nearest => Some(coarse(nearest, index)?.patch()),
+            Between::Interpolated => Some(coarse(above - 1, index)?.mixed(coarse(above, index)?, part)),
+        };
+        View { patch, wider: std::array::from_fn(wider) }
     }
 }
 
@@ -153,15 +195,16 @@ fn frozen(
     samples: &mut Vec<u16>,
     (powers, order): (&[FocalPower], &[usize]),
 ) -> Stack {
-    let mut patches = vec![Box::new([0; PIXELS]); powers.len()];
+    let mut views = vec![View::from(Patch([0.0; PIXELS])); powers.len()];
     for (number, &position) in (0..).zip(order) {
-        still.expose_patch(number, powers[position], samples);
+        still.expose_view(number, powers[position], samples);
         // The size is the sensor's own.
         let Ok(mosaic) = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, std::mem::take(samples)) else { continue };
-        *patches[position] = as_levels(&reconstructor.gray_patch(&mosaic, still.patch()));
+        views[position] = reconstructor.gray_view(&mosaic, still.patch());
         *samples = mosaic.into_samples();
     }
-    Stack::new(powers, patches)
+    let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
+    Stack::new(powers, patches).with_wider_of(&views)
 }
 
 /// The patch of a gray picture at `area`, rounded; black where `area` leaves the picture.
@@ -171,6 +214,15 @@ pub fn levels_at(picture: &GrayImage, area: PatchArea) -> [u8; PIXELS] {
         let (x, y) = (area.x + i % PATCH_SIDE, area.y + i / PATCH_SIDE);
         let value = if x < picture.width { picture.data.get(y * picture.width + x) } else { None };
         value.map_or(0, |value| value.round() as u8)
+    })
+}
+
+/// What policies see of a gray picture with the patch at `area`: its patch has whole gray levels.
+fn gray_view(picture: &GrayImage, area: PatchArea) -> View {
+    let patch = as_patch(&levels_at(picture, area));
+    View::around(patch, (area.x, area.y), (picture.width, picture.height), |Square { x, y, side }| {
+        let lines = picture.data.chunks_exact(picture.width).skip(y).take(side);
+        lines.flat_map(|line| line[x..x + side].iter().copied()).collect()
     })
 }
 
@@ -199,7 +251,7 @@ pub struct Playing {
 }
 
 impl FocalTimeScan for Playing {
-    fn observe(&mut self, focal_power: FocalPower) -> Patch {
+    fn observe(&mut self, focal_power: FocalPower) -> View {
         self.scan.see(self.pose, focal_power, self.between)
     }
 
@@ -240,17 +292,19 @@ impl ScanSet for Recorded {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::block_means;
+    use crate::training::texture::texture;
 
     /// One pose at focal powers 0, 0.5 and 1 whose patches are even: 0, 100 and 200.
     fn ramp() -> RecordedScan {
         let patches = [0, 100, 200].map(|level| Box::new([level; PIXELS])).to_vec();
-        RecordedScan::new(evenly_spread(3), vec![Stack { optimum: FocalPower::MIDDLE, patches }])
+        RecordedScan::new(evenly_spread(3), vec![Stack { optimum: FocalPower::MIDDLE, patches, wider: Vec::new() }])
     }
 
     #[test]
     #[allow(clippy::float_cmp, reason = "whole gray levels")]
     fn between_two_focal_powers_the_nearest_or_a_mix_is_seen() {
-        let seen = |power, between| ramp().see(0, FocalPower::nearest(power), between).0[500];
+        let seen = |power, between| ramp().see(0, FocalPower::nearest(power), between).patch.0[500];
         for (power, nearest, mixed) in [
             (0.0, 0.0, 0.0),
             (0.2, 0.0, 40.0),
@@ -261,6 +315,31 @@ mod tests {
         ] {
             assert_eq!(seen(power, Between::Nearest), nearest, "{power}");
             assert_eq!(seen(power, Between::Interpolated), mixed, "{power}");
+        }
+    }
+
+    #[test]
+    fn wider_patches_are_those_of_the_picture_and_mixed_as_the_patch_is() {
+        let picture = |seed| texture(seed, 128);
+        let area = PatchArea { x: 48, y: 48, width: 32, height: 32 };
+        let views = [1, 2].map(|seed| gray_view(&picture(seed), area));
+        let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
+        let stack = Stack::new(&evenly_spread(2), patches).with_wider_of(&views);
+        let scan = RecordedScan::new(evenly_spread(2), vec![stack]);
+
+        let expected = [1, 2].map(|seed| {
+            let data = &picture(seed).data;
+            [block_means(&data[32 * 128 + 32..], 128, 2), block_means(data, 128, 4)]
+        });
+        for (power, between, share) in [(0.3, Between::Nearest, 0.0), (0.25, Between::Interpolated, 0.25)] {
+            let seen = scan.see(0, FocalPower::nearest(power), between);
+            for (index, patch) in seen.wider.into_iter().enumerate() {
+                let [low, high] = expected.each_ref().map(|patches| &patches[index]);
+                for (i, found) in patch.unwrap().0.into_iter().enumerate() {
+                    let mixed = low.0[i] + share * (high.0[i] - low.0[i]);
+                    assert!((found - mixed).abs() < 0.01, "{index}, {i}: {found} {mixed}");
+                }
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::clip::{Area, Clip};
 use super::relief::StackScene;
-use crate::imaging::{PATCH_SIDE, Patch};
+use crate::imaging::{PATCH_SIDE, Patch, Square, View, WIDER};
 use crate::lens::FocalPower;
 use crate::simulation::cover::Cover;
 use crate::simulation::normal::{cheap_normal, standard_normal};
@@ -169,12 +169,16 @@ pub struct Scan {
     veil: Option<[Walk; 2]>,
     /// The sensor's pattern, a gray level a pixel; empty if there is none.
     pattern: Vec<f32>,
+    /// The same as the wider patches show it.
+    wider_pattern: [Vec<f32>; WIDER.len()],
     unrest: Option<Unrest>,
     cover: Option<Cover>,
     course: ChaCha8Rng,
     veil_course: ChaCha8Rng,
     unrest_course: ChaCha8Rng,
     noise: ChaCha8Rng,
+    /// Noise of the wider patches, so that the patch's is the same whether they are looked at or not.
+    wider_noise: ChaCha8Rng,
     defocus: Defocus,
 }
 
@@ -203,6 +207,11 @@ impl Scan {
         let veil = (settings.veil > 0.0).then(|| room.map(|room| Walk::new(room, settings.crop, &mut veil_course)));
         let pixels = if settings.pattern > 0.0 { PATCH_SIDE * PATCH_SIDE } else { 0 };
         let pattern = (0..pixels).map(|_| settings.pattern as f32 * cheap_normal(&mut noise)).collect();
+        let mut wider_noise = ChaCha8Rng::seed_from_u64(seed ^ 0x7769_6465_7221);
+        let wider_pattern = WIDER.map(|scale| {
+            let strength = settings.pattern as f32 / scale as f32;
+            (0..pixels).map(|_| strength * cheap_normal(&mut wider_noise)).collect()
+        });
         let mut unrest_course = ChaCha8Rng::seed_from_u64(seed ^ 0x756e_7265_7374);
         let unrest = settings.unrest.map(|unrest| Unrest::new(unrest, &mut unrest_course));
         let cover = settings.covered.then(|| Cover::new(seed ^ 0x0063_6f76_6572));
@@ -225,12 +234,14 @@ impl Scan {
             crop,
             veil,
             pattern,
+            wider_pattern,
             unrest,
             cover,
             course,
             veil_course,
             unrest_course,
             noise,
+            wider_noise,
             defocus,
         }
     }
@@ -269,13 +280,88 @@ impl Scan {
         patch
     }
 
+    /// The patch of [`Scan::observe`], and the wider ones around it.
+    pub fn view(&mut self, focal_power: FocalPower) -> View {
+        let patch = self.observe(focal_power);
+        let wider = match self.scene.clone() {
+            Scene::Flat(clip) => std::array::from_fn(|index| self.look_wider(&clip, index, focal_power)),
+            Scene::Stack(stack) => {
+                let (corner, position) = self.place_in_stack(&stack, focal_power);
+                stack.planes.view(corner, position).wider
+            }
+        };
+        let mut view = View { patch, wider };
+        for (index, patch) in view.wider.iter_mut().enumerate() {
+            if let Some(patch) = patch {
+                self.take_wider(patch, index);
+            }
+        }
+        view
+    }
+
+    /// What the camera makes of the light of a wider patch: as of the patch, but noise and rounding count for less, since a value is the
+    /// mean of many pixels.
+    fn take_wider(&mut self, patch: &mut Patch, index: usize) {
+        let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
+        let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
+        expose(patch, gain, (detail * self.contrast) as f32, offset);
+        if self.settings.noise > 0.0 {
+            let noise = self.settings.noise as f32 / WIDER[index] as f32;
+            for value in &mut patch.0 {
+                *value += noise * cheap_normal(&mut self.wider_noise);
+            }
+        }
+        for (value, pattern) in patch.0.iter_mut().zip(&self.wider_pattern[index]) {
+            *value += pattern;
+        }
+        patch.0.iter_mut().for_each(|value| *value = value.clamp(0.0, 255.0));
+    }
+
     /// What is seen of a focal stack.
     fn look_at_stack(&self, stack: &StackScene, focal_power: FocalPower) -> Patch {
+        let (corner, position) = self.place_in_stack(stack, focal_power);
+        stack.planes.patch(corner, position)
+    }
+
+    /// Where in a focal stack the patch lies, and the position of the focal plane.
+    fn place_in_stack(&self, stack: &StackScene, focal_power: FocalPower) -> ((usize, usize), f64) {
         let (x, y) = corner(&self.crop);
-        let Some(optics) = &self.optics else { return Patch([0.0; PATCH_SIDE * PATCH_SIDE]) };
+        let Some(optics) = &self.optics else { return (whole((x, y)), 0.0) };
         let position = optics.position(stack, self.focus.position(), focal_power.get());
         let [along, down] = optics.shift.map(|shift| shift * (position - optics.anchor));
-        stack.planes.patch(whole((x + along, y + down)), position)
+        (whole((x + along, y + down)), position)
+    }
+
+    /// What a wider patch shows of a sharp picture, blurred, with the veil over it if there is one. `None` where the usable part of the
+    /// picture is too small.
+    fn look_wider(&mut self, clip: &Clip, index: usize, focal_power: FocalPower) -> Option<Patch> {
+        let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
+        let mut patch = self.look_coarsely(clip, index, corner(&self.crop), sigma)?;
+        if let Some(at) = self.veil.as_ref().map(corner) {
+            let share = self.settings.veil as f32;
+            let veil = self.look_coarsely(clip, index, at, sigma)?;
+            for (value, veiled) in patch.0.iter_mut().zip(veil.0) {
+                *value += share * (veiled - *value);
+            }
+        }
+        Some(patch)
+    }
+
+    fn look_coarsely(&mut self, clip: &Clip, index: usize, corner: (f64, f64), sigma: f64) -> Option<Patch> {
+        let (scale, spot) = (WIDER[index], self.settings.spot);
+        let Area { left, top, right, bottom } = clip.area();
+        let (x, y) = whole(corner);
+        let inside = (x.saturating_sub(left), y.saturating_sub(top));
+        let square = Square::around(inside, scale, (right - left, bottom - top))?;
+        let (x, y) = (square.x + left, square.y + top);
+
+        let Some(unrest) = &self.unrest else {
+            return Some(self.defocus.wider_patch(clip.at(self.time), (x, y), scale, sigma, spot));
+        };
+        let coarse = &clip.coarse_at(self.time)[index];
+        let place = [(x, corner.0), (y, corner.1)].map(|(pixel, at)| (pixel as f64 + at.fract()) / scale as f64);
+        let look = |_, side, out: &mut [f32]| unrest.gather(coarse, scale, (place[0], place[1]), side, out);
+        Some(self.defocus.wider_patch_of(sigma / scale as f64, spot, look))
     }
 
     /// What is seen of a sharp picture, blurred, with the veil over it if there is one.
@@ -297,7 +383,7 @@ impl Scan {
         match &self.unrest {
             None => self.defocus.patch(picture, (corner.0 as isize, corner.1 as isize), sigma, spot),
             Some(unrest) => {
-                self.defocus.patch_of(sigma, spot, |_, side, out| unrest.gather(picture, corner, side, out))
+                self.defocus.patch_of(sigma, spot, |_, side, out| unrest.gather(picture, 1, corner, side, out))
             }
         }
     }
@@ -365,8 +451,8 @@ fn digitise(patch: &mut Patch) {
 }
 
 impl FocalTimeScan for Scan {
-    fn observe(&mut self, focal_power: FocalPower) -> Patch {
-        Self::observe(self, focal_power)
+    fn observe(&mut self, focal_power: FocalPower) -> View {
+        self.view(focal_power)
     }
 
     fn optimum(&self) -> FocalPower {
@@ -381,6 +467,9 @@ impl FocalTimeScan for Scan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::block_means;
+    use crate::scans::variety::Variety;
+    use crate::simulation::blur::gaussian_blur;
     use crate::simulation::texture::texture;
 
     fn scan(seed: u64) -> Scan {
@@ -397,6 +486,43 @@ mod tests {
         }
         assert_eq!(looked_at.optimum(), left_alone.optimum());
         assert_eq!(looked_at.observe(FocalPower::MIDDLE), left_alone.observe(FocalPower::MIDDLE));
+    }
+
+    #[test]
+    fn the_patch_is_the_same_whether_wider_ones_are_looked_at_or_not() {
+        let clip = Arc::new(Clip::still(texture(1, 256)).unwrap());
+        let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 1).unwrap().remove(0);
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        for scene in [Scene::Flat(clip), Scene::Stack(stack)] {
+            for seed in 0..10 {
+                let settings = Variety { share: 1.0 }.draw(&scene, &mut rng);
+                let (mut one, mut other) = [(); 2].map(|()| Scan::over(scene.clone(), settings, seed)).into();
+                for _ in 0..10 {
+                    assert_eq!(one.view(FocalPower::MIDDLE).patch, other.observe(FocalPower::MIDDLE));
+                    one.advance();
+                    other.advance();
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn wider_patches_show_the_same_blur_as_the_patch() {
+        let picture = texture(1, 256);
+        let mut scan = Scan::new(Arc::new(Clip::still(picture.clone()).unwrap()), ScanSettings::default(), 5);
+        for step in [0.0, 0.2, -0.4] {
+            let focal_power = scan.optimum().moved(step);
+            let sigma = scan.sigma0 * focal_power.distance(scan.optimum());
+            let blurred = gaussian_blur(&picture, sigma);
+            let seen = scan.view(focal_power);
+            for (patch, scale) in seen.wider.iter().zip(WIDER) {
+                let square = Square::around(whole(corner(&scan.crop)), scale, (256, 256)).unwrap();
+                let expected = block_means(&blurred.data[square.y * 256 + square.x..], 256, scale);
+                let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);
+                let off = pairs.map(|(one, other)| (one - other).powi(2)).sum::<f32>() / expected.0.len() as f32;
+                assert!(off.sqrt() < 1.0, "sigma {sigma}, scale {scale}: {}", off.sqrt());
+            }
+        }
     }
 
     #[test]

@@ -1,9 +1,9 @@
-//! Defocus of one patch of a sharp picture: only the patch's own 32x32 pixels are computed.
+//! Defocus of one patch of a sharp picture: only the patch's own 32x32 values are computed.
 
 use multiversion::multiversion;
 
 use super::gaussian;
-use crate::imaging::{GrayImage, PATCH_SIDE, Patch};
+use crate::imaging::{GrayImage, PATCH_SIDE, Patch, fill_block_means};
 
 /// Widest supported reach of a kernel, in pixels either side: four times the largest sigma of the scans, 8.
 const MAX_REACH: usize = 32;
@@ -27,6 +27,8 @@ pub struct Defocus {
     source: Box<[f32]>,
     rows: Box<[f32]>,
     sums: Box<[f32]>,
+    /// Pixels that the values of a wider patch are means of.
+    fine: Vec<f32>,
 }
 
 impl Default for Defocus {
@@ -36,6 +38,7 @@ impl Default for Defocus {
             source: zeros(MAX_SIDE * MAX_SIDE),
             rows: zeros(MAX_SIDE * PATCH_SIDE),
             sums: zeros(MAX_SIDE * (MAX_SIDE + 1)),
+            fine: Vec::new(),
         }
     }
 }
@@ -71,6 +74,43 @@ impl Defocus {
         }
         patch
     }
+
+    /// The wider patch whose values are means of `scale` x `scale` pixels of `image`, from `(x, y)` on, blurred by a spot of
+    /// standard deviation `sigma` pixels of the image.
+    pub fn wider_patch(
+        &mut self,
+        image: &GrayImage,
+        (x, y): (usize, usize),
+        scale: usize,
+        sigma: f64,
+        spot: Spot,
+    ) -> Patch {
+        let mut fine = std::mem::take(&mut self.fine);
+        let patch = self.wider_patch_of(sigma / scale as f64, spot, |reach, side, source| {
+            let margin = (reach * scale) as isize;
+            fine.resize((side * scale).pow(2), 0.0);
+            gather(image, (x as isize - margin, y as isize - margin), side * scale, &mut fine);
+            fill_block_means(&fine, side * scale, scale, side, &mut source[..side * side]);
+        });
+        self.fine = fine;
+        patch
+    }
+
+    /// As [`Defocus::patch_of`] where pixels are means of many of a finer picture's, so that blur narrower than a pixel counts too.
+    pub fn wider_patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
+        if !(LEAST_SIGMA / 3.0..1.0).contains(&sigma) {
+            return self.patch_of(sigma, spot, look);
+        }
+        // Of so narrow a spot only the variance shows, not the shape.
+        let kernel = narrow_kernel(sigma);
+        let reach = kernel.len() / 2;
+        let side = PATCH_SIDE + 2 * reach;
+        look(reach, side, &mut self.source);
+        let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
+        blur_rows(&self.source[..side * side], side, &kernel, &mut self.rows);
+        blur_columns(&self.rows[..side * PATCH_SIDE], &kernel, &mut patch.0);
+        patch
+    }
 }
 
 /// Fills `source`, `side` pixels a row, from `image`'s `(left, top)` on.
@@ -87,6 +127,26 @@ fn gather(image: &GrayImage, (left, top): (isize, isize), side: usize, source: &
             }
         }
     }
+}
+
+/// A kernel of variance `sigma` squared, which must be below 1: `exp(-t) I_n(t)` with t the variance, the discrete Gaussian
+/// (Lindeberg 1990). Samples of a Gaussian so narrow would have less variance than that.
+fn narrow_kernel(sigma: f64) -> Vec<f32> {
+    const REACH: i32 = 4;
+    let half = 0.5 * sigma * sigma;
+    // The series of the modified Bessel function; its terms shrink by a factor of more than 4.
+    let bessel = |order: i32| -> f64 {
+        let mut term = (1..=order).fold(1.0, |term, factor| term * half / f64::from(factor));
+        let mut sum = term;
+        for index in 1..12 {
+            term *= half * half / f64::from(index * (index + order));
+            sum += term;
+        }
+        sum
+    };
+    let weights: Vec<f64> = (-REACH..=REACH).map(|tap| bessel(tap.abs())).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.iter().map(|weight| (weight / sum) as f32).collect()
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
@@ -153,6 +213,8 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, sums: &mut [f32]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::{WIDER, block_means, gaussian_blur};
+    use crate::training::texture::texture;
 
     /// 0 left of column 64, 200 from there on.
     fn step_edge() -> GrayImage {
@@ -178,6 +240,33 @@ mod tests {
                 let expected = 100.0 * (1.0 + erf((column as f64 - 15.5) / (sigma * 2.0f64.sqrt())));
                 let found = f64::from(patch.0[10 * PATCH_SIDE + column]);
                 assert!((found - expected).abs() < 0.6, "sigma {sigma} column {column}: {found} != {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_narrow_kernel_has_its_variance() {
+        for sigma in [0.05, 0.2, 0.5, 0.8, 0.99] {
+            let variance: f64 = narrow_kernel(sigma)
+                .iter()
+                .zip(-4..=4)
+                .map(|(weight, tap): (_, i32)| f64::from(*weight) * f64::from(tap * tap))
+                .sum();
+            assert!((variance / (sigma * sigma) - 1.0).abs() < 0.02, "{sigma}: {variance}");
+        }
+    }
+
+    #[test]
+    fn a_wider_patch_is_nearly_the_reduced_blurred_picture() {
+        let picture = texture(4, 300);
+        for sigma in [0.0, 0.7, 1.5, 3.0, 6.0] {
+            let whole = gaussian_blur(&picture, sigma);
+            for scale in WIDER {
+                let found = Defocus::default().wider_patch(&picture, (70, 80), scale, sigma, Spot::Gaussian);
+                let expected = block_means(&whole.data[80 * 300 + 70..], 300, scale);
+                let off: f32 = found.0.iter().zip(&expected.0).map(|(a, b)| (a - b).powi(2)).sum::<f32>() / 1024.0;
+                // What is finer than a pixel folds before the blur here, and after it there.
+                assert!(off.sqrt() < 1.0, "sigma {sigma}, scale {scale}: {}", off.sqrt());
             }
         }
     }

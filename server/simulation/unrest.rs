@@ -57,7 +57,12 @@ impl Unrest {
 
     /// Fills `out`, `side` pixels a row, with what is seen of `image` around a patch whose top left pixel lies at `corner`.
     /// Outside the image its border pixels go on. The image has at least 2x2 pixels, `side` is at most [`MAX_SIDE`].
-    pub fn gather(&self, image: &GrayImage, corner: (f64, f64), side: usize, out: &mut [f32]) {
+    ///
+    /// A pixel of the image is `scale` of the scene's own: 1, or more where the image is a coarse one.
+    pub fn gather(&self, image: &GrayImage, scale: usize, corner: (f64, f64), side: usize, out: &mut [f32]) {
+        let cell = self.cell / scale as f32;
+        // A pixel wider than the cells of the contrast's field has a mean of it, which differs less from place to place.
+        let depth = (scale > 1).then(|| (0.7 * cell).min(1.0));
         let middle = 0.5 * side as f32;
         let centre = [corner.0, corner.1].map(|at| at as f32 + 0.5 * PATCH_SIDE as f32);
         let strain = self.strain.each_ref().map(|walk| walk.position() as f32);
@@ -72,7 +77,7 @@ impl Unrest {
         let out = &mut out[..side * side];
         let mean = out.iter().sum::<f32>() / out.len() as f32;
         let knots = |axis: usize| {
-            let place = move |index| (centre[axis] + index as f32 - middle) / self.cell + drift[axis];
+            let place = move |index| (centre[axis] + index as f32 - middle) / cell + drift[axis];
             (0..side).map(move |index| Knots::around(place(index)))
         };
         let columns: Vec<Knots> = knots(0).collect();
@@ -80,6 +85,7 @@ impl Unrest {
             let gains = self.gains_along(&row);
             for (column, value) in columns.iter().zip(line) {
                 let gain = mix(gains[column.before], gains[column.after], column.part);
+                let gain = depth.map_or(gain, |depth| mix(1.0, gain, depth));
                 *value = (mean + gain * (*value - mean)).clamp(0.0, 255.0);
             }
         }
@@ -156,7 +162,7 @@ mod tests {
             *walk = Walk::new((0.0, 0.0), Motion { speed: 0.0, memory: 1.0 }, &mut rng);
         }
         let mut seen = vec![0.0; 32 * 32];
-        unrest.gather(&slope(), (20.0, 30.5), 32, &mut seen);
+        unrest.gather(&slope(), 1, (20.0, 30.5), 32, &mut seen);
         for (index, value) in seen.iter().enumerate() {
             let (x, y) = (20.0 + (index % 32) as f32, 30.5 + (index / 32) as f32);
             assert!((value - 0.5 * (x + 2.0 * y)).abs() < 1e-3, "{index}: {value}");
@@ -180,7 +186,7 @@ mod tests {
         let at = |place, rng: &mut _| Walk::new((place, place), Motion { speed: 0.0, memory: 1.0 }, rng);
         unrest.strain = [-0.1, 0.0, 0.0, 0.1].map(|strain| at(strain, &mut rng));
         let mut seen = vec![0.0; 32 * 32];
-        unrest.gather(&slope(), (20.0, 30.0), 32, &mut seen);
+        unrest.gather(&slope(), 1, (20.0, 30.0), 32, &mut seen);
         assert!((seen[33] - seen[32] - 0.45).abs() < 1e-3);
         assert!((seen[64] - seen[32] - 1.1).abs() < 1e-3);
     }

@@ -1,8 +1,9 @@
 //! Trains the belief tracker: in simulation the optimum is known at every frame, so the posterior is learned directly,
 //! by cross-entropy, on scans that the tracker itself steers.
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use tch::{Device, Kind, Tensor, nn};
 
 use super::environment::{Environment, lead_astray};
@@ -10,8 +11,10 @@ use super::optimiser::{Optimiser, half_cosine};
 use super::recipe::belief::BeliefRecipe;
 use super::run::checkpoint::{Checkpoint, CheckpointError};
 use super::trainer::Trainer;
-use crate::autofocus::belief::{Trace, spread_over_bins};
+use crate::autofocus::belief::{self, Trace, spread_over_bins};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
+use crate::autofocus::weights::WeightsError;
+use crate::imaging::{View, WIDER};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
 
@@ -32,7 +35,12 @@ struct Actor {
     environment: Environment,
     trace: Trace,
     windows_left: usize,
+    /// How many wider patches are seen, finest first.
+    wider: usize,
 }
+
+/// Share of scans in which not all wider patches are seen, as in a picture that is too small for them.
+const NARROW: f64 = 0.1;
 
 /// Frames and what should have been believed: inputs `[N, T, BELIEF_INPUT]`, beliefs `[N, T, BINS]`.
 struct Batch {
@@ -47,7 +55,7 @@ impl BeliefTrainer {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
         let store = nn::VarStore::new(device);
-        let network = BeliefNetwork::new(&store.root());
+        let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
         let optimiser = Optimiser::new(recipe.optimiser, &store);
         let actors = Vec::new();
         let memory = network.blank(recipe.scans, device);
@@ -63,12 +71,15 @@ impl BeliefTrainer {
         let mut now = vec![0.0f32; count * BELIEF_INPUT];
         let mut believed = vec![0.0f32; count * BINS];
         for t in 0..window {
-            for (index, actor) in self.actors.iter_mut().enumerate() {
-                let patch = actor.environment.observe();
-                let input = actor.trace.input(&patch, actor.environment.focal_power().get());
-                now[index * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
-                inputs[(index * window + t) * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(&input);
-            }
+            // Each scan has random sources of its own, so how they are shared among cores changes nothing.
+            self.actors
+                .par_iter_mut()
+                .zip(now.par_chunks_exact_mut(BELIEF_INPUT))
+                .zip(inputs.par_chunks_exact_mut(window * BELIEF_INPUT))
+                .for_each(|((actor, now), inputs)| {
+                    now.copy_from_slice(&actor.see());
+                    inputs[t * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(now);
+                });
             let tensor = Tensor::from_slice(&now).view([count as i64, 1, BELIEF_INPUT as i64]).to_device(device);
             let (logits, memory) = tch::no_grad(|| self.network.forward(&tensor, &self.memory));
             self.memory = memory;
@@ -124,6 +135,10 @@ impl Trainer for BeliefTrainer {
         self.memory = self.network.blank(self.recipe.scans, self.store.device());
     }
 
+    fn begin_from(&mut self, bytes: &[u8]) -> Result<(), WeightsError> {
+        belief::load(&self.store, bytes)
+    }
+
     fn update(&mut self) -> f64 {
         let before = self.memory.shallow_clone();
         let batch = self.collect();
@@ -155,6 +170,14 @@ impl Trainer for BeliefTrainer {
 impl Actor {
     fn draw(recipe: &BeliefRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
         let environment = Environment::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
-        Self { environment, trace: Trace::default(), windows_left: recipe.windows_a_scan }
+        let wider = if rng.random_bool(NARROW) { rng.random_range(0..WIDER.len()) } else { WIDER.len() };
+        Self { environment, trace: Trace::default(), windows_left: recipe.windows_a_scan, wider }
+    }
+
+    /// The network's input at this frame.
+    fn see(&mut self) -> [f32; BELIEF_INPUT] {
+        let mut view = if self.wider > 0 { self.environment.view() } else { View::from(self.environment.observe()) };
+        view.wider[self.wider..].fill(None);
+        self.trace.input(&view, self.environment.focal_power().get())
     }
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
-use crate::imaging::Patch;
+use crate::imaging::{Patch, View};
 use crate::lens::FocalPower;
 use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scan;
@@ -62,9 +62,18 @@ impl Environment {
 
     /// The patch of this frame.
     pub fn observe(&mut self) -> Patch {
+        self.scan.observe(self.shown())
+    }
+
+    /// The view of this frame.
+    pub fn view(&mut self) -> View {
+        self.scan.view(self.shown())
+    }
+
+    /// The focal power at which the frame is shown, where the lens says it stands or near that.
+    fn shown(&self) -> FocalPower {
         let stands = self.focal_power.get();
-        let shown = if self.grid > 0.0 { (stands / self.grid).round() * self.grid } else { stands };
-        self.scan.observe(FocalPower::nearest(shown))
+        FocalPower::nearest(if self.grid > 0.0 { (stands / self.grid).round() * self.grid } else { stands })
     }
 
     /// Sends the lens to `target` and goes on to the next frame, or to a later one where the lens is late.

@@ -12,6 +12,7 @@ use super::calibration::{BANDS, Calibration};
 use super::colour::{Encoder, linear_srgb_from_bands};
 use super::frame::{CELL, GrayImage, MosaicFrame, RgbImage};
 use super::geometry::{PATCH_SIDE, Patch, PatchArea};
+use super::view::{Square, View, WIDEST};
 use avx2::Kernel;
 use balance::PixelBalance;
 use mix::Mix;
@@ -98,14 +99,30 @@ impl Reconstructor {
     #[must_use]
     pub fn gray_patch(&self, mosaic: &MosaicFrame, area: PatchArea) -> Patch {
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
-        if area.x >= mosaic.band_width() {
-            return patch;
+        self.gray_square(mosaic, Square { x: area.x, y: area.y, side: PATCH_SIDE }, &mut patch.0);
+        patch
+    }
+
+    /// What policies see of the gray picture with the patch at `area` (in cells), computing just those cells.
+    #[must_use]
+    pub fn gray_view(&self, mosaic: &MosaicFrame, area: PatchArea) -> View {
+        let size = (mosaic.band_width(), mosaic.band_height());
+        View::around(self.gray_patch(mosaic, area), (area.x, area.y), size, |square| {
+            let mut gray = vec![0.0; square.side * square.side];
+            self.gray_square(mosaic, square, &mut gray);
+            gray
+        })
+    }
+
+    /// Fills `gray` with the gray picture within `square` (in cells), row after row; leaves what lies outside the picture as it is.
+    fn gray_square(&self, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
+        if square.x >= mosaic.band_width() {
+            return;
         }
         match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
-            None => patch_of_counts(&self.of_counts, mosaic, area, &mut patch),
-            Some((balance, mixes)) => patch_of_balanced(balance, mixes, mosaic, area, &mut patch),
+            None => square_of_counts(&self.of_counts, mosaic, square, gray),
+            Some((balance, mixes)) => square_of_balanced(balance, mixes, mosaic, square, gray),
         }
-        patch
     }
 }
 
@@ -156,23 +173,23 @@ fn picture_of_balanced(
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn patch_of_counts(mixes: &Mixes, mosaic: &MosaicFrame, area: PatchArea, patch: &mut Patch) {
-    let cells = PATCH_SIDE.min(mosaic.band_width() - area.x);
-    for (y, gray) in (area.y..mosaic.band_height()).zip(patch.0.chunks_exact_mut(PATCH_SIDE)) {
+fn square_of_counts(mixes: &Mixes, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
+    let cells = square.side.min(mosaic.band_width() - square.x);
+    for (y, gray) in (square.y..mosaic.band_height()).zip(gray.chunks_exact_mut(square.side)) {
         let gray = &mut gray[..cells];
-        mixes.gray.apply(cell_row(mosaic, area.x, y, cells), [gray]);
+        mixes.gray.apply(cell_row(mosaic, square.x, y, cells), [gray]);
         clamp_gray(gray);
     }
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn patch_of_balanced(balance: &PixelBalance, mixes: &Mixes, mosaic: &MosaicFrame, area: PatchArea, patch: &mut Patch) {
-    let cells = PATCH_SIDE.min(mosaic.band_width() - area.x);
-    let mut balanced = [0; CELL * CELL * PATCH_SIDE];
+fn square_of_balanced(balance: &PixelBalance, mixes: &Mixes, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
+    let cells = square.side.min(mosaic.band_width() - square.x);
+    let mut balanced = [0; CELL * CELL * WIDEST];
     let balanced = &mut balanced[..CELL * CELL * cells];
-    for (y, gray) in (area.y..mosaic.band_height()).zip(patch.0.chunks_exact_mut(PATCH_SIDE)) {
+    for (y, gray) in (square.y..mosaic.band_height()).zip(gray.chunks_exact_mut(square.side)) {
         let gray = &mut gray[..cells];
-        balance.apply(cell_row(mosaic, area.x, y, cells), CELL * area.x, y, balanced);
+        balance.apply(cell_row(mosaic, square.x, y, cells), CELL * square.x, y, balanced);
         mixes.gray.apply(quarters(balanced), [gray]);
         clamp_gray(gray);
     }

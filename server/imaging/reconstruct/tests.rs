@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::imaging::Reference;
+use crate::imaging::block_means;
 
 fn mosaic(width: usize, height: usize, sample: impl Fn(usize, usize) -> u16) -> MosaicFrame {
     let samples = (0..width * height).map(|i| sample(i % width, i / width)).collect();
@@ -130,6 +131,25 @@ fn the_patch_is_cut_from_the_gray_picture() {
                 let expected = if inside { gray.data[row * 42 + column] } else { 0.0 };
                 assert!((found - expected).abs() < 0.02, "({column}, {row}): {found} {expected}");
             }
+        }
+    }
+}
+
+#[test]
+fn wider_patches_are_means_of_the_gray_picture() {
+    let seen = mosaic(640, 560, texture);
+    let flat = |count: u16| Reference::PerPixel(mosaic(640, 560, |_, _| count));
+    for calibration in [Calibration::default(), calibration(flat(40), flat(900))] {
+        let (_, gray) = pictures(&calibration, &seen);
+        let reconstructor = Reconstructor::new(&calibration);
+        let area = PatchArea { x: 70, y: 40, width: 32, height: 32 };
+        let view = reconstructor.gray_view(&seen, area);
+        assert_eq!(view.patch, reconstructor.gray_patch(&seen, area));
+        // The widest patch would begin 8 cells above the picture.
+        for (patch, (scale, left, top)) in view.wider.into_iter().zip([(2, 54, 24), (4, 22, 0)]) {
+            let expected = block_means(&gray.data[top * 160 + left..], 160, scale);
+            let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);
+            assert!(pairs.into_iter().all(|(one, other)| (one - other).abs() < 0.02), "scale {scale}");
         }
     }
 }

@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::autofocus::mgm;
-use crate::imaging::{PATCH_SIDE, Patch};
+use crate::imaging::{PATCH_SIDE, View};
 use crate::lens::FocalPower;
 use crate::scans::FocalTimeScan;
 use crate::scans::ScanSet;
@@ -103,12 +103,12 @@ struct Playing {
 }
 
 impl FocalTimeScan for Playing {
-    fn observe(&mut self, focal_power: FocalPower) -> Patch {
+    fn observe(&mut self, focal_power: FocalPower) -> View {
         let Moment { corner, first_plane, .. } = self.course.frames[self.frame];
         let position = first_plane as f64 + focal_power.get() * (self.course.planes - 1) as f64;
-        let mut patch = self.course.stack.patch(corner, position);
-        patch.0.iter_mut().for_each(|value| *value = value.round());
-        patch
+        let mut view = self.course.stack.view(corner, position);
+        view.patch.0.iter_mut().for_each(|value| *value = value.round());
+        view
     }
 
     fn optimum(&self) -> FocalPower {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::sensor::AutoExposure;
 use super::view::{self, Mapping, Region};
 use super::{Hand, Haste, Phantom, Pose};
-use crate::imaging::{PATCH_SIDE, PatchArea};
+use crate::imaging::{PATCH_SIDE, PatchArea, Square, WIDER};
 use crate::lens::FocalPower;
 
 /// Seed of the first brain that recorded scans are made over: none that training or its benchmark sees.
@@ -102,10 +102,17 @@ impl Still<'_> {
         self.render(number, focal_power, &Region::WHOLE, samples);
     }
 
-    /// The same exposure, of which only the samples of the patch are made: fifty times as fast.
-    pub fn expose_patch(&self, number: u16, focal_power: FocalPower, samples: &mut [u16]) {
+    /// The same exposure, of which only the samples are made that policies see: those of the patch and of the wider ones around it.
+    pub fn expose_view(&self, number: u16, focal_power: FocalPower, samples: &mut [u16]) {
         let PatchArea { x, y, width, height } = self.patch();
-        self.render(number, focal_power, &Region { columns: x..x + width, rows: y..y + height }, samples);
+        let widest = WIDER[WIDER.len() - 1];
+        // The sensor is larger than the widest patch too.
+        let square = Square::around((x, y), widest, (view::WIDTH, view::HEIGHT));
+        let region = square.map_or(Region { columns: x..x + width, rows: y..y + height }, |square| Region {
+            columns: square.x..square.x + square.side,
+            rows: square.y..square.y + square.side,
+        });
+        self.render(number, focal_power, &region, samples);
     }
 
     fn render(&self, number: u16, focal_power: FocalPower, region: &Region, samples: &mut [u16]) {
@@ -140,7 +147,7 @@ mod tests {
     use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
     #[test]
-    fn a_patch_alone_is_the_same_as_that_of_the_whole_exposure() {
+    fn a_view_alone_is_the_same_as_that_of_the_whole_exposure() {
         let trajectory = Trajectory::new(1, 2, Haste::default());
         let still = trajectory.still(1).unwrap();
         let reconstructor = Reconstructor::new(&Calibration::default());
@@ -150,10 +157,10 @@ mod tests {
             if whole {
                 still.expose(3, power, &mut samples);
             } else {
-                still.expose_patch(3, power, &mut samples);
+                still.expose_view(3, power, &mut samples);
             }
             let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
-            reconstructor.gray_patch(&mosaic, still.patch())
+            reconstructor.gray_view(&mosaic, still.patch())
         };
         assert!(seen(true) == seen(false));
     }
@@ -178,7 +185,7 @@ mod tests {
         let still = trajectory.still(0).unwrap();
         let seen = |number| {
             let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
-            still.expose_patch(number, still.optimal(), &mut samples);
+            still.expose_view(number, still.optimal(), &mut samples);
             samples
         };
         assert!(seen(0) == seen(0) && seen(0) != seen(1));

@@ -1,0 +1,169 @@
+//! What policies see of a frame: the patch in the middle of the view, and the same place at coarser scales.
+
+use super::geometry::{PATCH_SIDE, Patch};
+
+/// How many pixels along each axis one value of a wider patch is the mean of, finest first.
+pub const WIDER: [usize; 2] = [2, 4];
+/// Pixels along each axis that the widest patch covers.
+pub(super) const WIDEST: usize = PATCH_SIDE * WIDER[WIDER.len() - 1];
+
+/// The patch of a frame, and wider ones around it.
+///
+/// A wider patch has 32x32 values too, each the mean of a block of pixels, so it covers a larger part of the view at a coarser
+/// scale. It has the patch's centre, or lies as near to it as the picture allows. Gray levels are not rounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// The patch at the picture's own scale: all that the paper's policies see.
+    pub patch: Patch,
+    /// The patches at the scales [`WIDER`]; `None` where the picture is smaller than what such a patch covers.
+    pub wider: [Option<Patch>; WIDER.len()],
+}
+
+/// A square of a picture's pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Square {
+    /// Left column.
+    pub x: usize,
+    /// Top row.
+    pub y: usize,
+    /// Columns, and rows.
+    pub side: usize,
+}
+
+impl Square {
+    /// What the patch at `scale` covers whose centre is that of the 32x32 patch at `corner`, moved as little as needed to lie
+    /// inside a picture of `width` x `height` pixels. `None` where the picture is smaller than that.
+    #[must_use]
+    pub fn around(corner: (usize, usize), scale: usize, (width, height): (usize, usize)) -> Option<Self> {
+        let side = PATCH_SIDE * scale;
+        let margin = (side - PATCH_SIDE) / 2;
+        let first = |corner: usize, length: usize| {
+            let last = length.checked_sub(side)?;
+            Some(corner.saturating_sub(margin).min(last))
+        };
+        Some(Self { x: first(corner.0, width)?, y: first(corner.1, height)?, side })
+    }
+}
+
+impl View {
+    /// The view around `patch`, which lies at `corner` of a picture of `size` (width and height). `gray` makes the gray levels of
+    /// a square of the picture, row after row; it is called once, with the largest square that is needed, or not at all.
+    pub fn around(
+        patch: Patch,
+        corner: (usize, usize),
+        size: (usize, usize),
+        gray: impl FnOnce(Square) -> Vec<f32>,
+    ) -> Self {
+        let squares = WIDER.map(|scale| Square::around(corner, scale, size));
+        // A square of a coarser scale holds those of all finer ones.
+        let Some(largest) = squares.iter().flatten().next_back().copied() else { return Self::from(patch) };
+        let levels = gray(largest);
+
+        let means = |index: usize| {
+            let square = squares[index]?;
+            let first = (square.y - largest.y) * largest.side + square.x - largest.x;
+            Some(block_means(levels.get(first..)?, largest.side, WIDER[index]))
+        };
+        Self { patch, wider: std::array::from_fn(means) }
+    }
+}
+
+impl From<Patch> for View {
+    /// A view of nothing but `patch`.
+    fn from(patch: Patch) -> Self {
+        Self { patch, wider: [None; WIDER.len()] }
+    }
+}
+
+/// The patch whose values are the means of blocks of `scale` x `scale` pixels of `levels`, which has `width` pixels a row and
+/// begins with the patch's first block.
+#[must_use]
+pub fn block_means(levels: &[f32], width: usize, scale: usize) -> Patch {
+    let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
+    fill_block_means(levels, width, scale, PATCH_SIDE, &mut patch.0);
+    patch
+}
+
+/// Fills `out`, `columns` values a row, with the means of blocks of `scale` x `scale` pixels of `levels`, which has `width` pixels a
+/// row and begins with the first block.
+///
+/// Scales are those of [`WIDER`]; for another one nothing is filled.
+pub fn fill_block_means(levels: &[f32], width: usize, scale: usize, columns: usize, out: &mut [f32]) {
+    match scale {
+        2 => fill_blocks::<2>(levels, width, columns, out),
+        4 => fill_blocks::<4>(levels, width, columns, out),
+        _ => (),
+    }
+}
+
+fn fill_blocks<const SCALE: usize>(levels: &[f32], width: usize, columns: usize, out: &mut [f32]) {
+    let mut sums = vec![0.0f32; columns * SCALE];
+    #[allow(clippy::cast_precision_loss, reason = "a few pixels")]
+    let share = 1.0 / (SCALE * SCALE) as f32;
+
+    for (row, out) in out.chunks_exact_mut(columns).enumerate() {
+        sums.fill(0.0);
+        for line in levels.chunks(width).skip(row * SCALE).take(SCALE) {
+            sums.iter_mut().zip(line).for_each(|(sum, level)| *sum += level);
+        }
+        for (value, block) in out.iter_mut().zip(sums.as_chunks::<SCALE>().0) {
+            *value = share * block.iter().sum::<f32>();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[allow(clippy::cast_precision_loss, reason = "gray levels")]
+    fn level(x: usize, y: usize) -> f32 {
+        ((x * x * 7 + y * 13 + x * y) % 256) as f32
+    }
+
+    /// The view at `corner` of a picture of these levels.
+    fn view(corner: (usize, usize), size: (usize, usize)) -> View {
+        let patch = Patch(std::array::from_fn(|i| level(corner.0 + i % PATCH_SIDE, corner.1 + i / PATCH_SIDE)));
+        View::around(patch, corner, size, |Square { x, y, side }| {
+            (0..side * side).map(|i| level(x + i % side, y + i / side)).collect()
+        })
+    }
+
+    /// The mean of a block, summed directly.
+    #[allow(clippy::cast_precision_loss, reason = "a few pixels")]
+    fn mean(x: usize, y: usize, scale: usize) -> f32 {
+        let sum: f32 = (0..scale * scale).map(|i| level(x + i % scale, y + i / scale)).sum();
+        sum / (scale * scale) as f32
+    }
+
+    #[test]
+    fn wider_patches_are_means_of_blocks_around_the_same_centre() {
+        let seen = view((100, 90), (300, 250));
+        for (scale, left, top) in [(2, 84, 74), (4, 52, 42)] {
+            let index = WIDER.iter().position(|&wider| wider == scale).unwrap();
+            let patch = seen.wider[index].unwrap();
+            for (i, found) in patch.0.iter().enumerate() {
+                let expected = mean(left + scale * (i % PATCH_SIDE), top + scale * (i / PATCH_SIDE), scale);
+                assert!((found - expected).abs() < 1e-3, "scale {scale}, {i}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn wider_patches_keep_inside_the_picture() {
+        assert_eq!(Square::around((3, 200), 4, (300, 240)), Some(Square { x: 0, y: 112, side: 128 }));
+        let seen = view((3, 200), (300, 240));
+        assert!((seen.wider[1].unwrap().0[0] - mean(0, 112, 4)).abs() < 1e-3);
+        // That of the middle scale need not move down, but it must move to the right.
+        assert_eq!(Square::around((3, 200), 2, (300, 240)), Some(Square { x: 0, y: 176, side: 64 }));
+        assert!((seen.wider[0].unwrap().0[33] - mean(2, 178, 2)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn where_the_picture_is_too_small_there_is_none() {
+        let wider = |size| view((10, 10), size).wider.map(|patch| patch.is_some());
+        assert_eq!(wider((128, 128)), [true, true]);
+        assert_eq!(wider((500, 127)), [true, false]);
+        assert_eq!(wider((63, 500)), [false, false]);
+    }
+}
