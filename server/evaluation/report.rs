@@ -253,7 +253,6 @@ const COLOURS: [&str; 8] = ["#999999", "#0072b2", "#56b4e9", "#009e73", "#e69f00
 
 /// Focal path (above) and error (below; moving average of 5 frames) of each policy on scan `index`, the optimum in black.
 #[must_use]
-#[allow(clippy::cast_precision_loss, reason = "counts of frames are small")]
 pub fn figure(outcomes: &[Outcome], index: usize) -> String {
     let policies: Vec<(&str, &Path)> = outcomes
         .iter()

@@ -32,7 +32,7 @@ pub struct PatchArea {
     pub height: usize,
 }
 
-/// What every policy sees: 32x32 gray values on the 0..255 scale, row by row, from the centre of the content area.
+/// What the paper's policies see: 32x32 gray values on the 0..255 scale, row by row, from the centre of the content area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch(pub [f32; PATCH_SIDE * PATCH_SIDE]);
 

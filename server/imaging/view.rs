@@ -4,8 +4,6 @@ use super::geometry::{PATCH_SIDE, Patch};
 
 /// How many pixels along each axis one value of a wider patch is the mean of, finest first.
 pub const WIDER: [usize; 2] = [2, 4];
-/// Pixels along each axis that the widest patch covers.
-pub(super) const WIDEST: usize = PATCH_SIDE * WIDER[WIDER.len() - 1];
 
 /// The patch of a frame, and wider ones around it.
 ///
@@ -98,7 +96,6 @@ pub fn fill_block_means(levels: &[f32], width: usize, scale: usize, columns: usi
 
 fn fill_blocks<const SCALE: usize>(levels: &[f32], width: usize, columns: usize, out: &mut [f32]) {
     let mut sums = vec![0.0f32; columns * SCALE];
-    #[allow(clippy::cast_precision_loss, reason = "a few pixels")]
     let share = 1.0 / (SCALE * SCALE) as f32;
 
     for (row, out) in out.chunks_exact_mut(columns).enumerate() {
@@ -116,7 +113,6 @@ fn fill_blocks<const SCALE: usize>(levels: &[f32], width: usize, columns: usize,
 mod tests {
     use super::*;
 
-    #[allow(clippy::cast_precision_loss, reason = "gray levels")]
     fn level(x: usize, y: usize) -> f32 {
         ((x * x * 7 + y * 13 + x * y) % 256) as f32
     }
@@ -130,7 +126,6 @@ mod tests {
     }
 
     /// The mean of a block, summed directly.
-    #[allow(clippy::cast_precision_loss, reason = "a few pixels")]
     fn mean(x: usize, y: usize, scale: usize) -> f32 {
         let sum: f32 = (0..scale * scale).map(|i| level(x + i % scale, y + i / scale)).sum();
         sum / (scale * scale) as f32

@@ -206,7 +206,7 @@ fn peak(positions: &[f32], curve: &[f32]) -> f32 {
 mod tests {
     use super::*;
     use crate::imaging::block_means;
-    use crate::training::texture::texture;
+    use crate::simulation::texture::texture;
 
     #[test]
     fn a_parabola_peaks_at_its_vertex() {

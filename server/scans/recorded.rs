@@ -63,7 +63,6 @@ pub struct Stack {
 struct Coarse(Box<[u16; PIXELS]>);
 
 impl Coarse {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gray levels; what is beyond saturates")]
     fn of(patch: &Patch) -> Self {
         Self(Box::new(patch.0.map(|value| (256.0 * value).round() as u16)))
     }
@@ -72,7 +71,6 @@ impl Coarse {
         Patch(self.0.map(|value| f32::from(value) / 256.0))
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "a share")]
     fn mixed(&self, high: &Self, part: f64) -> Patch {
         let part = part as f32;
         let (low, high) = (self.patch(), high.patch());
@@ -200,11 +198,24 @@ fn frozen(
         still.expose_view(number, powers[position], samples);
         // The size is the sensor's own.
         let Ok(mosaic) = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, std::mem::take(samples)) else { continue };
-        views[position] = reconstructor.gray_view(&mosaic, still.patch());
+        let mut picture = GrayImage { width: mosaic.band_width(), height: mosaic.band_height(), data: Vec::new() };
+        picture.data.resize(picture.width * picture.height, 0.0);
+        put_square(&mut picture, still.seen(), &reconstructor.gray_square(&mosaic, still.seen()));
+        // As it would be stored: in whole gray levels.
+        picture.data.iter_mut().for_each(|value| *value = value.round());
+        views[position] = gray_view(&picture, still.patch());
         *samples = mosaic.into_samples();
     }
     let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
     Stack::new(powers, patches).with_wider_of(&views)
+}
+
+/// Puts `levels` into `square` of `picture`, which holds it.
+pub(super) fn put_square(picture: &mut GrayImage, square: Square, levels: &[f32]) {
+    let lines = picture.data.chunks_exact_mut(picture.width).skip(square.y);
+    for (line, levels) in lines.zip(levels.chunks_exact(square.side)) {
+        line[square.x..square.x + square.side].copy_from_slice(levels);
+    }
 }
 
 /// The patch of a gray picture at `area`, rounded; black where `area` leaves the picture.
@@ -293,7 +304,7 @@ impl ScanSet for Recorded {
 mod tests {
     use super::*;
     use crate::imaging::block_means;
-    use crate::training::texture::texture;
+    use crate::simulation::texture::texture;
 
     /// One pose at focal powers 0, 0.5 and 1 whose patches are even: 0, 100 and 200.
     fn ramp() -> RecordedScan {

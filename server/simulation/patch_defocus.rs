@@ -214,7 +214,7 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, sums: &mut [f32]
 mod tests {
     use super::*;
     use crate::imaging::{WIDER, block_means, gaussian_blur};
-    use crate::training::texture::texture;
+    use crate::simulation::texture::texture;
 
     /// 0 left of column 64, 200 from there on.
     fn step_edge() -> GrayImage {

@@ -78,7 +78,10 @@ class MetricLearned(nn.Module):
 
 
 class Belief(nn.Module):
-    """Inputs `[N, T, 87]`, as `server/autofocus/belief.rs` makes them of frames, to logits `[N, T, 41]` of the optimum's bins."""
+    """Inputs `[N, T, inputs]`, as `server/autofocus/belief.rs` makes them of frames, to logits `[N, T, 41]` of the optimum's bins.
+
+    The weights that ship take 175 inputs. Earlier ones took the first 87 of them, and so do the vectors.
+    """
 
     def __init__(self, inputs, units, bins):
         super().__init__()

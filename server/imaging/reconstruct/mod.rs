@@ -12,7 +12,7 @@ use super::calibration::{BANDS, Calibration};
 use super::colour::{Encoder, linear_srgb_from_bands};
 use super::frame::{CELL, GrayImage, MosaicFrame, RgbImage};
 use super::geometry::{PATCH_SIDE, Patch, PatchArea};
-use super::view::{Square, View, WIDEST};
+use super::view::{Square, View};
 use avx2::Kernel;
 use balance::PixelBalance;
 use mix::Mix;
@@ -99,7 +99,7 @@ impl Reconstructor {
     #[must_use]
     pub fn gray_patch(&self, mosaic: &MosaicFrame, area: PatchArea) -> Patch {
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
-        self.gray_square(mosaic, Square { x: area.x, y: area.y, side: PATCH_SIDE }, &mut patch.0);
+        self.fill_gray(mosaic, Square { x: area.x, y: area.y, side: PATCH_SIDE }, &mut patch.0);
         patch
     }
 
@@ -107,15 +107,19 @@ impl Reconstructor {
     #[must_use]
     pub fn gray_view(&self, mosaic: &MosaicFrame, area: PatchArea) -> View {
         let size = (mosaic.band_width(), mosaic.band_height());
-        View::around(self.gray_patch(mosaic, area), (area.x, area.y), size, |square| {
-            let mut gray = vec![0.0; square.side * square.side];
-            self.gray_square(mosaic, square, &mut gray);
-            gray
-        })
+        View::around(self.gray_patch(mosaic, area), (area.x, area.y), size, |square| self.gray_square(mosaic, square))
+    }
+
+    /// The gray picture within `square` (in cells), row after row; black where the square leaves the picture.
+    #[must_use]
+    pub fn gray_square(&self, mosaic: &MosaicFrame, square: Square) -> Vec<f32> {
+        let mut gray = vec![0.0; square.side * square.side];
+        self.fill_gray(mosaic, square, &mut gray);
+        gray
     }
 
     /// Fills `gray` with the gray picture within `square` (in cells), row after row; leaves what lies outside the picture as it is.
-    fn gray_square(&self, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
+    fn fill_gray(&self, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
         if square.x >= mosaic.band_width() {
             return;
         }
@@ -185,12 +189,11 @@ fn square_of_counts(mixes: &Mixes, mosaic: &MosaicFrame, square: Square, gray: &
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn square_of_balanced(balance: &PixelBalance, mixes: &Mixes, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
     let cells = square.side.min(mosaic.band_width() - square.x);
-    let mut balanced = [0; CELL * CELL * WIDEST];
-    let balanced = &mut balanced[..CELL * CELL * cells];
+    let mut balanced = vec![0; CELL * CELL * cells];
     for (y, gray) in (square.y..mosaic.band_height()).zip(gray.chunks_exact_mut(square.side)) {
         let gray = &mut gray[..cells];
-        balance.apply(cell_row(mosaic, square.x, y, cells), CELL * square.x, y, balanced);
-        mixes.gray.apply(quarters(balanced), [gray]);
+        balance.apply(cell_row(mosaic, square.x, y, cells), CELL * square.x, y, &mut balanced);
+        mixes.gray.apply(quarters(&balanced), [gray]);
         clamp_gray(gray);
     }
 }

@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use super::{Bench, RecordError, Taken};
 use crate::camera::CameraError;
-use crate::imaging::{Calibration, GrayImage, MosaicFrame, Patch, PatchArea, Reconstructor, RgbImage};
+use crate::imaging::{Calibration, GrayImage, MosaicFrame, Reconstructor, RgbImage};
 use crate::lens::FocalPower;
+use crate::scans::recorded::put_square;
 use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH, Trajectory};
 
 /// The poses of a [`Trajectory`].
@@ -33,22 +34,13 @@ impl Bench for PhantomBench {
                 .map_err(|error| CameraError::Failed(error.to_string()))?;
             let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
             reconstructor.reconstruct(&mosaic, &mut rgb, &mut gray);
-            put(&mut gray, &reconstructor.gray_patch(&mosaic, still.patch()), still.patch());
+            // What policies see as they see it: the picture is reconstructed for people and may be off by a level.
+            put_square(&mut gray, still.seen(), &reconstructor.gray_square(&mosaic, still.seen()));
             *samples = mosaic.into_samples();
             Ok(gray)
         };
         let numbered: Vec<(u16, FocalPower)> = (0..).zip(powers.iter().copied()).collect();
         let pictures = numbered.into_par_iter().map_init(tools, picture).collect::<Result<_, CameraError>>()?;
         Ok(Taken { pictures, patch: still.patch(), truth: Some(still.optimal()) })
-    }
-}
-
-/// Puts the patch as policies see it into its picture, which is reconstructed for people and may be off by a level.
-fn put(picture: &mut GrayImage, patch: &Patch, area: PatchArea) {
-    for (row, values) in patch.0.chunks_exact(area.width).enumerate() {
-        let start = (area.y + row) * picture.width + area.x;
-        if let Some(pixels) = picture.data.get_mut(start..start + area.width) {
-            pixels.copy_from_slice(values);
-        }
     }
 }

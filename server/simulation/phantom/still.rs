@@ -102,17 +102,19 @@ impl Still<'_> {
         self.render(number, focal_power, &Region::WHOLE, samples);
     }
 
-    /// The same exposure, of which only the samples are made that policies see: those of the patch and of the wider ones around it.
-    pub fn expose_view(&self, number: u16, focal_power: FocalPower, samples: &mut [u16]) {
-        let PatchArea { x, y, width, height } = self.patch();
+    /// What the widest patch that policies see covers, in pixels of a band.
+    #[must_use]
+    pub fn seen(&self) -> Square {
+        let PatchArea { x, y, width, .. } = self.patch();
         let widest = WIDER[WIDER.len() - 1];
         // The sensor is larger than the widest patch too.
-        let square = Square::around((x, y), widest, (view::WIDTH, view::HEIGHT));
-        let region = square.map_or(Region { columns: x..x + width, rows: y..y + height }, |square| Region {
-            columns: square.x..square.x + square.side,
-            rows: square.y..square.y + square.side,
-        });
-        self.render(number, focal_power, &region, samples);
+        Square::around((x, y), widest, (view::WIDTH, view::HEIGHT)).unwrap_or(Square { x, y, side: width })
+    }
+
+    /// The same exposure, of which only the samples of [`Still::seen`] are made.
+    pub fn expose_view(&self, number: u16, focal_power: FocalPower, samples: &mut [u16]) {
+        let Square { x, y, side } = self.seen();
+        self.render(number, focal_power, &Region { columns: x..x + side, rows: y..y + side }, samples);
     }
 
     fn render(&self, number: u16, focal_power: FocalPower, region: &Region, samples: &mut [u16]) {
