@@ -4,15 +4,15 @@ use std::sync::{Arc, OnceLock};
 
 use sha2::{Digest, Sha256};
 
-use crate::imaging::{GrayImage, WIDER, reduced};
+use crate::imaging::{GrayImage, reduced};
 
 /// Sharp pictures in order of time, one for a still, and where patches may lie on them.
 #[derive(Debug, Clone)]
 pub struct Clip {
     frames: Vec<Arc<GrayImage>>,
     area: Area,
-    /// The pictures at the scales of wider patches, made when they are first asked for.
-    coarse: Vec<OnceLock<[GrayImage; WIDER.len()]>>,
+    /// The pictures at half the resolution, made when they are first asked for.
+    coarse: Vec<OnceLock<GrayImage>>,
 }
 
 /// A rectangle of pixels: `left <= x < right`, `top <= y < bottom`.
@@ -87,13 +87,12 @@ impl Clip {
         &self.frames[self.index(t)]
     }
 
-    /// The picture at time `t` at each scale of [`WIDER`]: means of whole blocks of pixels.
+    /// The picture at time `t` at half the resolution: means of 2x2 pixels.
     #[must_use]
-    pub fn coarse_at(&self, t: usize) -> &[GrayImage; WIDER.len()] {
+    pub fn coarse_at(&self, t: usize) -> &GrayImage {
         let index = self.index(t);
         let picture = &*self.frames[index];
-        self.coarse[index]
-            .get_or_init(|| WIDER.map(|scale| reduced(picture, picture.width / scale, picture.height / scale)))
+        self.coarse[index].get_or_init(|| reduced(picture, picture.width / 2, picture.height / 2))
     }
 
     fn index(&self, t: usize) -> usize {

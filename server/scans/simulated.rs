@@ -284,7 +284,7 @@ impl Scan {
     pub fn view(&mut self, focal_power: FocalPower) -> View {
         let patch = self.observe(focal_power);
         let wider = match self.scene.clone() {
-            Scene::Flat(clip) => std::array::from_fn(|index| self.look_wider(&clip, index, focal_power)),
+            Scene::Flat(clip) => self.look_widely(&clip, patch, focal_power).wider,
             Scene::Stack(stack) => {
                 let (corner, position) = self.place_in_stack(&stack, focal_power);
                 stack.planes.view(corner, position).wider
@@ -332,36 +332,39 @@ impl Scan {
         (whole((x + along, y + down)), position)
     }
 
-    /// What a wider patch shows of a sharp picture, blurred, with the veil over it if there is one. `None` where the usable part of the
-    /// picture is too small.
-    fn look_wider(&mut self, clip: &Clip, index: usize, focal_power: FocalPower) -> Option<Patch> {
+    /// What the wider patches show of a sharp picture, blurred, with the veil over it if there is one. They stay within the usable part
+    /// of the picture.
+    fn look_widely(&mut self, clip: &Clip, patch: Patch, focal_power: FocalPower) -> View {
         let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
-        let mut patch = self.look_coarsely(clip, index, corner(&self.crop), sigma)?;
+        let mut view = self.view_of_flat(clip, patch, corner(&self.crop), sigma);
         if let Some(at) = self.veil.as_ref().map(corner) {
             let share = self.settings.veil as f32;
-            let veil = self.look_coarsely(clip, index, at, sigma)?;
-            for (value, veiled) in patch.0.iter_mut().zip(veil.0) {
-                *value += share * (veiled - *value);
+            let veil = self.view_of_flat(clip, patch, at, sigma);
+            for (patch, veil) in view.wider.iter_mut().flatten().zip(veil.wider.iter().flatten()) {
+                for (value, veiled) in patch.0.iter_mut().zip(veil.0) {
+                    *value += share * (veiled - *value);
+                }
             }
         }
-        Some(patch)
+        view
     }
 
-    fn look_coarsely(&mut self, clip: &Clip, index: usize, corner: (f64, f64), sigma: f64) -> Option<Patch> {
-        let (scale, spot) = (WIDER[index], self.settings.spot);
+    fn view_of_flat(&mut self, clip: &Clip, patch: Patch, corner: (f64, f64), sigma: f64) -> View {
         let Area { left, top, right, bottom } = clip.area();
         let (x, y) = whole(corner);
         let inside = (x.saturating_sub(left), y.saturating_sub(top));
-        let square = Square::around(inside, scale, (right - left, bottom - top))?;
-        let (x, y) = (square.x + left, square.y + top);
-
-        let Some(unrest) = &self.unrest else {
-            return Some(self.defocus.wider_patch(clip.at(self.time), (x, y), scale, sigma, spot));
-        };
-        let coarse = &clip.coarse_at(self.time)[index];
-        let place = [(x, corner.0), (y, corner.1)].map(|(pixel, at)| (pixel as f64 + at.fract()) / scale as f64);
-        let look = |_, side, out: &mut [f32]| unrest.gather(coarse, scale, (place[0], place[1]), side, out);
-        Some(self.defocus.wider_patch_of(sigma / scale as f64, spot, look))
+        View::around(patch, inside, (right - left, bottom - top), |square| {
+            let square = Square { x: square.x + left, y: square.y + top, ..square };
+            let spot = self.settings.spot;
+            let Some(unrest) = &self.unrest else {
+                return self.defocus.square(clip.at(self.time), square, sigma, spot);
+            };
+            let place = [(square.x, corner.0), (square.y, corner.1)].map(|(pixel, at)| pixel as f64 + at.fract());
+            let coarse = clip.coarse_at(self.time);
+            self.defocus.coarse_square(square.side, sigma, spot, |_, side, out| {
+                unrest.gather_coarsely(coarse, (place[0], place[1]), square.side, side, out);
+            })
+        })
     }
 
     /// What is seen of a sharp picture, blurred, with the veil over it if there is one.
@@ -383,7 +386,7 @@ impl Scan {
         match &self.unrest {
             None => self.defocus.patch(picture, (corner.0 as isize, corner.1 as isize), sigma, spot),
             Some(unrest) => {
-                self.defocus.patch_of(sigma, spot, |_, side, out| unrest.gather(picture, 1, corner, side, out))
+                self.defocus.patch_of(sigma, spot, |_, side, out| unrest.gather(picture, corner, side, out))
             }
         }
     }
@@ -520,7 +523,7 @@ mod tests {
                 let expected = block_means(&blurred.data[square.y * 256 + square.x..], 256, scale);
                 let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);
                 let off = pairs.map(|(one, other)| (one - other).powi(2)).sum::<f32>() / expected.0.len() as f32;
-                assert!(off.sqrt() < 1.0, "sigma {sigma}, scale {scale}: {}", off.sqrt());
+                assert!(off.sqrt() < 0.5, "sigma {sigma}, scale {scale}: {}", off.sqrt());
             }
         }
     }

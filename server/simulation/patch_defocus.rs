@@ -3,12 +3,18 @@
 use multiversion::multiversion;
 
 use super::gaussian;
-use crate::imaging::{GrayImage, PATCH_SIDE, Patch, fill_block_means};
+use crate::imaging::{GrayImage, PATCH_SIDE, Patch, Square, fill_block_means};
 
 /// Widest supported reach of a kernel, in pixels either side: four times the largest sigma of the scans, 8.
 const MAX_REACH: usize = 32;
 /// Pixels a row that the widest kernel needs.
 pub(super) const MAX_SIDE: usize = PATCH_SIDE + 2 * MAX_REACH;
+/// Widest blur, in pixels of standard deviation.
+const MOST_SIGMA: f64 = 8.0;
+/// From this on wide squares are blurred at half the resolution: nothing is left that would show the difference.
+const WIDE_SIGMA: f64 = 3.0;
+/// Pixels along each axis that a value has the mean of there.
+const COARSE: usize = 2;
 /// Below this a blur changes no grey value that a camera could tell.
 const LEAST_SIGMA: f64 = 0.15;
 
@@ -22,25 +28,11 @@ pub enum Spot {
 }
 
 /// Scratch space that [`Defocus::patch`] reuses.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Defocus {
-    source: Box<[f32]>,
-    rows: Box<[f32]>,
-    sums: Box<[f32]>,
-    /// Pixels that the values of a wider patch are means of.
-    fine: Vec<f32>,
-}
-
-impl Default for Defocus {
-    fn default() -> Self {
-        let zeros = |count| vec![0.0; count].into();
-        Self {
-            source: zeros(MAX_SIDE * MAX_SIDE),
-            rows: zeros(MAX_SIDE * PATCH_SIDE),
-            sums: zeros(MAX_SIDE * (MAX_SIDE + 1)),
-            fine: Vec::new(),
-        }
-    }
+    source: Vec<f32>,
+    rows: Vec<f32>,
+    sums: Vec<f32>,
 }
 
 impl Defocus {
@@ -55,62 +47,101 @@ impl Defocus {
     /// The same of a scene that `look` shows: it is called with how many pixels around the patch matter, how many that makes
     /// a row, and where to put them, row after row.
     pub fn patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
-        let sigma = sigma.clamp(0.0, 8.0);
+        let sigma = sigma.clamp(0.0, MOST_SIGMA);
         let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
-        let side = PATCH_SIDE + 2 * reach;
-        look(reach, side, &mut self.source);
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
-        match spot {
-            _ if reach == 0 => patch.0.copy_from_slice(&self.source[..PATCH_SIDE * PATCH_SIDE]),
-            Spot::Gaussian => {
-                let kernel: Vec<f32> = gaussian::kernel(sigma, reach).into_iter().map(|weight| weight as f32).collect();
-                blur_rows(&self.source[..side * side], side, &kernel, &mut self.rows);
-                blur_columns(&self.rows[..side * PATCH_SIDE], &kernel, &mut patch.0);
-            }
-            Spot::Disc => {
-                let source = &self.source[..side * side];
-                disc(source, side, reach, 2.0 * sigma as f32, &mut self.sums, &mut patch.0);
-            }
-        }
+        let kernel = || gaussian_kernel(sigma, reach);
+        self.blur(PATCH_SIDE, reach, Blur { sigma, spot, kernel }, look, &mut patch.0);
         patch
     }
 
-    /// The wider patch whose values are means of `scale` x `scale` pixels of `image`, from `(x, y)` on, blurred by a spot of
-    /// standard deviation `sigma` pixels of the image.
-    pub fn wider_patch(
+    /// Gray levels of `square` of `image`, row after row, blurred as in [`Defocus::patch`]. A wide blur is made of means of 2x2 pixels:
+    /// each of the square's values is then twice as wide and high as a pixel.
+    pub fn square(&mut self, image: &GrayImage, square: Square, sigma: f64, spot: Spot) -> Vec<f32> {
+        let Square { x, y, side } = square;
+        let sigma = sigma.clamp(0.0, MOST_SIGMA);
+        if sigma >= WIDE_SIGMA {
+            return self.coarse_square(side, sigma, spot, |reach, coarse_side, source| {
+                let margin = (COARSE * reach) as isize;
+                let fine_side = COARSE * coarse_side;
+                let mut fine = vec![0.0; fine_side * fine_side];
+                gather(image, (x as isize - margin, y as isize - margin), fine_side, &mut fine);
+                fill_block_means(&fine, fine_side, COARSE, coarse_side, source);
+            });
+        }
+        let reach = if sigma < LEAST_SIGMA { 0 } else { (4.0 * sigma).ceil() as usize };
+        let mut levels = vec![0.0; side * side];
+        let look = |reach: usize, side: usize, source: &mut [f32]| {
+            gather(image, (x as isize - reach as isize, y as isize - reach as isize), side, source);
+        };
+        let kernel = || gaussian_kernel(sigma, reach);
+        self.blur(side, reach, Blur { sigma, spot, kernel }, look, &mut levels);
+        levels
+    }
+
+    /// Gray levels of a square of `side` pixels of a scene that `look` shows in means of 2x2 pixels, as in [`Defocus::patch_of`],
+    /// blurred by a spot of standard deviation `sigma` pixels.
+    pub fn coarse_square(
         &mut self,
-        image: &GrayImage,
-        (x, y): (usize, usize),
-        scale: usize,
+        side: usize,
         sigma: f64,
         spot: Spot,
-    ) -> Patch {
-        let mut fine = std::mem::take(&mut self.fine);
-        let patch = self.wider_patch_of(sigma / scale as f64, spot, |reach, side, source| {
-            let margin = (reach * scale) as isize;
-            fine.resize((side * scale).pow(2), 0.0);
-            gather(image, (x as isize - margin, y as isize - margin), side * scale, &mut fine);
-            fill_block_means(&fine, side * scale, scale, side, &mut source[..side * side]);
-        });
-        self.fine = fine;
-        patch
+        look: impl FnOnce(usize, usize, &mut [f32]),
+    ) -> Vec<f32> {
+        let sigma = sigma.clamp(0.0, MOST_SIGMA) / COARSE as f64;
+        let side = side / COARSE;
+        let mut levels = vec![0.0; side * side];
+        if sigma < 1.0 {
+            // Of so narrow a spot only the variance shows, not the shape; samples of a Gaussian would have less than its variance.
+            let kernel = || narrow_kernel(sigma);
+            self.blur(side, NARROW_REACH, Blur { sigma, spot: Spot::Gaussian, kernel }, look, &mut levels);
+        } else {
+            let reach = (4.0 * sigma).ceil() as usize;
+            let kernel = || gaussian_kernel(sigma, reach);
+            self.blur(side, reach, Blur { sigma, spot, kernel }, look, &mut levels);
+        }
+        repeated(&levels, side)
     }
 
-    /// As [`Defocus::patch_of`] where pixels are means of many of a finer picture's, so that blur narrower than a pixel counts too.
-    pub fn wider_patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
-        if !(LEAST_SIGMA / 3.0..1.0).contains(&sigma) {
-            return self.patch_of(sigma, spot, look);
-        }
-        // Of so narrow a spot only the variance shows, not the shape.
-        let kernel = narrow_kernel(sigma);
-        let reach = kernel.len() / 2;
-        let side = PATCH_SIDE + 2 * reach;
+    /// Fills `out`, `width` values a row and as many rows, with what `look` shows, blurred by `blur`, which reaches `reach` pixels far.
+    fn blur<K: FnOnce() -> Vec<f32>>(
+        &mut self,
+        width: usize,
+        reach: usize,
+        blur: Blur<K>,
+        look: impl FnOnce(usize, usize, &mut [f32]),
+        out: &mut [f32],
+    ) {
+        let side = width + 2 * reach;
+        self.source.resize(side * side, 0.0);
         look(reach, side, &mut self.source);
-        let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
-        blur_rows(&self.source[..side * side], side, &kernel, &mut self.rows);
-        blur_columns(&self.rows[..side * PATCH_SIDE], &kernel, &mut patch.0);
-        patch
+        match blur.spot {
+            _ if reach == 0 => out.copy_from_slice(&self.source),
+            Spot::Gaussian => {
+                let kernel = (blur.kernel)();
+                self.rows.resize(side * width, 0.0);
+                blur_rows(&self.source, side, &kernel, width, &mut self.rows);
+                blur_columns(&self.rows, &kernel, width, out);
+            }
+            Spot::Disc => {
+                self.sums.resize(side * (side + 1), 0.0);
+                disc(&self.source, side, reach, 2.0 * blur.sigma as f32, width, &mut self.sums, out);
+            }
+        }
     }
+}
+
+/// A spot, and how to make its kernel where it is a Gaussian.
+struct Blur<K> {
+    sigma: f64,
+    spot: Spot,
+    kernel: K,
+}
+
+/// Each of `levels`, `side` a row, in place of [`COARSE`] x [`COARSE`] pixels.
+fn repeated(levels: &[f32], side: usize) -> Vec<f32> {
+    let wide = |line: &[f32]| -> Vec<f32> { line.iter().flat_map(|&level| [level; COARSE]).collect() };
+    levels.chunks_exact(side).map(wide).flat_map(|line| [line.clone(), line]).flatten().collect()
 }
 
 /// Fills `source`, `side` pixels a row, from `image`'s `(left, top)` on.
@@ -129,10 +160,17 @@ fn gather(image: &GrayImage, (left, top): (isize, isize), side: usize, source: &
     }
 }
 
+/// The Gaussian's kernel in single precision.
+fn gaussian_kernel(sigma: f64, reach: usize) -> Vec<f32> {
+    gaussian::kernel(sigma, reach).into_iter().map(|weight| weight as f32).collect()
+}
+
+/// Reach of a [`narrow_kernel`].
+const NARROW_REACH: usize = 4;
+
 /// A kernel of variance `sigma` squared, which must be below 1: `exp(-t) I_n(t)` with t the variance, the discrete Gaussian
-/// (Lindeberg 1990). Samples of a Gaussian so narrow would have less variance than that.
+/// (Lindeberg 1990).
 fn narrow_kernel(sigma: f64) -> Vec<f32> {
-    const REACH: i32 = 4;
     let half = 0.5 * sigma * sigma;
     // The series of the modified Bessel function; its terms shrink by a factor of more than 4.
     let bessel = |order: i32| -> f64 {
@@ -144,41 +182,45 @@ fn narrow_kernel(sigma: f64) -> Vec<f32> {
         }
         sum
     };
-    let weights: Vec<f64> = (-REACH..=REACH).map(|tap| bessel(tap.abs())).collect();
+    let weights: Vec<f64> = (-(NARROW_REACH as i32)..=NARROW_REACH as i32).map(|tap| bessel(tap.abs())).collect();
     let sum: f64 = weights.iter().sum();
     weights.iter().map(|weight| (weight / sum) as f32).collect()
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn blur_rows(source: &[f32], side: usize, kernel: &[f32], rows: &mut [f32]) {
-    for (line, out) in source.chunks_exact(side).zip(rows.chunks_exact_mut(PATCH_SIDE)) {
-        let mut sums = [0.0f32; PATCH_SIDE];
-        for (tap, weight) in kernel.iter().enumerate() {
-            for (sum, value) in sums.iter_mut().zip(&line[tap..tap + PATCH_SIDE]) {
-                *sum += weight * value;
+fn blur_rows(source: &[f32], side: usize, kernel: &[f32], width: usize, rows: &mut [f32]) {
+    for (line, out) in source.chunks_exact(side).zip(rows.chunks_exact_mut(width)) {
+        for (block, out) in out.as_chunks_mut::<PATCH_SIDE>().0.iter_mut().enumerate() {
+            let mut sums = [0.0f32; PATCH_SIDE];
+            for (tap, weight) in kernel.iter().enumerate() {
+                for (sum, value) in sums.iter_mut().zip(&line[PATCH_SIDE * block + tap..][..PATCH_SIDE]) {
+                    *sum += weight * value;
+                }
             }
+            *out = sums;
         }
-        out.copy_from_slice(&sums);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn blur_columns(rows: &[f32], kernel: &[f32], out: &mut [f32]) {
-    for (row, out) in out.chunks_exact_mut(PATCH_SIDE).enumerate() {
-        let mut sums = [0.0f32; PATCH_SIDE];
-        for (weight, line) in kernel.iter().zip(rows[row * PATCH_SIDE..].chunks_exact(PATCH_SIDE)) {
-            for (sum, value) in sums.iter_mut().zip(line) {
-                *sum += weight * value;
+fn blur_columns(rows: &[f32], kernel: &[f32], width: usize, out: &mut [f32]) {
+    for (row, out) in out.chunks_exact_mut(width).enumerate() {
+        for (block, out) in out.as_chunks_mut::<PATCH_SIDE>().0.iter_mut().enumerate() {
+            let mut sums = [0.0f32; PATCH_SIDE];
+            for (weight, line) in kernel.iter().zip(rows[row * width..].chunks_exact(width)) {
+                for (sum, value) in sums.iter_mut().zip(&line[PATCH_SIDE * block..][..PATCH_SIDE]) {
+                    *sum += weight * value;
+                }
             }
+            *out = sums;
         }
-        out.copy_from_slice(&sums);
     }
 }
 
 /// Mean over a disc, its rim weighted by cover along the row: each row's span is a difference of running sums, and all
 /// columns of a row share how their spans lie to the pixels.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn disc(source: &[f32], side: usize, reach: usize, radius: f32, sums: &mut [f32], out: &mut [f32]) {
+fn disc(source: &[f32], side: usize, reach: usize, radius: f32, width: usize, sums: &mut [f32], out: &mut [f32]) {
     for (line, sums) in source.chunks_exact(side).zip(sums.chunks_exact_mut(side + 1)) {
         sums[0] = 0.0;
         let mut sum = 0.0;
@@ -197,8 +239,8 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, sums: &mut [f32]
         for (edge, sign) in [(middle + half, 1.0f32), (middle - half, -1.0)] {
             let whole = edge as usize;
             let (near, far) = (sign * (1.0 - edge.fract()), sign * edge.fract());
-            for (row, out) in out.chunks_exact_mut(PATCH_SIDE).enumerate() {
-                let sums = &sums[(row + offset) * (side + 1) + whole..][..=PATCH_SIDE];
+            for (row, out) in out.chunks_exact_mut(width).enumerate() {
+                let sums = &sums[(row + offset) * (side + 1) + whole..][..=width];
                 for (value, pair) in out.iter_mut().zip(sums.windows(2)) {
                     *value += near * pair[0] + far * pair[1];
                 }
@@ -257,16 +299,33 @@ mod tests {
     }
 
     #[test]
-    fn a_wider_patch_is_nearly_the_reduced_blurred_picture() {
+    fn a_square_shows_what_the_patches_in_it_show() {
         let picture = texture(4, 300);
-        for sigma in [0.0, 0.7, 1.5, 3.0, 6.0] {
+        for spot in [Spot::Gaussian, Spot::Disc] {
+            for sigma in [0.0, 0.5, 1.5, 2.9, 3.0, 6.0] {
+                let mut defocus = Defocus::default();
+                let levels = defocus.square(&picture, Square { x: 70, y: 80, side: 128 }, sigma, spot);
+                let patch = defocus.patch(&picture, (70 + 32, 80 + 64), sigma, spot);
+                let off = |i: usize| (levels[(64 + i / 32) * 128 + 32 + i % 32] - patch.0[i]).powi(2);
+                let off = ((0..1024).map(off).sum::<f32>() / 1024.0).sqrt();
+                // A wide blur is made at half the resolution, which shifts gray levels by what they change within a pixel.
+                let most = if sigma < WIDE_SIGMA { 1e-3 } else { 4.0 };
+                assert!(off < most, "{spot:?} of {sigma}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn wide_blur_has_the_block_means_of_blur_at_full_resolution() {
+        let picture = texture(4, 300);
+        for sigma in [3.0, 4.0, 6.0, 8.0] {
             let whole = gaussian_blur(&picture, sigma);
+            let found = Defocus::default().square(&picture, Square { x: 70, y: 80, side: 128 }, sigma, Spot::Gaussian);
             for scale in WIDER {
-                let found = Defocus::default().wider_patch(&picture, (70, 80), scale, sigma, Spot::Gaussian);
+                let found = block_means(&found, 128, scale);
                 let expected = block_means(&whole.data[80 * 300 + 70..], 300, scale);
                 let off: f32 = found.0.iter().zip(&expected.0).map(|(a, b)| (a - b).powi(2)).sum::<f32>() / 1024.0;
-                // What is finer than a pixel folds before the blur here, and after it there.
-                assert!(off.sqrt() < 1.0, "sigma {sigma}, scale {scale}: {}", off.sqrt());
+                assert!(off.sqrt() < 0.5, "sigma {sigma}, scale {scale}: {}", off.sqrt());
             }
         }
     }

@@ -57,14 +57,24 @@ impl Unrest {
 
     /// Fills `out`, `side` pixels a row, with what is seen of `image` around a patch whose top left pixel lies at `corner`.
     /// Outside the image its border pixels go on. The image has at least 2x2 pixels, `side` is at most [`MAX_SIDE`].
-    ///
-    /// A pixel of the image is `scale` of the scene's own: 1, or more where the image is a coarse one.
-    pub fn gather(&self, image: &GrayImage, scale: usize, corner: (f64, f64), side: usize, out: &mut [f32]) {
-        let cell = self.cell / scale as f32;
-        // A pixel wider than the cells of the contrast's field has a mean of it, which differs less from place to place.
-        let depth = (scale > 1).then(|| (0.7 * cell).min(1.0));
-        let middle = 0.5 * side as f32;
+    pub fn gather(&self, image: &GrayImage, corner: (f64, f64), side: usize, out: &mut [f32]) {
         let centre = [corner.0, corner.1].map(|at| at as f32 + 0.5 * PATCH_SIDE as f32);
+        self.fill(image, centre, self.cell, None, side, out);
+    }
+
+    /// The same around a square of `width` pixels whose top left pixel lies at `corner`, where `image` holds means of 2x2 pixels.
+    pub fn gather_coarsely(&self, image: &GrayImage, corner: (f64, f64), width: usize, side: usize, out: &mut [f32]) {
+        let centre = [corner.0, corner.1].map(|at| 0.5 * (at as f32 + 0.5 * width as f32));
+        let cell = 0.5 * self.cell;
+        // A value wider than the cells of the contrast's field has a mean of it, which differs less from place to place.
+        let depth = (0.7 * cell).min(1.0);
+        self.fill(image, centre, cell, Some(depth), side, out);
+    }
+
+    /// Fills `out` around `centre`, with the contrast's field at knots `cell` pixels apart, its differences from 1 scaled by `depth` if
+    /// there is one.
+    fn fill(&self, image: &GrayImage, centre: [f32; 2], cell: f32, depth: Option<f32>, side: usize, out: &mut [f32]) {
+        let middle = 0.5 * side as f32;
         let strain = self.strain.each_ref().map(|walk| walk.position() as f32);
         let drift = self.drift.each_ref().map(|walk| walk.position() as f32);
         let along = (1.0 + strain[0], strain[2]);
@@ -162,7 +172,7 @@ mod tests {
             *walk = Walk::new((0.0, 0.0), Motion { speed: 0.0, memory: 1.0 }, &mut rng);
         }
         let mut seen = vec![0.0; 32 * 32];
-        unrest.gather(&slope(), 1, (20.0, 30.5), 32, &mut seen);
+        unrest.gather(&slope(), (20.0, 30.5), 32, &mut seen);
         for (index, value) in seen.iter().enumerate() {
             let (x, y) = (20.0 + (index % 32) as f32, 30.5 + (index / 32) as f32);
             assert!((value - 0.5 * (x + 2.0 * y)).abs() < 1e-3, "{index}: {value}");
@@ -186,7 +196,7 @@ mod tests {
         let at = |place, rng: &mut _| Walk::new((place, place), Motion { speed: 0.0, memory: 1.0 }, rng);
         unrest.strain = [-0.1, 0.0, 0.0, 0.1].map(|strain| at(strain, &mut rng));
         let mut seen = vec![0.0; 32 * 32];
-        unrest.gather(&slope(), 1, (20.0, 30.0), 32, &mut seen);
+        unrest.gather(&slope(), (20.0, 30.0), 32, &mut seen);
         assert!((seen[33] - seen[32] - 0.45).abs() < 1e-3);
         assert!((seen[64] - seen[32] - 1.1).abs() < 1e-3);
     }
