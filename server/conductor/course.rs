@@ -78,31 +78,6 @@ struct Stop {
     wall: Timestamp,
 }
 
-/// What a session asks of the control loop.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Driving {
-    /// The lens waits where every segment begins.
-    AtStart(FocalPower),
-    /// A policy runs from `start`, or from where the lens is.
-    Policy { segment: SegmentId, name: PolicyName, start: Option<FocalPower> },
-    /// The lens holds still, where it is or at a focal power.
-    Hold { segment: Option<SegmentId>, at: Option<FocalPower> },
-}
-
-impl Driving {
-    /// The command that brings it about.
-    pub fn command(&self) -> Command {
-        let (drive, segment) = match self {
-            Self::AtStart(start) => (Drive::Manual(*start), None),
-            Self::Policy { segment, name, start } => {
-                (Drive::Policy { name: name.clone(), start: *start }, Some(*segment))
-            }
-            Self::Hold { segment, at } => (Drive::Hold { at: *at }, *segment),
-        };
-        Command::Drive { drive, segment }
-    }
-}
-
 impl Course {
     /// A session just made; `clock` is this run's.
     pub fn new(made: NewSession, protocol: Protocol, created: Event, clock: RunClock) -> Self {
@@ -299,21 +274,28 @@ impl Course {
         self.latest_comments.push(CommentLine { at: comment.stamp.wall, setting, said: comment.said });
     }
 
-    /// What it asks of the control loop; nothing before its start and after its end.
-    pub fn driving(&self) -> Option<Driving> {
+    /// Who is to drive the lens now, as a command to the control loop. None before the session's start and after its end.
+    pub fn lens_command(&self) -> Option<Command> {
         let segment = self.state.segment();
-        match (self.state.phase(), segment) {
-            (Phase::Inspecting, Some(segment)) if self.state.running() => Some(Driving::Policy {
-                segment,
-                name: self.made.segments.iter().find(|(known, _)| *known == segment)?.1.clone(),
-                start: self.begin_at,
-            }),
-            (Phase::Notice, _) if self.state.paused().is_none() => Some(Driving::AtStart(self.protocol.start)),
-            (Phase::Inspecting, segment) => Some(Driving::Hold { segment, at: self.begin_at }),
-            (Phase::Questions, _) => Some(Driving::Hold { segment: None, at: self.begin_at }),
-            (Phase::Notice | Phase::Closing, _) => Some(Driving::Hold { segment: None, at: None }),
-            (Phase::Ready | Phase::Completed | Phase::Aborted, _) => None,
-        }
+        let running = self.state.running();
+        let paused = self.state.paused().is_some();
+
+        let (drive, segment) = match (self.state.phase(), segment) {
+            (Phase::Inspecting, Some(segment)) if running => {
+                (Drive::Policy { name: self.policy_of(segment)?, start: self.begin_at }, Some(segment))
+            }
+            (Phase::Notice, _) if !paused => (Drive::Manual(self.protocol.start), None),
+            (Phase::Inspecting, segment) => (Drive::Hold { at: self.begin_at }, segment),
+            (Phase::Questions, _) => (Drive::Hold { at: self.begin_at }, None),
+            (Phase::Notice | Phase::Closing, _) => (Drive::Hold { at: None }, None),
+            (Phase::Ready | Phase::Completed | Phase::Aborted, _) => return None,
+        };
+        Some(Command::Drive { drive, segment })
+    }
+
+    fn policy_of(&self, segment: SegmentId) -> Option<PolicyName> {
+        let (_, policy) = self.made.segments.iter().find(|(known, _)| *known == segment)?;
+        Some(policy.clone())
     }
 
     /// Time of inspection until what is shown changes, `inspected` having passed in the segment.

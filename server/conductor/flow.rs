@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use tokio::sync::watch;
 use tokio::time::timeout;
 
-use super::course::{Course, Driving, RunClock};
+use super::course::{Course, RunClock};
 use super::{ConductError, Live, Pen, Shared, views};
 use crate::clock::Moment;
 use crate::control::{Command, Drive};
@@ -20,6 +20,9 @@ use crate::trial::view::{Action, Phase, Role};
 
 /// How long the screens wait for the disk to take what stopped a session before they show it as not recorded yet.
 const PROMPTLY: Duration = Duration::from_millis(300);
+
+/// The lens stays where it is, and no session's setting is under way.
+const HOLD: Command = Command::Drive { drive: Drive::Hold { at: None }, segment: None };
 
 impl Shared {
     /// What is in memory. Never held while anything is waited for.
@@ -261,33 +264,35 @@ impl Shared {
 
     /// Takes the lens from a policy that the session no longer asks for.
     fn hold(&self, live: &mut Live) {
-        let wanted = live.course.as_ref().and_then(Course::driving);
-        if !matches!(live.driving, Some(Driving::Policy { .. })) || wanted == live.driving {
+        let wanted = live.course.as_ref().and_then(Course::lens_command);
+        let policy_drives = matches!(live.commanded, Some(Command::Drive { drive: Drive::Policy { .. }, .. }));
+        if !policy_drives || wanted == live.commanded {
             return;
         }
+
         let hold = match wanted {
-            Some(hold @ Driving::Hold { .. }) => hold,
-            _ => Driving::Hold { segment: None, at: None },
+            Some(hold @ Command::Drive { drive: Drive::Hold { .. }, .. }) => hold,
+            _ => HOLD,
         };
-        self.control.send(hold.command());
-        live.driving = Some(hold);
+        self.control.send(hold.clone());
+        live.commanded = Some(hold);
     }
 
     /// Tells the control loop what the session now asks of it, if that changed.
     fn drive(&self, live: &mut Live) {
-        let wanted = live.course.as_ref().and_then(Course::driving);
-        if wanted == live.driving {
+        let wanted = live.course.as_ref().and_then(Course::lens_command);
+        if wanted == live.commanded {
             return;
         }
-        let drive = match (&wanted, live.course.as_ref()) {
-            (Some(wanted), _) => Some(wanted.command()),
-            (None, Some(course)) if course.state.phase() == Phase::Ready => None,
-            (None, _) => Some(Command::Drive { drive: Drive::Hold { at: None }, segment: None }),
-        };
-        live.driving = wanted;
-        if let Some(command) = drive {
+
+        let is_ready = live.course.as_ref().is_some_and(|course| course.state.phase() == Phase::Ready);
+        if let Some(command) = wanted.clone() {
             self.control.send(command);
+        } else if !is_ready {
+            // The session has ended: its last command no longer holds, and nobody has said who focuses next.
+            self.control.send(HOLD);
         }
+        live.commanded = wanted;
     }
 
     /// Has both tasks of [`Conductor::run`](super::Conductor::run) look at once.

@@ -24,7 +24,7 @@ pub use timeline::{PauseSpan, SetAside, SettingSpan, Timeline, TimelineComment, 
 
 use crate::autofocus::Registry;
 use crate::clock::Clock;
-use crate::control::ControlHandle;
+use crate::control::{Command, ControlHandle};
 use crate::ids::SessionId;
 use crate::store::{RunClocks, Store, StoreError};
 use crate::trial::session::Refusal;
@@ -80,8 +80,8 @@ struct Shared {
 
 struct Live {
     course: Option<Course>,
-    /// What the control loop was told last.
-    driving: Option<course::Driving>,
+    /// What the session last told the control loop.
+    commanded: Option<Command>,
     /// Why the disk did not take what stopped the session, when it was last asked to.
     unrecorded_because: Option<String>,
 }
@@ -183,7 +183,7 @@ impl Conductor {
             registry,
             clock,
             clocks,
-            live: std::sync::Mutex::new(Live { course: None, driving: None, unrecorded_because: None }),
+            live: std::sync::Mutex::new(Live { course: None, commanded: None, unrecorded_because: None }),
             pen: Mutex::new(Pen { random, practice_random }),
             surgeon: watch::Sender::new(None),
             operator: watch::Sender::new(None),

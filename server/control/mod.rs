@@ -1,6 +1,7 @@
 //! Control: the loop camera -> patch -> policy -> lens, its watchdog and its telemetry. Waits for no viewer, disk or
 //! database.
 
+mod advice;
 mod attribution;
 mod eye;
 mod pilot;
@@ -99,7 +100,7 @@ pub struct StepRecord {
 pub enum Hold {
     /// The policy panicked; a fresh instance is being made.
     PolicyPanicked,
-    /// The policy asked for something that is no focal power.
+    /// The policy asked for an invalid focal power.
     PolicyNonsense,
     /// The policy took longer than a frame.
     PolicySlow,
@@ -114,10 +115,9 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// Whether the policy is the reason. A policy that takes time to start or to think is one that was learned: this tells policies
-    /// apart.
+    /// Whether the policy is the cause. Such holds tell policies apart: only learned ones take time to start and to compute.
     #[must_use]
-    pub const fn is_the_policys(self) -> bool {
+    pub const fn caused_by_policy(self) -> bool {
         matches!(self, Self::PolicyPanicked | Self::PolicyNonsense | Self::PolicySlow | Self::PolicyUnavailable)
     }
 

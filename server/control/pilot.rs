@@ -1,14 +1,14 @@
-//! The pilot: asks the policy in charge, checks what it answers, and replaces an instance that fails.
+//! The pilot: asks the policy in charge, and replaces an instance that fails.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::Hold;
-use super::runner::{Answer, Runner};
-use crate::autofocus::{Decision, Observation, PolicyName, Registry};
+use super::advice::{Advice, Failure};
+use super::runner::Runner;
+use crate::autofocus::{Observation, PolicyName, Registry};
 use crate::clock::{Clock, Moment};
-use crate::lens::FocalPower;
 
 /// Time from a failure to the next attempt: long enough not to flood the log, short enough that the loop is back well
 /// within a second of the reason's end.
@@ -21,8 +21,6 @@ const STARTING: Duration = Duration::from_millis(500);
 const MOST_HUNG: usize = 4;
 /// While this many hang, a newly chosen policy is not tried either.
 const MOST_HUNG_AT_ALL: usize = 32;
-/// A belief longer than this is not shown.
-const LONGEST_BELIEF: usize = 4096;
 
 /// Why the policy's advice cannot be followed, and what is being done. The words do not name the policy, so that they
 /// may be shown during a blinded session.
@@ -40,19 +38,6 @@ impl HoldReason {
     pub fn new(hold: Hold, message: &str) -> Self {
         Self { hold, message: message.into() }
     }
-}
-
-/// Advice that can be followed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Advice {
-    /// Where to go.
-    pub target: FocalPower,
-    /// The policy's focus metric, if it has one and it is a number.
-    pub metric: Option<f64>,
-    /// The policy's belief, if it has one.
-    pub belief: Option<Arc<[f32]>>,
-    /// Time the policy's step took.
-    pub took: Duration,
 }
 
 /// Has at most one policy in charge, on a runner's thread.
@@ -90,25 +75,27 @@ impl Pilot {
         self.policy.as_ref()
     }
 
-    /// What the policy advises on seeing this; waits at most one frame.
+    /// What the policy advises on seeing this. Waits at most one frame.
     ///
     /// # Errors
-    /// Why there is no advice to follow.
+    /// When there is no advice to follow.
     pub fn ask(&mut self, seen: &Observation<'_>) -> Result<Advice, HoldReason> {
         let now = self.clock.now();
         if self.runner.is_none() {
             self.restart(now)?;
         }
         self.clear_late_answer(now)?;
+
         let Some(runner) = &mut self.runner else { return Err(starting()) };
-        runner.ask(now, seen);
         let proven = runner.proven;
+        runner.ask(now, seen);
+
         match runner.answer(self.patience) {
-            Some(answer) => {
-                let advice = check(answer).map_err(|reason| self.fail(now, reason))?;
+            Some(Ok(advice)) => {
                 self.failed = None;
                 Ok(advice)
             }
+            Some(Err(failure)) => Err(self.fail(now, hold_reason(failure))),
             None => Err(if proven { slow() } else { starting() }),
         }
     }
@@ -118,8 +105,10 @@ impl Pilot {
         let Some(runner) = &mut self.runner else { return Ok(()) };
         let Some(since) = runner.open_since() else { return Ok(()) };
         let (limit, reason) = if runner.proven { (HUNG, slow()) } else { (STARTING, starting()) };
+
         match runner.answer(Duration::ZERO) {
-            Some(late) => check(late).map(drop).map_err(|reason| self.fail(now, reason)),
+            Some(Ok(_late)) => Ok(()),
+            Some(Err(failure)) => Err(self.fail(now, hold_reason(failure))),
             None if now.since(since) < limit => Err(reason),
             None => Err(self.fail(now, slow())),
         }
@@ -165,39 +154,29 @@ impl Pilot {
     }
 }
 
-/// The one place where a policy's answer becomes something to act on. What went wrong is logged for those who debug alone: the operator
-/// of a blinded session sits before the log, and only some policies fail so. The status tells it outside sessions.
-fn check(answer: Answer) -> Result<Advice, HoldReason> {
-    match answer {
-        Answer::Decided { decision, took } => checked(decision, took),
-        Answer::Panicked(message) => {
+/// Why the lens is held after `failure`. The details go to the debug log alone: the operator of a blinded session may read the
+/// log, and only some policies fail in these ways. Outside sessions the status shows them.
+fn hold_reason(failure: Failure) -> HoldReason {
+    match failure {
+        Failure::Panicked(message) => {
             tracing::debug!(message, "the policy panicked");
-            Err(HoldReason::new(
-                Hold::PolicyPanicked,
-                "the policy failed and is being started afresh; the lens is held",
-            ))
+            HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being started afresh; the lens is held")
         }
-        Answer::Unavailable(error) => {
+        Failure::Unavailable(error) => {
             tracing::debug!(%error, "the policy cannot be had");
-            Err(HoldReason::new(
+            HoldReason::new(
                 Hold::PolicyUnavailable,
                 "the policy cannot run here; the lens is held: `parfocal policies` tells why",
-            ))
+            )
+        }
+        Failure::InvalidTarget(target) => {
+            tracing::debug!(target, "the policy asked for what is no focal power");
+            HoldReason::new(
+                Hold::PolicyNonsense,
+                "the policy asked for what is no focal power and is being started afresh; the lens is held",
+            )
         }
     }
-}
-
-fn checked(decision: Decision, took: Duration) -> Result<Advice, HoldReason> {
-    let Ok(target) = FocalPower::new(decision.target) else {
-        tracing::debug!(target = decision.target, "the policy asked for what is no focal power");
-        return Err(HoldReason::new(
-            Hold::PolicyNonsense,
-            "the policy asked for what is no focal power and is being started afresh; the lens is held",
-        ));
-    };
-    let metric = decision.metric.filter(|metric| metric.is_finite());
-    let sound = |belief: &Arc<[f32]>| belief.len() <= LONGEST_BELIEF && belief.iter().all(|p| p.is_finite());
-    Ok(Advice { target, metric, belief: decision.belief.filter(sound), took })
 }
 
 fn slow() -> HoldReason {

@@ -10,7 +10,8 @@ use std::time::Duration;
 
 use rustix::thread::{Pid, gettid};
 
-use crate::autofocus::{Decision, Observation, Policy, PolicyError, PolicyName, Registry, networks};
+use super::advice::{Advice, Failure};
+use crate::autofocus::{Observation, Policy, PolicyName, Registry, networks};
 use crate::clock::{Clock, Moment};
 use crate::imaging::View;
 use crate::lens::FocalPower;
@@ -24,20 +25,7 @@ struct Question {
 }
 
 /// What came of a question.
-#[derive(Debug)]
-pub enum Answer {
-    /// The policy answered.
-    Decided {
-        /// Its answer, unchecked.
-        decision: Decision,
-        /// Time its step took.
-        took: Duration,
-    },
-    /// The policy panicked, with this message; its thread has ended.
-    Panicked(String),
-    /// The policy could not be made; its thread has ended.
-    Unavailable(PolicyError),
-}
+type Answer = Result<Advice, Failure>;
 
 /// One instance of a policy on a thread of its own. At most one question is open at a time. Dropping the runner ends the
 /// thread as soon as the policy's step returns, and waits for nothing.
@@ -91,14 +79,14 @@ impl Runner {
     }
 
     /// Waits for the answer to the open question, for at most `timeout`; `None` when it did not come.
-    pub fn answer(&mut self, timeout: Duration) -> Option<Answer> {
+    pub fn answer(&mut self, timeout: Duration) -> Option<Result<Advice, Failure>> {
         let answer = match self.answers.recv_timeout(timeout) {
             Ok(answer) => answer,
             Err(RecvTimeoutError::Timeout) => {
                 self.take_time();
                 return None;
             }
-            Err(RecvTimeoutError::Disconnected) => Answer::Panicked("its thread ended".into()),
+            Err(RecvTimeoutError::Disconnected) => Err(Failure::Panicked("its thread ended".into())),
         };
         self.asked_at = None;
         self.proven = true;
@@ -149,13 +137,14 @@ fn serve(
 ) {
     let mut policy = match guarded(|| registry.build(name)) {
         Ok(Ok(policy)) => policy,
-        Ok(Err(error)) => return drop(answers.send(Answer::Unavailable(error))),
-        Err(message) => return drop(answers.send(Answer::Panicked(message))),
+        Ok(Err(error)) => return drop(answers.send(Err(Failure::Unavailable(error)))),
+        Err(message) => return drop(answers.send(Err(Failure::Panicked(message)))),
     };
+
     for question in questions {
         let answer = step(&mut *policy, &question, clock);
-        let over = matches!(answer, Answer::Panicked(_));
-        if answers.send(answer).is_err() || over {
+        let panicked = matches!(answer, Err(Failure::Panicked(_)));
+        if answers.send(answer).is_err() || panicked {
             return;
         }
     }
@@ -164,10 +153,8 @@ fn serve(
 fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answer {
     let began = clock.now();
     let seen = Observation { view: &question.view, focal_power: question.focal_power };
-    match guarded(|| policy.step(&seen)) {
-        Ok(decision) => Answer::Decided { decision, took: clock.now().since(began) },
-        Err(message) => Answer::Panicked(message),
-    }
+    let decision = guarded(|| policy.step(&seen)).map_err(Failure::Panicked)?;
+    Advice::new(decision, clock.now().since(began))
 }
 
 /// Keeps what a panicking policy says, and where in the code it stood, off the standard error from now on: the operator of a blinded

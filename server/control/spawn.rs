@@ -121,7 +121,7 @@ struct Worker {
     last_frame_at: Moment,
     /// Why frames lead to nothing: none come, or they hold no patch.
     camera_fault: Option<HoldReason>,
-    /// Since when the lens has been held without a break, and whether for the policy's sake.
+    /// Whether the policy caused the hold, and since when the lens has been held without a break.
     held_since: Option<(bool, Moment)>,
     window: LatencyWindow,
     steps: u64,
@@ -233,10 +233,12 @@ impl Worker {
         let now = self.clock.now();
         let reason = self.camera_fault.as_ref().or(self.stepper.hold_reason());
         self.held_since = reason.map(|reason| {
-            let policys = reason.hold.is_the_policys();
-            self.held_since.filter(|held| held.0 == policys).unwrap_or((policys, now))
+            let caused_by_policy = reason.hold.caused_by_policy();
+            self.held_since.filter(|held| held.0 == caused_by_policy).unwrap_or((caused_by_policy, now))
         });
-        let (held, message) = (reason.map(|reason| reason.hold), reason.map(|reason| reason.message.clone()));
+        let held = reason.map(|reason| reason.hold);
+        let message = reason.map(|reason| reason.message.clone());
+
         let changed = {
             let last = self.status.borrow();
             last.held != held || last.message != message || last.policy.as_ref() != self.stepper.policy()
@@ -244,10 +246,12 @@ impl Worker {
         if !changed && now.since(self.published_at) < STATUS_INTERVAL {
             return;
         }
+
         self.published_at = now;
         let figures = self.window.figures(now);
         let mut camera = self.source.health();
         camera.working &= held != Some(Hold::CameraFailed);
+
         self.status.send_replace(Arc::new(ControlStatus {
             camera,
             camera_offer: self.controls.as_ref().map(Controls::offered).unwrap_or_default(),

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::advice::Advice;
 use super::attribution::Attribution;
 use super::eye::Eye;
-use super::pilot::{Advice, HoldReason, Pilot};
+use super::pilot::{HoldReason, Pilot};
 use super::runner::guarded;
 use super::{Command, ControlledFrame, Drive, Hold, StepRecord};
 use crate::autofocus::{Observation, PolicyName, Registry};
@@ -22,7 +23,9 @@ pub struct Stepper {
     eye: Eye,
     pilot: Pilot,
     attribution: Attribution,
-    drive: Driver,
+    drive: Drive,
+    /// Whether a frame was exposed with the lens where the policy is to begin. Until then the policy is not asked.
+    placed: bool,
     segment: Option<SegmentId>,
     content_area: Option<ContentArea>,
     /// What the lens took last.
@@ -33,23 +36,6 @@ pub struct Stepper {
     lens_fault: Option<HoldReason>,
     /// Why the last step followed no policy, if it was to hold.
     step_hold: Option<HoldReason>,
-}
-
-/// Who drives, without the names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Driver {
-    Hand,
-    Nobody,
-    /// `placed` once a frame was exposed with the lens where the policy is to begin.
-    Policy {
-        placed: bool,
-    },
-}
-
-/// What a frame led to, before the lens was told.
-struct Choice {
-    policy: Option<PolicyName>,
-    outcome: Result<Option<Advice>, HoldReason>,
 }
 
 impl Stepper {
@@ -63,7 +49,8 @@ impl Stepper {
             clock,
             lens,
             eye,
-            drive: Driver::Hand,
+            drive: Drive::Manual(start),
+            placed: false,
             segment: None,
             content_area: None,
             asked: start,
@@ -93,23 +80,19 @@ impl Stepper {
     }
 
     fn change_driver(&mut self, drive: Drive) {
-        self.step_hold = None;
-        self.wanted = self.asked;
-        let (driver, policy) = match drive {
-            Drive::Manual(power) => {
-                self.wanted = power;
-                (Driver::Hand, None)
-            }
-            Drive::Hold { at } => {
-                self.wanted = at.unwrap_or(self.asked);
-                (Driver::Nobody, None)
-            }
-            Drive::Policy { name, start } => {
-                self.wanted = start.unwrap_or(self.asked);
-                (Driver::Policy { placed: false }, Some(name))
-            }
+        self.wanted = match &drive {
+            Drive::Manual(power) => *power,
+            Drive::Hold { at } => at.unwrap_or(self.asked),
+            Drive::Policy { start, .. } => start.unwrap_or(self.asked),
         };
-        self.drive = driver;
+        let policy = match &drive {
+            Drive::Policy { name, .. } => Some(name.clone()),
+            Drive::Manual(_) | Drive::Hold { .. } => None,
+        };
+
+        self.step_hold = None;
+        self.placed = false;
+        self.drive = drive;
         self.pilot.engage(policy);
     }
 
@@ -121,8 +104,16 @@ impl Stepper {
         // A lens that is away may be anywhere.
         let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
         let (area, view) = self.eye.look(&frame.image, self.content_area.as_ref())?;
-        let Choice { policy, outcome } = self.choose(&frame, &view);
+
+        let asks = self.asks_policy(&frame);
+        let policy = self.pilot.policy().filter(|_| asks == Ok(true)).cloned();
+        let outcome = match asks {
+            Ok(true) => self.ask(&frame, &view).map(Some),
+            Ok(false) => Ok(None),
+            Err(reason) => Err(reason),
+        };
         let advice = self.act(outcome);
+
         let record = StepRecord {
             frame: frame.number,
             exposed_at: frame.exposed_at,
@@ -146,25 +137,28 @@ impl Stepper {
         self.tell_lens();
     }
 
-    fn choose(&mut self, frame: &Frame, view: &View) -> Choice {
-        let unasked = |outcome| Choice { policy: None, outcome };
-        match self.drive {
-            Driver::Hand => unasked(Ok(None)),
-            Driver::Nobody => unasked(Err(HoldReason::new(Hold::Paused, "paused on request"))),
-            Driver::Policy { placed } => {
-                if let Some(fault) = &self.lens_fault {
-                    // Frames from a lens that does not move would teach the policy wrong.
-                    return unasked(Err(fault.clone()));
-                }
-                if !placed && !self.attribution.settled(frame.middle()) {
-                    return unasked(Ok(None));
-                }
-                self.drive = Driver::Policy { placed: true };
-                let focal_power = self.attribution.focal_power(frame.middle());
-                let outcome = self.pilot.ask(&Observation { view, focal_power }).map(Some);
-                Choice { policy: self.pilot.policy().cloned(), outcome }
-            }
+    /// Whether the policy is asked about `frame`.
+    ///
+    /// # Errors
+    /// When the lens is to be held instead.
+    fn asks_policy(&mut self, frame: &Frame) -> Result<bool, HoldReason> {
+        match &self.drive {
+            Drive::Manual(_) => return Ok(false),
+            Drive::Hold { .. } => return Err(HoldReason::new(Hold::Paused, "paused on request")),
+            Drive::Policy { .. } => {}
         }
+        if let Some(fault) = &self.lens_fault {
+            // Frames from a lens that does not move would mislead the policy.
+            return Err(fault.clone());
+        }
+
+        self.placed = self.placed || self.attribution.settled(frame.middle());
+        Ok(self.placed)
+    }
+
+    fn ask(&mut self, frame: &Frame, view: &View) -> Result<Advice, HoldReason> {
+        let focal_power = self.attribution.focal_power(frame.middle());
+        self.pilot.ask(&Observation { view, focal_power })
     }
 
     /// Tells the lens what was decided, and remembers the reason if it is to be held instead.

@@ -120,7 +120,7 @@ const LASTING: Duration = Duration::from_secs(3);
 /// A hold that has gone on for `held_for`, and the words for it, as far as they may be told while a session is under way: one by the
 /// policy when it lasts, and then in the same words whatever went wrong. Only learned policies take time to start and to think.
 fn told_blinded(hold: Hold, held_for: Duration, message: Option<&Arc<str>>) -> (Option<Hold>, Option<Arc<str>>) {
-    if !hold.is_the_policys() {
+    if !hold.caused_by_policy() {
         return (Some(hold), message.cloned());
     }
     if held_for < LASTING {
@@ -141,7 +141,7 @@ impl Audience for ForOperator {
         // Asked once: a session may begin meanwhile.
         let blinded = app.blinded();
         let (age, seen) = if blinded { (coarse(age_ms), Seen::default()) } else { (age_ms, Seen::new(&frame.insight)) };
-        let held = frame.insight.held.filter(|hold| !(blinded && hold.is_the_policys()));
+        let held = frame.insight.held.filter(|hold| !(blinded && hold.caused_by_policy()));
         OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, app), held, seen }
     }
 
