@@ -11,7 +11,7 @@ use crate::control::ControlStatus;
 use crate::http::error::role_name;
 use crate::http::keys::{Keys, ROLES};
 use crate::imaging::Calibration;
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 /// The announcement for people of a server that others reach at `host`. On a `terminal` the code has colours.
 pub fn announcement(

@@ -13,7 +13,7 @@ use crate::trial::allocation::Seed;
 use crate::trial::commitment::Allocation;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::protocol::Protocol;
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 impl Shared {
     pub(super) async fn create(&self, by: Role, participant: &str, protocol: &str) -> Result<SessionId, ConductError> {

@@ -13,11 +13,14 @@ use crate::control::{Command, Drive};
 use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
 use crate::store::{Comment, NewSession, Reader, RunClocks};
+use crate::trial::action::Action;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
+use crate::trial::phase::Phase;
 use crate::trial::protocol::Protocol;
+use crate::trial::role::Role;
 use crate::trial::session::{Plan, Refusal, SessionState, decide, decide_time};
-use crate::trial::view::{Action, CommentLine, Phase, Role};
+use crate::trial::view::CommentLine;
 
 /// Comments and log lines that the operator sees.
 pub(super) const LATEST: usize = 30;

@@ -14,9 +14,11 @@ use crate::clock::Moment;
 use crate::control::{Command, Drive};
 use crate::ids::SessionId;
 use crate::store::DeviceReport;
+use crate::trial::action::Action;
 use crate::trial::grace::{Grace, Outstanding};
+use crate::trial::phase::Phase;
+use crate::trial::role::Role;
 use crate::trial::session::{decide, decide_restart};
-use crate::trial::view::{Action, Phase, Role};
 
 /// How long the screens wait for the disk to take what stopped a session before they show it as not recorded yet.
 const PROMPTLY: Duration = Duration::from_millis(300);

@@ -27,8 +27,11 @@ use crate::clock::Clock;
 use crate::control::{Command, ControlHandle};
 use crate::ids::SessionId;
 use crate::store::{RunClocks, Store, StoreError};
+use crate::trial::action::Action;
+use crate::trial::remark::{Holding, NewAnswer, NewComment};
+use crate::trial::role::Role;
 use crate::trial::session::Refusal;
-use crate::trial::view::{Action, Holding, NewAnswer, NewComment, OperatorView, Role, SurgeonView};
+use crate::trial::view::{OperatorView, SurgeonView};
 use course::{Course, RunClock};
 
 /// What a conductor works with.

@@ -6,7 +6,8 @@ use crate::ids::{SegmentId, SessionId};
 use crate::store::{Answer, Comment, Kept, Stamp};
 use crate::trial::answers;
 use crate::trial::grace::Grace;
-use crate::trial::view::{AnswerValue, Holding, NewAnswer, NewComment, Said};
+use crate::trial::question::AnswerValue;
+use crate::trial::remark::{Holding, NewAnswer, NewComment, Said};
 
 impl Shared {
     pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {

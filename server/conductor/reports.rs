@@ -13,7 +13,9 @@ use crate::trial::answers::sus_score;
 use crate::trial::event::EventKind;
 use crate::trial::grace::Outstanding;
 use crate::trial::participant::ParticipantCode;
-use crate::trial::view::{AnswerValue, LogLine, QuestionKind, Role};
+use crate::trial::question::{AnswerValue, QuestionKind};
+use crate::trial::role::Role;
+use crate::trial::view::LogLine;
 
 /// A session in detail, for the researcher. Policies are in it once it was unblinded, and not before.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

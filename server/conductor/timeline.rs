@@ -11,8 +11,9 @@ use super::{ConductError, Conductor};
 use crate::ids::SessionId;
 use crate::store::{Answer, PathPoint, RunClocks, standings};
 use crate::trial::event::{Event, EventKind};
+use crate::trial::question::AnswerValue;
+use crate::trial::remark::Said;
 use crate::trial::standing::Standing;
-use crate::trial::view::{AnswerValue, Said};
 
 /// A session over time. Seconds count from its start by the server's clocks, pauses included.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use super::course::{Course, LATEST};
 use crate::clock::Moment;
 use crate::trial::event::Event;
+use crate::trial::phase::Phase;
+use crate::trial::question::AnswerValue;
 use crate::trial::session::PauseCause;
-use crate::trial::view::{AnswerValue, LogLine, OperatorView, Phase, SurgeonView};
+use crate::trial::view::{LogLine, OperatorView, SurgeonView};
 
 /// The surgeon's and the operator's view of `course` at `now`; `because`: why the disk did not take what stopped it.
 pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {

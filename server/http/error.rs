@@ -12,7 +12,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::conductor::ConductError;
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 /// Why a request was not done. The text is for the person who reads it.
 #[derive(Debug, Clone, thiserror::Error)]

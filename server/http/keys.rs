@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
 
 use crate::files::make_private;
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 /// Name of the key file in the data folder.
 const FILE: &str = "keys.toml";

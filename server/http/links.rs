@@ -8,7 +8,7 @@ use qrcode::render::svg;
 use super::App;
 use super::error::Error;
 use super::security::is_loopback_name;
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 /// The link that lets a browser in as the surgeon: by the name that the operator's browser came by, unless that leads
 /// nowhere from a tablet.

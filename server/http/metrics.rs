@@ -17,7 +17,7 @@ use super::error::Error;
 use super::roles::Roles;
 use super::{App, AppState};
 use crate::priority::Standing;
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 /// The server's counters in the `OpenMetrics` text format.
 #[utoipa::path(get, path = "/metrics", tag = "service", responses(

@@ -22,7 +22,8 @@ use crate::conductor::ProtocolSummary;
 use crate::control::{Command, Drive};
 use crate::ids::SessionId;
 use crate::lens::FocalPower;
-use crate::trial::view::{OperatorView, Role};
+use crate::trial::role::Role;
+use crate::trial::view::OperatorView;
 
 /// What [`ParticipantCode`](crate::trial::participant::ParticipantCode) takes, for browsers to check while typing.
 const CODE_PATTERN: &str = r"[A-Z0-9\-]{2,16}";

@@ -22,7 +22,9 @@ use crate::autofocus::PolicyName;
 use crate::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
 use crate::ids::SessionId;
 use crate::store::{SessionLine, SessionStatus};
-use crate::trial::view::{Action, AnswerValue, Role};
+use crate::trial::action::Action;
+use crate::trial::question::AnswerValue;
+use crate::trial::role::Role;
 
 /// Points of the focal path for each setting: about as many as there are pixels to draw them on.
 const POINTS: u32 = 600;

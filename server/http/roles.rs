@@ -18,7 +18,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::error::{Error, role_name};
 use super::keys::{Keys, ROLES};
 use super::{App, AppState};
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 /// A cookie outlives a study day, not a study.
 const COOKIE_SECONDS: u32 = 30 * 24 * 3600;

@@ -17,7 +17,10 @@ use super::json::JsonBody;
 use super::roles::Surgeon;
 use super::security::Nonce;
 use crate::ids::SessionId;
-use crate::trial::view::{Action, Holding, NewAnswer, NewComment, Role, SurgeonView};
+use crate::trial::action::Action;
+use crate::trial::remark::{Holding, NewAnswer, NewComment};
+use crate::trial::role::Role;
+use crate::trial::view::SurgeonView;
 
 #[derive(Template)]
 #[template(path = "surgeon.html")]

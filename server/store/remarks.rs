@@ -6,7 +6,8 @@ use sqlx::sqlite::SqliteRow;
 use super::sessions::{parsed, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError, moment, nanoseconds};
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
-use crate::trial::view::{AnswerValue, Holding, Origin, Said, WaitClock};
+use crate::trial::question::AnswerValue;
+use crate::trial::remark::{Holding, Origin, Said, WaitClock};
 
 /// What became of something given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

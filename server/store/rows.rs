@@ -9,8 +9,9 @@ use utoipa::ToSchema;
 
 use crate::clock::Moment;
 use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
+use crate::trial::question::AnswerValue;
+use crate::trial::remark::{Origin, Said};
 use crate::trial::standing::{Given, Standing, by_question};
-use crate::trial::view::{AnswerValue, Origin, Said};
 
 /// When and by which server something was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

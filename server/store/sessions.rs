@@ -13,7 +13,7 @@ use crate::trial::allocation::{Algorithm, Seed};
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::{DEFAULT_GRACE, Grace};
 use crate::trial::protocol::{Protocol, ProtocolError};
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 
 /// A session to be made.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Questionnaires: whether an answer fits its question, how an answer in parts adds up, and the System Usability
 //! Scale's score.
 
-use super::view::{AnswerValue, Question, QuestionKind};
+use super::question::{AnswerValue, Question, QuestionKind};
 
 /// Longest text of an answer or comment, bytes of UTF-8: some 2500 words.
 pub const LONGEST_TEXT: usize = 16 * 1024;

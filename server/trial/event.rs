@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::view::Role;
+use super::role::Role;
 use crate::clock::Moment;
 use crate::ids::SegmentId;
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 
 use super::answers::on_top_of;
-use super::view::AnswerValue;
+use super::question::AnswerValue;
 use crate::ids::DeviceId;
 
 /// An answer as it was given.

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use parfocal::ids::SessionId;
 use parfocal::store::NewSession;
-use parfocal::trial::view::{Action, Role};
+use parfocal::trial::action::Action;
+use parfocal::trial::role::Role;
 
 use crate::bench::Bench;
 

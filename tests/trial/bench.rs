@@ -13,9 +13,12 @@ use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot};
 use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal::lens::{FocalPower, LensHealth};
 use parfocal::store::{Run, Store};
-use parfocal::trial::view::{
-    Action, AnswerValue, NewAnswer, NewComment, OperatorView, Origin, Phase, QuestionKind, Role, Said, SurgeonView,
-};
+use parfocal::trial::action::Action;
+use parfocal::trial::phase::Phase;
+use parfocal::trial::question::{AnswerValue, QuestionKind};
+use parfocal::trial::remark::{NewAnswer, NewComment, Origin, Said};
+use parfocal::trial::role::Role;
+use parfocal::trial::view::{OperatorView, SurgeonView};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use tokio::sync::{mpsc, watch};

@@ -12,7 +12,8 @@ use parfocal::ids::SessionId;
 use parfocal::store::export::verify::{Check, Verdict, verify};
 use parfocal::store::export::{Export, ExportError, ZipStream, export};
 use parfocal::store::{DeviceEvent, Reader, telemetry};
-use parfocal::trial::view::{Action, Role};
+use parfocal::trial::action::Action;
+use parfocal::trial::role::Role;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 

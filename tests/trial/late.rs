@@ -8,7 +8,11 @@ use parfocal::ids::{DeviceId, SessionId};
 use parfocal::store::MIGRATOR;
 use parfocal::store::export::export;
 use parfocal::store::export::verify::verify;
-use parfocal::trial::view::{Action, AnswerValue, Holding, NewAnswer, Origin, Phase, Role, WaitClock};
+use parfocal::trial::action::Action;
+use parfocal::trial::phase::Phase;
+use parfocal::trial::question::AnswerValue;
+use parfocal::trial::remark::{Holding, NewAnswer, Origin, WaitClock};
+use parfocal::trial::role::Role;
 use uuid::Uuid;
 
 use crate::bench::Bench;

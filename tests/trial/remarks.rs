@@ -3,7 +3,11 @@
 use std::time::Duration;
 
 use parfocal::conductor::ConductError;
-use parfocal::trial::view::{Action, AnswerValue, NewAnswer, Origin, Phase, QuestionKind, Role, Said};
+use parfocal::trial::action::Action;
+use parfocal::trial::phase::Phase;
+use parfocal::trial::question::{AnswerValue, QuestionKind};
+use parfocal::trial::remark::{NewAnswer, Origin, Said};
+use parfocal::trial::role::Role;
 
 use crate::bench::Bench;
 

@@ -9,7 +9,9 @@ use parfocal::conductor::ConductError;
 use parfocal::control::{Command, Drive};
 use parfocal::lens::FocalPower;
 use parfocal::store::SessionStatus;
-use parfocal::trial::view::{Action, Phase, Role};
+use parfocal::trial::action::Action;
+use parfocal::trial::phase::Phase;
+use parfocal::trial::role::Role;
 
 use crate::bench::{Bench, PARTICIPANT};
 
@@ -262,7 +264,7 @@ async fn a_stop_that_the_disk_does_not_take_is_done_all_the_same_and_recorded_on
     assert!(bench.view().unrecorded && bench.view().phase == Phase::Questions);
     assert!(bench.operator_view().unrecorded_because.is_some_and(|why| why.contains("broken")));
     // Nothing is said to be done that is not on the disk, but for what stops.
-    let answer = bench.answer("sharpness", parfocal::trial::view::AnswerValue::Point(4)).await;
+    let answer = bench.answer("sharpness", parfocal::trial::question::AnswerValue::Point(4)).await;
     assert!(matches!(answer, Err(ConductError::Storage(_))), "{answer:?}");
     let finish = Action::FinishQuestions { segment: Some(segment) };
     assert!(matches!(bench.conductor.act(Role::Surgeon, session, finish).await, Err(ConductError::Storage(_))));

@@ -11,7 +11,7 @@ use parfocal::control::{Hold, StepRecord};
 use parfocal::ids::SegmentId;
 use parfocal::lens::FocalPower;
 use parfocal::store::{MIGRATOR, Reader, Store, StoreError, telemetry};
-use parfocal::trial::view::Action;
+use parfocal::trial::action::Action;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::bench::{Bench, a_clock, a_run};

@@ -29,7 +29,7 @@ use super::roles::Roles;
 use super::shutdown::ended;
 use crate::control::ControlStatus;
 use crate::live::{EncodedFrame, Watcher};
-use crate::trial::view::Role;
+use crate::trial::role::Role;
 use audience::Audience;
 use operator::ForOperator;
 use surgeon::ForSurgeon;

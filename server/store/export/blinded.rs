@@ -15,8 +15,9 @@ use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
 use crate::trial::protocol::Protocol;
+use crate::trial::question::{AnswerValue, QuestionKind};
+use crate::trial::remark::WaitClock;
 use crate::trial::standing::Standing;
-use crate::trial::view::{AnswerValue, QuestionKind, WaitClock};
 
 /// A session without what unblinding tells.
 pub struct Blinded {

@@ -13,7 +13,7 @@ use crate::autofocus::PolicyName;
 use crate::lens::FocalPower;
 use crate::trial::allocation::Order;
 use crate::trial::grace::DEFAULT_GRACE;
-use crate::trial::view::{Question, QuestionKind};
+use crate::trial::question::{Question, QuestionKind};
 
 /// Most segments in a session: what a surgeon can still compare, and the ranking's limit.
 const MOST_SETTINGS: usize = 24;

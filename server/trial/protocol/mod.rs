@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 pub use fault::ProtocolError;
 
 use super::allocation::Order;
-use super::view::{Question, QuestionKind};
+use super::question::Question;
 use crate::autofocus::PolicyName;
 use crate::lens::FocalPower;
 
@@ -96,19 +96,6 @@ impl Protocol {
             .flat_map(|prompt| [prompt.at, prompt.at + self.prompt_stay])
             .filter(|&at| at > inspected)
             .min()
-    }
-}
-
-impl QuestionKind {
-    /// Name of the kind, as in protocols and exports.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Text => "text",
-            Self::Likert { .. } => "likert",
-            Self::Ranking => "ranking",
-            Self::Sus => "sus",
-        }
     }
 }
 

@@ -6,9 +6,12 @@ use std::time::Duration;
 use super::{PauseCause, SessionState};
 use crate::clock::Moment;
 use crate::ids::SegmentId;
+use crate::trial::action::Action;
 use crate::trial::answers::is_whole;
 use crate::trial::event::EventKind;
-use crate::trial::view::{Action, Phase, Question, Role};
+use crate::trial::phase::Phase;
+use crate::trial::question::Question;
+use crate::trial::role::Role;
 
 /// Longest reason, characters.
 const LONGEST_REASON: usize = 1000;

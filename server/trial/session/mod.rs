@@ -20,9 +20,10 @@ use std::time::Duration;
 pub use decide::{Refusal, decide, decide_restart, decide_time};
 
 use super::event::{Event, EventKind};
+use super::phase::Phase;
 use super::protocol::Protocol;
+use super::question::{AnswerValue, Question};
 use super::standing::{Given, counted};
-use super::view::{AnswerValue, Phase, Question};
 use crate::clock::Moment;
 use crate::ids::SegmentId;
 
@@ -140,7 +141,7 @@ impl SessionState {
     /// Whether nothing more will happen in it but late comments and unblinding.
     #[must_use]
     pub const fn ended(&self) -> bool {
-        matches!(self.phase, Phase::Completed | Phase::Aborted)
+        self.phase.has_ended()
     }
 
     /// Whether it was told which policies ran.

@@ -7,7 +7,9 @@ use proptest::prelude::*;
 use uuid::Uuid;
 
 use super::*;
-use crate::trial::view::{Action, QuestionKind, Role};
+use crate::trial::action::Action;
+use crate::trial::question::QuestionKind;
+use crate::trial::role::Role;
 
 fn segment(number: usize) -> SegmentId {
     SegmentId(Uuid::from_u128(number as u128 + 1))
