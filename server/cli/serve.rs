@@ -166,7 +166,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         loopback_only: address.ip().is_loopback(),
         metrics: http::Metrics::default(),
         shutdown,
-        control: control.clone(),
+        control: control.observer(),
     });
     let host = app.address;
     let server = tokio::spawn(http::run(listener, app));

@@ -18,8 +18,10 @@ use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
 use crate::trial::phase::Phase;
 use crate::trial::protocol::Protocol;
+use crate::trial::refusal::Refusal;
 use crate::trial::role::Role;
-use crate::trial::session::{Plan, Refusal, SessionState, decide, decide_time};
+use crate::trial::session::{Plan, SessionState, decide, decide_time};
+use crate::trial::unblinding::Circumstances;
 use crate::trial::view::CommentLine;
 
 /// Comments and log lines that the operator sees.
@@ -153,15 +155,16 @@ impl Course {
     /// The events that `action` brings about, to be written to the disk; [`Course::written`] says what became of them.
     ///
     /// # Errors
-    /// When `by` may not, or the action does not fit where the session stands.
+    /// When `by` may not, or the action does not fit where the session stands or the circumstances.
     pub fn begin_writing(
         &mut self,
         by: Role,
         action: &Action,
+        circumstances: &Circumstances,
         at: Moment,
         wall: Timestamp,
     ) -> Result<Vec<Event>, Refusal> {
-        let kinds = decide(&self.state, by, action, at)?;
+        let kinds = circumstances.decide(self.session(), &self.state, by, action, at)?;
         self.writing = !kinds.is_empty();
         Ok(self.number(by, kinds, at, wall))
     }

@@ -4,21 +4,18 @@
 use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use jiff::Timestamp;
 use tokio::sync::watch;
 use tokio::time::timeout;
 
-use super::course::{Course, RunClock};
+use super::circumstances::Subject;
+use super::course::Course;
 use super::{ConductError, Live, Pen, Shared, views};
-use crate::clock::Moment;
 use crate::control::{Command, Drive};
 use crate::ids::SessionId;
-use crate::store::DeviceReport;
 use crate::trial::action::Action;
-use crate::trial::grace::{Grace, Outstanding};
 use crate::trial::phase::Phase;
 use crate::trial::role::Role;
-use crate::trial::session::{decide, decide_restart};
+use crate::trial::session::decide_restart;
 
 /// How long the screens wait for the disk to take what stopped a session before they show it as not recorded yet.
 const PROMPTLY: Duration = Duration::from_millis(300);
@@ -72,34 +69,31 @@ impl Shared {
             self.keep_time();
             self.record_stops(&mut pen).await?;
 
-            let grace = {
-                let mut live = self.live();
-                let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
-                // Who may not is told that first.
-                decide(&course.state, by, action, self.clock.now())?;
-                course.grace
-            };
-            self.ask_first(session, grace, action).await?;
+            let subject = self.live().course_of(session).map(|course| Subject::of(course));
+            let subject = subject.ok_or_else(ConductError::no_session)?;
+            let circumstances = self.circumstances(&mut pen, subject, action).await?;
 
             let mut live = self.live();
-            let (at, wall) = (self.clock.now(), self.clock.wall());
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
-            // Stopped since: that comes first.
-            if !course.is_unrecorded() {
-                break course.begin_writing(by, action, at, wall)?;
+            // It was stopped meanwhile, and that goes to the disk first.
+            if course.is_unrecorded() {
+                continue;
             }
+            break course.begin_writing(by, action, &circumstances, self.clock.now(), self.clock.wall())?;
         };
         if events.is_empty() {
             return Ok(());
         }
 
         let written = self.store.append_events(session, &events).await;
+
         let mut live = self.live();
         if let Some(course) = live.course_of(session) {
             course.written(if written.is_ok() { events } else { Vec::new() });
         }
         live.forget_what_is_done_with();
         drop(live);
+
         self.show_and_drive();
         self.wake();
         Ok(written?)
@@ -107,63 +101,15 @@ impl Shared {
 
     /// Acts on a session that is not the one in memory.
     async fn act_on_earlier(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
-        let _pen = self.pen.lock().await;
+        let mut pen = self.pen.lock().await;
         let mut earlier = self.load(session).await?;
-        let same_set = |course: &Course| !course.state.ended() && course.made.seed == earlier.made.seed;
-        if matches!(action, Action::Unblind { .. }) && self.live().course.as_ref().is_some_and(same_set) {
-            let text = "a session of the same balanced set is under way, and this one's order would tell its own; wait for its end";
-            return Err(ConductError::Conflict(text.to_owned()));
-        }
-        if matches!(action, Action::Unblind { .. })
-            && let Some((participant, made)) = self.store.reader().blinded_twin(session).await?
-        {
-            let text = format!(
-                "the session of {participant} made at {made} took this one's place and has the same order; unblind that one first"
-            );
-            return Err(ConductError::Conflict(text));
-        }
-        let (at, wall) = (self.clock.now(), self.clock.wall());
-        let events = earlier.begin_writing(by, action, at, wall)?;
-        self.ask_first(session, earlier.grace, action).await?;
+        let circumstances = self.circumstances(&mut pen, Subject::of(&earlier), action).await?;
+        let events = earlier.begin_writing(by, action, &circumstances, self.clock.now(), self.clock.wall())?;
         Ok(self.store.append_events(session, &events).await?)
     }
 
-    /// Refuses to unblind while something may be outstanding, unless that is known.
-    async fn ask_first(&self, session: SessionId, grace: Grace, action: &Action) -> Result<(), ConductError> {
-        if !matches!(action, Action::Unblind { despite_outstanding: false, .. }) {
-            return Ok(());
-        }
-        match self.outstanding(session, grace).await? {
-            None => Ok(()),
-            Some(outstanding) => {
-                let text = format!("{outstanding}; to unblind all the same, confirm it (despite_outstanding)");
-                Err(ConductError::Conflict(text))
-            }
-        }
-    }
-
-    /// What may still come in for `session`, whose grace is `grace`, which unblinding would keep from counting.
-    pub(super) async fn outstanding(
-        &self,
-        session: SessionId,
-        grace: Grace,
-    ) -> Result<Option<Outstanding>, ConductError> {
-        let devices = self.store.reader().surgeon_devices(session).await?;
-        let told = |device: &DeviceReport| device.told.map(|(holding, run, at)| (holding, self.clocks.wall(run, at)));
-        Ok(grace.outstanding(self.time(self.clock.now()), devices.iter().map(told)))
-    }
-
-    /// `at`, a moment of this run, on the time that goes on over the server's restarts.
-    pub(super) fn time(&self, at: Moment) -> Timestamp {
-        self.clocks.wall(self.store.run(), at)
-    }
-
-    pub(super) fn run_clock(&self) -> RunClock {
-        RunClock { clocks: Arc::clone(&self.clocks), run: self.store.run() }
-    }
-
     pub(super) async fn load(&self, session: SessionId) -> Result<Course, ConductError> {
-        let course = Course::load(self.store.reader(), &self.run_clock(), session).await?;
+        let course = Course::load(self.store.reader(), &self.run_clock, session).await?;
         course.ok_or_else(ConductError::no_session)
     }
 
@@ -250,7 +196,7 @@ impl Shared {
 
     pub(super) fn publish(&self, live: &Live) {
         let now = self.clock.now();
-        let shown = live.course.as_ref().filter(|course| !course.dismissed);
+        let shown = live.shown();
         let because = live.unrecorded_because.as_deref();
         let (surgeon, operator) = shown.map(|course| views::both(course, because, now)).unzip();
         replace_if_changed(&self.surgeon, surgeon);

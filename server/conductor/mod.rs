@@ -4,9 +4,11 @@
 //! until then.
 
 mod allocate;
+mod circumstances;
 mod course;
 mod flow;
 mod keeping;
+mod lens;
 mod library;
 mod remarks;
 mod reports;
@@ -26,11 +28,13 @@ use crate::autofocus::Registry;
 use crate::clock::Clock;
 use crate::control::{Command, ControlHandle};
 use crate::ids::SessionId;
-use crate::store::{RunClocks, Store, StoreError};
+use crate::store::{Store, StoreError};
 use crate::trial::action::Action;
+use crate::trial::permission::{self, CurrentSession, Request};
+use crate::trial::phase::Phase;
+use crate::trial::refusal::Refusal;
 use crate::trial::remark::{Holding, NewAnswer, NewComment};
 use crate::trial::role::Role;
-use crate::trial::session::Refusal;
 use crate::trial::view::{OperatorView, SurgeonView};
 use course::{Course, RunClock};
 
@@ -67,7 +71,7 @@ struct Shared {
     registry: Registry,
     clock: Arc<dyn Clock>,
     /// The clocks of this start of the server and of those before.
-    clocks: Arc<RunClocks>,
+    run_clock: RunClock,
     /// The session in memory. Held for moments and never while the disk is waited for: to stop the lens takes it.
     live: std::sync::Mutex<Live>,
     /// Held from the decision on something to its commit, so that what is decided is decided on what is on disk, and
@@ -93,6 +97,16 @@ impl Live {
     /// The session in memory, if it is `session`.
     fn course_of(&mut self, session: SessionId) -> Option<&mut Course> {
         self.course.as_mut().filter(|course| course.session() == session)
+    }
+
+    /// The session on the screens.
+    fn shown(&self) -> Option<&Course> {
+        self.course.as_ref().filter(|course| !course.dismissed)
+    }
+
+    /// Where that session stands.
+    fn shown_phase(&self) -> Option<Phase> {
+        self.shown().map(|course| course.state.phase())
     }
 
     /// Lets go of a session that was closed, once the disk has all of it.
@@ -173,10 +187,10 @@ impl Conductor {
     pub async fn open(parts: Parts) -> Result<Self, ConductError> {
         let Parts { store, control, library, registry, clock, random, mut practice_random } = parts;
         practice_random.set_stream(u64::try_from(store.run()).unwrap_or_default());
-        let clocks = Arc::new(store.reader().run_clocks().await?);
-        let clock_of_run = RunClock { clocks: Arc::clone(&clocks), run: store.run() };
+        let run_clock = RunClock { clocks: Arc::new(store.reader().run_clocks().await?), run: store.run() };
+
         let course = match store.reader().session_under_way().await? {
-            Some(session) => Course::load(store.reader(), &clock_of_run, session).await?,
+            Some(session) => Course::load(store.reader(), &run_clock, session).await?,
             None => None,
         };
         let shared = Shared {
@@ -185,7 +199,7 @@ impl Conductor {
             library,
             registry,
             clock,
-            clocks,
+            run_clock,
             live: std::sync::Mutex::new(Live { course: None, commanded: None, unrecorded_because: None }),
             pen: Mutex::new(Pen { random, practice_random }),
             surgeon: watch::Sender::new(None),
@@ -233,12 +247,11 @@ impl Conductor {
     /// # Errors
     /// When it has not ended, or `by` is not the operator.
     pub fn dismiss(&self, by: Role, session: SessionId) -> Result<(), ConductError> {
-        operator_only(by)?;
         let mut live = self.shared.live();
+        let phase = live.course_of(session).map(|course| course.state.phase());
+        permission::check(by, Request::CloseSession, CurrentSession::of(phase))?;
+
         if let Some(course) = live.course_of(session) {
-            if !course.state.ended() {
-                return Err(ConductError::Conflict("the session is under way; abort it to end it".to_owned()));
-            }
             course.dismissed = true;
         }
         live.forget_what_is_done_with();
@@ -280,8 +293,4 @@ impl Conductor {
         let stopped = |_| Err(ConductError::Storage("the server was stopped meanwhile; try again".to_owned()));
         tokio::spawn(work(Arc::clone(&self.shared))).await.unwrap_or_else(stopped)
     }
-}
-
-fn operator_only(by: Role) -> Result<(), ConductError> {
-    if by == Role::Operator { Ok(()) } else { Err(ConductError::Forbidden("only the operator can do this".to_owned())) }
 }

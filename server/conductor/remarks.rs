@@ -29,7 +29,7 @@ impl Shared {
             frame: new.frame,
             frame_run: new.run.filter(|run| (1..=self.store.run()).contains(run)),
             origin: new.origin.plausible(),
-            late: grace.is_late(self.time(stamp.at)),
+            late: grace.is_late(self.run_clock.time(stamp.at)),
             stamp,
             said: new.said,
         };
@@ -70,7 +70,7 @@ impl Shared {
         if kept == Kept::New
             && let Some(course) = live.course_of(answer.session)
         {
-            let given = answer.given(self.store.run(), &self.clocks);
+            let given = answer.given(self.run_clock.run, &self.run_clock.clocks);
             course.state.keep_answer(answer.segment, &answer.question, given);
             self.publish(&live);
         }
@@ -101,7 +101,7 @@ impl Shared {
     fn stamped(&self, new: NewAnswer, grace: Grace) -> Answer {
         let NewAnswer { key, session, segment, question, value, origin } = new;
         let stamp = self.stamp();
-        let late = grace.is_late(self.time(stamp.at));
+        let late = grace.is_late(self.run_clock.time(stamp.at));
         Answer { key, session, segment, question, value, origin: origin.plausible(), late, stamp }
     }
 
@@ -109,7 +109,7 @@ impl Shared {
     /// can still be read, so that a late comment on it is kept.
     async fn of_earlier(&self, session: SessionId) -> Result<(Vec<SegmentId>, Grace), ConductError> {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
-        let grace = stored.grace(&self.clocks);
+        let grace = stored.grace(&self.run_clock.clocks);
         Ok((stored.made.segments.into_iter().map(|(segment, _)| segment).collect(), grace))
     }
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::course::Course;
-use super::{ConductError, Conductor, ProtocolSummary, operator_only};
+use super::{ConductError, Conductor, ProtocolSummary};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
 use crate::store::{DeviceEvent, Participant, Reader, SessionLine, standings};
@@ -13,6 +13,7 @@ use crate::trial::answers::sus_score;
 use crate::trial::event::EventKind;
 use crate::trial::grace::Outstanding;
 use crate::trial::participant::ParticipantCode;
+use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::question::{AnswerValue, QuestionKind};
 use crate::trial::role::Role;
 use crate::trial::view::LogLine;
@@ -115,9 +116,7 @@ impl Conductor {
     /// # Errors
     /// When `code` is no code, or the disk failed.
     pub async fn add_participant(&self, by: Role, code: &str) -> Result<(), ConductError> {
-        if by != Role::Researcher {
-            operator_only(by)?;
-        }
+        permission::check(by, Request::AddParticipant, CurrentSession::None)?;
         let code = ParticipantCode::new(code).map_err(|error| ConductError::Invalid(error.to_string()))?;
         Ok(self.shared.store.add_participant(code.as_str(), self.shared.clock.wall()).await?)
     }
@@ -162,7 +161,7 @@ impl Conductor {
     /// What happened in the session, and to camera and lens since it was made.
     async fn log(&self, course: &Course) -> Result<Vec<LogLine>, ConductError> {
         let reader = self.shared.store.reader();
-        let clocks = &self.shared.clocks;
+        let clocks = &self.shared.run_clock.clocks;
         let events = reader.events(course.session()).await?;
         let devices = reader.device_events(course.session()).await?;
 
@@ -185,7 +184,7 @@ impl Conductor {
     }
 
     async fn answer_lines(&self, course: &Course) -> Result<Vec<AnswerLine>, ConductError> {
-        let clocks = &self.shared.clocks;
+        let clocks = &self.shared.run_clock.clocks;
         let answers = self.shared.store.reader().answers(course.session()).await?;
         let standings = standings(&answers, clocks);
 

@@ -118,7 +118,7 @@ impl Conductor {
     pub async fn timeline(&self, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
         let course = self.shared.load(session).await?;
         let reader = self.shared.store.reader();
-        let runs = &self.shared.clocks;
+        let runs = &self.shared.run_clock.clocks;
         let events = reader.events(session).await?;
         let events: Vec<(Timestamp, Event)> =
             events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();

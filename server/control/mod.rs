@@ -198,7 +198,24 @@ pub struct ControlHandle {
     pub camera: Option<Controls>,
 }
 
+/// What can be seen of the loop, without the right to command it.
+#[derive(Clone)]
+pub struct ControlObserver {
+    /// The loop's state.
+    pub status: watch::Receiver<Arc<ControlStatus>>,
+    /// The latest frame.
+    pub frames: Arc<LatestSlot<ControlledFrame>>,
+    /// The camera's settings, where it has any.
+    pub camera: Option<Controls>,
+}
+
 impl ControlHandle {
+    /// The same without the right to command the loop.
+    #[must_use]
+    pub fn observer(&self) -> ControlObserver {
+        ControlObserver { status: self.status.clone(), frames: Arc::clone(&self.frames), camera: self.camera.clone() }
+    }
+
     /// Tells the loop something; what is sent after the loop's end is dropped.
     pub fn send(&self, command: Command) {
         let _ = self.commands.send(command);

@@ -17,11 +17,10 @@ use super::roles::{Operator, Roles};
 use super::security::Nonce;
 use super::surgeon::Act;
 use super::{App, AppState};
-use crate::autofocus::{PolicyEntry, PolicyError, PolicyName};
+use crate::autofocus::PolicyEntry;
 use crate::conductor::ProtocolSummary;
-use crate::control::{Command, Drive};
 use crate::ids::SessionId;
-use crate::lens::FocalPower;
+use crate::trial::action::Focus;
 use crate::trial::role::Role;
 use crate::trial::view::OperatorView;
 
@@ -92,16 +91,6 @@ async fn codes(app: &App) -> Result<Vec<String>, Error> {
     Ok(participants.into_iter().map(|participant| participant.code).collect())
 }
 
-/// Who is to focus outside sessions.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-enum Focus {
-    /// Nobody: the lens goes to this focal power, 0..=1, and stays.
-    FocalPower(f64),
-    /// A policy.
-    Policy(String),
-}
-
 /// Lets a policy focus, or sets the focal power by hand. Not while a session is under way.
 #[utoipa::path(post, path = "/api/operator/focus", tag = "operator", request_body = Focus, responses(
     (status = 204, description = "Done"),
@@ -112,27 +101,8 @@ async fn focus(
     State(app): State<AppState>,
     JsonBody(focus): JsonBody<Focus>,
 ) -> Result<StatusCode, Error> {
-    if app.blinded() {
-        return Err(Error::Conflict("A session is under way: it decides who focuses until it is closed.".into()));
-    }
-    let drive = match focus {
-        Focus::FocalPower(value) => {
-            Drive::Manual(FocalPower::new(value).map_err(|error| Error::Invalid(error.to_string()))?)
-        }
-        Focus::Policy(name) => policy(&app, &name)?,
-    };
-    app.control.send(Command::Drive { drive, segment: None });
+    app.conductor.focus(Role::Operator, &focus)?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// Refuses here what the loop could only refuse without an answer.
-fn policy(app: &App, name: &str) -> Result<Drive, Error> {
-    let name = PolicyName::new(name);
-    match app.registry.build(&name) {
-        Ok(_) => Ok(Drive::Policy { name, start: None }),
-        Err(error @ PolicyError::Unknown { .. }) => Err(Error::NotFound(error.to_string())),
-        Err(error) => Err(Error::Conflict(error.to_string())),
-    }
 }
 
 /// A participant to be added.

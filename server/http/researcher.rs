@@ -21,8 +21,9 @@ use super::security::Nonce;
 use crate::autofocus::PolicyName;
 use crate::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
 use crate::ids::SessionId;
-use crate::store::{SessionLine, SessionStatus};
+use crate::store::SessionLine;
 use crate::trial::action::Action;
+use crate::trial::phase::SessionStatus;
 use crate::trial::question::AnswerValue;
 use crate::trial::role::Role;
 

@@ -11,17 +11,19 @@ use super::keys::Keys;
 use crate::autofocus::Registry;
 use crate::clock::Clock;
 use crate::conductor::Conductor;
-use crate::control::ControlHandle;
+use crate::control::ControlObserver;
 use crate::live::LiveHandle;
 use crate::store::Store;
+use crate::trial::permission::{CurrentSession, may_see_focal_power};
+use crate::trial::role::Role;
 use crate::trial::view::{OperatorView, SurgeonView};
 
 /// The server's parts, made once at start.
 pub struct App {
     /// Both clocks.
     pub clock: Arc<dyn Clock>,
-    /// The control loop.
-    pub control: ControlHandle,
+    /// The control loop as far as it can be seen. People command the lens through the conductor alone.
+    pub control: ControlObserver,
     /// Pictures.
     pub live: LiveHandle,
     /// The database.
@@ -59,9 +61,10 @@ pub struct Metrics {
 pub type AppState = Arc<App>;
 
 impl App {
-    /// Whether a session is under way or its end is still shown: then nobody is told which policy runs.
+    /// Whether what tells policies apart is now kept from operator and researcher too.
     #[must_use]
     pub fn blinded(&self) -> bool {
-        self.operator_view.borrow().is_some()
+        let phase = self.operator_view.borrow().as_ref().map(|view| view.surgeon.phase);
+        !may_see_focal_power(Role::Operator, CurrentSession::of(phase))
     }
 }

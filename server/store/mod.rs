@@ -38,7 +38,6 @@ pub use reader::Reader;
 pub use remarks::Kept;
 pub use rows::*;
 pub use sessions::{NewSession, StoredSession};
-pub use sets::SetMember;
 
 /// The migrations, each with its way down.
 pub static MIGRATOR: Migrator = sqlx::migrate!("./migrations");

@@ -10,11 +10,11 @@ use sqlx::{Row, migrate::Migrate};
 
 use super::sessions::{parsed, stamp};
 use super::{
-    DATABASE, DeviceEvent, MIGRATOR, Participant, PathPoint, RunClocks, SessionLine, SessionStatus, Stamp, StoreError,
-    moment,
+    DATABASE, DeviceEvent, MIGRATOR, Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError, moment,
 };
 use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
+use crate::trial::phase::SessionStatus;
 
 /// A database open for reading. Clone freely.
 #[derive(Clone, Debug)]

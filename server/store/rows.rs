@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 
 use crate::clock::Moment;
 use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
+use crate::trial::phase::SessionStatus;
 use crate::trial::question::AnswerValue;
 use crate::trial::remark::{Origin, Said};
 use crate::trial::standing::{Given, Standing, by_question};
@@ -134,18 +135,6 @@ pub struct SessionLine {
     pub unblinded: bool,
     /// Whether that was while it was under way.
     pub emergency: bool,
-}
-
-/// How far a session came.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum SessionStatus {
-    /// Neither completed nor aborted.
-    UnderWay,
-    /// Every answer is in.
-    Completed,
-    /// Ended early.
-    Aborted,
 }
 
 /// A point of a session's focal path. No metric and no timing: those differ by policy.

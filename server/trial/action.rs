@@ -1,4 +1,4 @@
-//! What moves a session on.
+//! What people do: actions that move a session on, and, outside sessions, who is to focus.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -58,4 +58,14 @@ impl Action {
     pub const fn stops_the_lens(&self) -> bool {
         matches!(self, Self::FinishSegment { .. } | Self::Pause { .. } | Self::Abort { .. })
     }
+}
+
+/// Who is to focus outside sessions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Focus {
+    /// Nobody: the lens goes to this focal power, 0..=1, and stays.
+    FocalPower(f64),
+    /// A policy.
+    Policy(String),
 }

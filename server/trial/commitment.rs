@@ -4,6 +4,7 @@
 use sha2::{Digest, Sha256};
 
 use super::allocation::{Algorithm, Seed};
+use super::protocol::Protocol;
 use crate::autofocus::PolicyName;
 use crate::ids::SessionId;
 
@@ -25,6 +26,15 @@ pub struct Allocation {
 }
 
 impl Allocation {
+    /// Draws the order of a new `session` by `protocol`: that of place `index` among the sessions that share `seed`.
+    #[must_use]
+    pub fn draw(session: SessionId, protocol: &Protocol, seed: Seed, index: usize) -> Self {
+        let algorithm = protocol.order.algorithm();
+        let order = algorithm.draw(seed, protocol.policies.len(), protocol.repeats, index);
+        let schedule = order.into_iter().map(|policy| protocol.policies[policy].clone()).collect();
+        Self { session, algorithm, seed, index, protocol_sha256: protocol.sha256(), schedule }
+    }
+
     /// The text that is hashed: seven lines, each ended by a line feed.
     #[must_use]
     pub fn statement(&self) -> String {

@@ -1,4 +1,4 @@
-//! The phases of a session.
+//! Where a session stands: its phases, and how far it came.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -29,4 +29,16 @@ impl Phase {
     pub const fn has_ended(self) -> bool {
         matches!(self, Self::Completed | Self::Aborted)
     }
+}
+
+/// How far a session came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SessionStatus {
+    /// Neither completed nor aborted.
+    UnderWay,
+    /// Every answer is in.
+    Completed,
+    /// Ended early.
+    Aborted,
 }

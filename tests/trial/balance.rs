@@ -73,11 +73,11 @@ async fn unblinding_closes_the_set_and_its_seed_is_told_when_all_of_it_are_unbli
     let second = bench.whole_session("balanced").await;
     bench.unblind(first).await;
     let seed = made(&bench, first).await.seed;
-    assert!(!bench.store.reader().set_unblinded(seed).await.unwrap());
+    assert!(!bench.store.reader().balanced_set(seed).await.unwrap().may_tell_seed());
     let third = bench.whole_session("balanced").await;
     assert!(made(&bench, third).await.seed != seed, "the order of the first tells those of its set apart");
     bench.unblind(second).await;
-    assert!(bench.store.reader().set_unblinded(seed).await.unwrap());
+    assert!(bench.store.reader().balanced_set(seed).await.unwrap().may_tell_seed());
 }
 
 #[tokio::test]

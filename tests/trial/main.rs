@@ -4,6 +4,7 @@ mod balance;
 mod bench;
 mod exports;
 mod late;
+mod lens;
 mod remarks;
 mod sessions;
 mod storage;

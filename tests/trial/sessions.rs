@@ -8,9 +8,8 @@ use parfocal::autofocus::PolicyName;
 use parfocal::conductor::ConductError;
 use parfocal::control::{Command, Drive};
 use parfocal::lens::FocalPower;
-use parfocal::store::SessionStatus;
 use parfocal::trial::action::Action;
-use parfocal::trial::phase::Phase;
+use parfocal::trial::phase::{Phase, SessionStatus};
 use parfocal::trial::role::Role;
 
 use crate::bench::{Bench, PARTICIPANT};

@@ -26,7 +26,7 @@ impl Unblinded {
             _ => None,
         });
         let Some(reason) = reason else { return Ok(None) };
-        let seed_told = reader.set_unblinded(stored.made.seed).await?;
+        let seed_told = reader.balanced_set(stored.made.seed).await?.may_tell_seed();
         Ok(Some(Self { made: stored.made.clone(), reason, seed_told }))
     }
 

@@ -11,27 +11,11 @@ use crate::trial::answers::is_whole;
 use crate::trial::event::EventKind;
 use crate::trial::phase::Phase;
 use crate::trial::question::Question;
+use crate::trial::refusal::Refusal;
 use crate::trial::role::Role;
 
 /// Longest reason, characters.
 const LONGEST_REASON: usize = 1000;
-
-/// Why an action was not done; nothing was changed.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Refusal {
-    /// Another role does this.
-    #[error("{0}")]
-    NotAllowed(String),
-    /// The session has no such segment.
-    #[error("this session has no such setting; reload the page")]
-    UnknownSegment,
-    /// It does not fit where the session stands.
-    #[error("{0}")]
-    Conflict(String),
-    /// What was sent makes no sense.
-    #[error("{0}")]
-    Invalid(String),
-}
 
 /// The events that `action` by `by` brings about at `now`; none when it was done before (a double click, a stale tab).
 ///
@@ -82,7 +66,7 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
         }
         Action::Unblind { .. } => ("the researcher", by == Role::Researcher),
     };
-    if fits { Ok(()) } else { Err(Refusal::NotAllowed(format!("only {who} can do this"))) }
+    if fits { Ok(()) } else { Err(Refusal::only(who)) }
 }
 
 /// Where `segment` stands to the one under way: already left (`None`), or under way and not paused.
@@ -92,10 +76,10 @@ fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Re
         return Ok(None);
     }
     if state.phase == Phase::Aborted {
-        return Err(conflict("the session was aborted"));
+        return Err(Refusal::conflict("the session was aborted"));
     }
     if position > state.done || state.segment().is_none() {
-        return Err(conflict("this setting has not been reached"));
+        return Err(Refusal::conflict("this setting has not been reached"));
     }
     Ok(Some(state.phase))
 }
@@ -112,7 +96,7 @@ fn acknowledge(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind
 
 fn finish_segment(state: &SessionState, segment: SegmentId, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     match current(state, segment)? {
-        Some(Phase::Notice) => Err(conflict("this setting has not begun")),
+        Some(Phase::Notice) => Err(Refusal::conflict("this setting has not begun")),
         Some(Phase::Inspecting) => {
             going_on(state)?;
             Ok(finish(state, segment, state.inspected(now)))
@@ -128,7 +112,7 @@ fn finish_questions(state: &SessionState, segment: SegmentId) -> Result<Vec<Even
             answered(state, Some(segment), &state.plan.after_segment)?;
             Ok(with_completion(state, EventKind::QuestionsFinished { segment: Some(segment) }))
         }
-        Some(_) => Err(conflict("the questions on this setting have not been asked")),
+        Some(_) => Err(Refusal::conflict("the questions on this setting have not been asked")),
         None => Ok(Vec::new()),
     }
 }
@@ -141,7 +125,7 @@ fn finish_closing(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
             answered(state, None, &state.plan.closing)?;
             Ok(vec![EventKind::QuestionsFinished { segment: None }, EventKind::Completed])
         }
-        _ => Err(conflict("the closing questions have not been asked")),
+        _ => Err(Refusal::conflict("the closing questions have not been asked")),
     }
 }
 
@@ -160,8 +144,8 @@ fn with_completion(state: &SessionState, last: EventKind) -> Vec<EventKind> {
 
 fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     match state.phase {
-        Phase::Ready => return Err(conflict("the session has not started")),
-        Phase::Completed | Phase::Aborted => return Err(conflict("the session has ended")),
+        Phase::Ready => return Err(Refusal::conflict("the session has not started")),
+        Phase::Completed | Phase::Aborted => return Err(Refusal::conflict("the session has ended")),
         _ => {}
     }
     if state.paused == Some(PauseCause::Operator) {
@@ -174,7 +158,7 @@ fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKin
 fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     let reason = needed(reason_text(reason)?)?;
     match state.phase {
-        Phase::Completed => return Err(conflict("the session is complete; nothing is left to abort")),
+        Phase::Completed => return Err(Refusal::conflict("the session is complete; nothing is left to abort")),
         Phase::Aborted => return Ok(Vec::new()),
         _ => {}
     }
@@ -196,7 +180,7 @@ fn answered(state: &SessionState, segment: Option<SegmentId>, questions: &[Quest
 }
 
 fn going_on(state: &SessionState) -> Result<(), Refusal> {
-    if state.paused.is_some() { Err(conflict("the session is paused")) } else { Ok(()) }
+    if state.paused.is_some() { Err(Refusal::conflict("the session is paused")) } else { Ok(()) }
 }
 
 fn reason_text(reason: &str) -> Result<String, Refusal> {
@@ -213,10 +197,6 @@ fn needed(reason: String) -> Result<String, Refusal> {
     } else {
         Ok(reason)
     }
-}
-
-fn conflict(text: &str) -> Refusal {
-    Refusal::Conflict(text.to_owned())
 }
 
 fn milliseconds(duration: Duration) -> u64 {

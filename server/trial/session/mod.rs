@@ -17,7 +17,7 @@ mod tests;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-pub use decide::{Refusal, decide, decide_restart, decide_time};
+pub use decide::{decide, decide_restart, decide_time};
 
 use super::event::{Event, EventKind};
 use super::phase::Phase;

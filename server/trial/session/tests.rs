@@ -9,6 +9,7 @@ use uuid::Uuid;
 use super::*;
 use crate::trial::action::Action;
 use crate::trial::question::QuestionKind;
+use crate::trial::refusal::Refusal;
 use crate::trial::role::Role;
 
 fn segment(number: usize) -> SegmentId {

@@ -1,0 +1,58 @@
+//! What the rule of unblinding asks for, gathered from the database.
+
+use super::course::Course;
+use super::{ConductError, Pen, Shared};
+use crate::ids::SessionId;
+use crate::store::DeviceReport;
+use crate::trial::action::Action;
+use crate::trial::allocation::Seed;
+use crate::trial::grace::{Grace, Outstanding};
+use crate::trial::unblinding::Circumstances;
+
+/// What of a session is needed to look up the circumstances of an action on it.
+#[derive(Clone, Copy)]
+pub(super) struct Subject {
+    session: SessionId,
+    seed: Seed,
+    grace: Grace,
+}
+
+impl Subject {
+    pub const fn of(course: &Course) -> Self {
+        Self { session: course.session(), seed: course.made.seed, grace: course.grace }
+    }
+}
+
+impl Shared {
+    /// The circumstances that bear on `action`. Only unblinding asks for any.
+    pub(super) async fn circumstances(
+        &self,
+        pen: &mut Pen,
+        subject: Subject,
+        action: &Action,
+    ) -> Result<Circumstances, ConductError> {
+        if !matches!(action, Action::Unblind { .. }) {
+            return Ok(Circumstances::default());
+        }
+
+        // The database has to know whether the session in memory has ended: it may be of the same set.
+        self.record_stops(pen).await?;
+        let set = self.store.reader().balanced_set(subject.seed).await?;
+        let outstanding = self.outstanding(subject.session, subject.grace).await?;
+        Ok(Circumstances { set: Some(set), outstanding })
+    }
+
+    /// What may still come in for `session`, whose grace is `grace`, and would not count after unblinding.
+    pub(super) async fn outstanding(
+        &self,
+        session: SessionId,
+        grace: Grace,
+    ) -> Result<Option<Outstanding>, ConductError> {
+        let devices = self.store.reader().surgeon_devices(session).await?;
+        let clocks = &self.run_clock.clocks;
+        let told = |device: &DeviceReport| device.told.map(|(holding, run, at)| (holding, clocks.wall(run, at)));
+
+        let now = self.run_clock.time(self.clock.now());
+        Ok(grace.outstanding(now, devices.iter().map(told)))
+    }
+}

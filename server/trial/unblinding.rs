@@ -1,0 +1,168 @@
+//! When a session may be unblinded.
+
+use super::action::Action;
+use super::balanced_set::BalancedSet;
+use super::event::EventKind;
+use super::grace::Outstanding;
+use super::refusal::Refusal;
+use super::role::Role;
+use super::session::{SessionState, decide};
+use crate::clock::Moment;
+use crate::ids::SessionId;
+
+/// What bears on an action besides the session's own state. Only unblinding asks for any of it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Circumstances {
+    /// The sessions that share the session's seed, the session included.
+    pub set: Option<BalancedSet>,
+    /// What may still come in for the session, and would not count after unblinding.
+    pub outstanding: Option<Outstanding>,
+}
+
+impl Circumstances {
+    /// The events that `action` by `by` on `session` brings about at `now`. None where it was done before.
+    ///
+    /// # Errors
+    /// When `by` may not, the action does not fit where the session stands, or it does not fit these circumstances.
+    pub fn decide(
+        &self,
+        session: SessionId,
+        state: &SessionState,
+        by: Role,
+        action: &Action,
+        now: Moment,
+    ) -> Result<Vec<EventKind>, Refusal> {
+        // Whoever may not is told so first, and nothing of other sessions.
+        let events = decide(state, by, action, now)?;
+
+        if let Action::Unblind { despite_outstanding, .. } = action
+            && !events.is_empty()
+        {
+            self.check_unblinding(session, *despite_outstanding)?;
+        }
+        Ok(events)
+    }
+
+    fn check_unblinding(&self, session: SessionId, despite_outstanding: bool) -> Result<(), Refusal> {
+        if let Some(set) = &self.set {
+            set.check_unblinding(session)?;
+        }
+
+        match &self.outstanding {
+            Some(outstanding) if !despite_outstanding => Err(Refusal::Conflict(format!(
+                "{outstanding}; to unblind all the same, confirm it (despite_outstanding)"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use jiff::Timestamp;
+    use uuid::Uuid;
+
+    use super::*;
+    use crate::trial::allocation::Seed;
+    use crate::trial::balanced_set::Member;
+    use crate::trial::event::Event;
+    use crate::trial::phase::SessionStatus;
+    use crate::trial::session::Plan;
+
+    const SESSION: SessionId = SessionId(Uuid::from_u128(1));
+    const OTHER: SessionId = SessionId(Uuid::from_u128(2));
+
+    fn now() -> Moment {
+        Moment::from_nanos(1)
+    }
+
+    /// A session that ended with the last of `kinds`.
+    fn state(kinds: impl IntoIterator<Item = EventKind>) -> SessionState {
+        let plan = Plan {
+            segments: Vec::new(),
+            limit: Duration::from_mins(1),
+            after_segment: Vec::new(),
+            closing: Vec::new(),
+        };
+        let mut state = SessionState::new(plan);
+        for (kind, number) in kinds.into_iter().zip(1..) {
+            state.apply(&Event { number, by: Role::System, at: now(), wall: Timestamp::UNIX_EPOCH, kind });
+        }
+        state
+    }
+
+    fn completed() -> SessionState {
+        state([EventKind::Created, EventKind::Started, EventKind::Completed])
+    }
+
+    fn unblind(despite_outstanding: bool) -> Action {
+        Action::Unblind { reason: "the study is over".to_owned(), despite_outstanding }
+    }
+
+    fn member(session: SessionId, place: usize, status: SessionStatus) -> Member {
+        let made = Timestamp::UNIX_EPOCH;
+        Member { session, participant: "S-01".to_owned(), made, place, status, unblinded: false }
+    }
+
+    /// Another session of the set is under way.
+    fn other_under_way() -> Circumstances {
+        let members = vec![member(SESSION, 0, SessionStatus::Completed), member(OTHER, 1, SessionStatus::UnderWay)];
+        Circumstances { set: Some(BalancedSet { seed: Seed([7; 32]), members }), outstanding: None }
+    }
+
+    /// A surgeon's device has not said that it is empty.
+    fn device_silent() -> Circumstances {
+        Circumstances { set: None, outstanding: Some(Outstanding { counts_until: None, devices: 1 }) }
+    }
+
+    fn decided(
+        circumstances: &Circumstances,
+        state: &SessionState,
+        by: Role,
+        action: &Action,
+    ) -> Result<usize, Refusal> {
+        circumstances.decide(SESSION, state, by, action, now()).map(|events| events.len())
+    }
+
+    #[test]
+    fn a_session_is_unblinded_where_nothing_stands_against_it() {
+        assert_eq!(decided(&Circumstances::default(), &completed(), Role::Researcher, &unblind(false)), Ok(1));
+    }
+
+    #[test]
+    fn a_session_is_not_unblinded_where_its_order_would_tell_another() {
+        for despite_outstanding in [false, true] {
+            let refused =
+                decided(&other_under_way(), &completed(), Role::Researcher, &unblind(despite_outstanding)).unwrap_err();
+            assert!(refused.to_string().contains("same balanced set"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn what_is_outstanding_refuses_unblinding_until_it_is_confirmed() {
+        let refused = decided(&device_silent(), &completed(), Role::Researcher, &unblind(false)).unwrap_err();
+        assert!(refused.to_string().contains("despite_outstanding"), "{refused}");
+        assert_eq!(decided(&device_silent(), &completed(), Role::Researcher, &unblind(true)), Ok(1));
+    }
+
+    #[test]
+    fn who_may_not_unblind_learns_nothing_of_other_sessions() {
+        for by in [Role::Surgeon, Role::Operator, Role::System] {
+            let refused = decided(&other_under_way(), &completed(), by, &unblind(false)).unwrap_err();
+            assert_eq!(refused, Refusal::only("the researcher"), "{by:?}");
+        }
+    }
+
+    #[test]
+    fn what_was_unblinded_before_and_other_actions_ask_for_no_circumstances() {
+        let emergency = false;
+        let unblinded = EventKind::Unblinded { reason: "over".to_owned(), emergency };
+        let done = state([EventKind::Created, EventKind::Started, EventKind::Completed, unblinded]);
+        assert_eq!(decided(&other_under_way(), &done, Role::Researcher, &unblind(false)), Ok(0));
+
+        let ready = state([EventKind::Created]);
+        assert_eq!(decided(&other_under_way(), &ready, Role::Operator, &Action::Start), Ok(1));
+    }
+}
