@@ -65,7 +65,8 @@ impl Shared {
         Ok(protocol.clone())
     }
 
-    /// The seed, and the place in the set that shares it: the first free place of a set that is still open, or a fresh seed.
+    /// The seed, and the place in the set that shares it: the first free place of a set that is
+    /// still open, or a fresh seed.
     async fn draw_place(&self, protocol: &Protocol, random: &mut ChaCha12Rng) -> Result<(Seed, usize), ConductError> {
         let algorithm = protocol.order.algorithm();
         let size = algorithm.set_size(protocol.policies.len());

@@ -35,14 +35,16 @@ impl Shared {
             return Ok(Circumstances::default());
         }
 
-        // The database has to know whether the session in memory has ended: it may be of the same set.
+        // The database has to know whether the session in memory has ended: it may be of the same
+        // set.
         self.record_stops(pen).await?;
         let set = self.store.reader().balanced_set(subject.seed).await?;
         let outstanding = self.outstanding(subject.session, subject.grace).await?;
         Ok(Circumstances { set: Some(set), outstanding })
     }
 
-    /// What may still come in for `session`, whose grace is `grace`, and would not count after unblinding.
+    /// What may still come in for `session`, whose grace is `grace`, and would not count after
+    /// unblinding.
     pub(super) async fn outstanding(
         &self,
         session: SessionId,

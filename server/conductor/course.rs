@@ -1,5 +1,5 @@
-//! A session in memory: what was made, where it stands, what was said; what of it the disk has yet to take; and what it
-//! asks of the control loop.
+//! A session in memory: how it was made, where it stands, what was said, what of it is not on disk
+//! yet, and what it asks of the control loop.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -50,7 +50,7 @@ pub(super) struct Course {
     recorded: usize,
     /// What led to the events that are not, oldest first.
     stops: Vec<Stop>,
-    /// Whether further events are on their way to the disk, which are in the state only once they are on it.
+    /// Whether further events are being written. They change the state once they are on disk.
     writing: bool,
     /// Where the policy begins when it is next put in charge; none: where the lens is.
     begin_at: Option<FocalPower>,
@@ -72,8 +72,8 @@ impl RunClock {
     }
 }
 
-/// What stops the lens: somebody's action, or the time limit. It takes effect at once, and goes to the disk when the disk
-/// takes it.
+/// What stops the lens: somebody's action, or the time limit. It takes effect at once, and is
+/// recorded as soon as the disk takes it.
 #[derive(Debug, Clone)]
 struct Stop {
     by: Role,
@@ -115,7 +115,8 @@ impl Course {
         }
     }
 
-    /// Session `session` as the database has it, or `None`; `clock` is this run's, and knows those before.
+    /// Session `session` as the database has it, or `None`; `clock` is this run's, and knows those
+    /// before.
     pub async fn load(reader: &Reader, clock: &RunClock, session: SessionId) -> Result<Option<Self>, ConductError> {
         let Some(stored) = reader.session(session).await? else { return Ok(None) };
         let protocol =
@@ -152,7 +153,8 @@ impl Course {
         self.interrupted_at = Some(focal_power);
     }
 
-    /// The events that `action` brings about, to be written to the disk; [`Course::written`] says what became of them.
+    /// The events that `action` brings about, to be written to the disk; [`Course::written`] says
+    /// what became of them.
     ///
     /// # Errors
     /// When `by` may not, or the action does not fit where the session stands or the circumstances.
@@ -169,8 +171,9 @@ impl Course {
         Ok(self.number(by, kinds, at, wall))
     }
 
-    /// Takes in the events that are now on the disk; none where it did not take them. What stopped the session in the
-    /// meantime comes after them and is decided anew: a pause while the session was being resumed pauses it again.
+    /// Takes in `events`, which are now on disk; none where writing failed. What stopped the
+    /// session in the meantime comes after them and is decided anew: a pause while the session was
+    /// being resumed pauses it again.
     pub fn written(&mut self, events: Vec<Event>) {
         self.writing = false;
         let mut recorded: Vec<(Timestamp, Event)> =
@@ -180,7 +183,7 @@ impl Course {
         self.replay(recorded);
 
         for stop in std::mem::take(&mut self.stops) {
-            // Refused: what it was to stop has ended meanwhile.
+            // It is refused where the session or setting that it was to stop has ended.
             let _ = self.take(stop);
         }
     }
@@ -196,7 +199,7 @@ impl Course {
     /// Ends the setting if its time is up; its events wait for the disk. Whether it did.
     pub fn keep_time(&mut self, at: Moment, wall: Timestamp) -> bool {
         let before = self.events.len();
-        // Nobody is refused anything by the time.
+        // The time limit is never refused.
         let _ = self.take(Stop { by: Role::System, action: None, at, wall });
         self.events.len() > before
     }
@@ -206,7 +209,8 @@ impl Course {
             Some(action) => decide(&self.state, stop.by, action, stop.at)?,
             None => decide_time(&self.state, stop.at),
         };
-        // What changes nothing now may do so after what is being written.
+        // An action that changes nothing now may change something once the events being written are
+        // there.
         if kinds.is_empty() && !(self.writing && stop.action.is_some()) {
             return Ok(());
         }
@@ -222,7 +226,8 @@ impl Course {
         (&self.events[self.recorded..], self.stops.len())
     }
 
-    /// Notes that the first `events` of those events are on the disk, and with them the first `stops` stops.
+    /// Notes that the first `events` of those events are on the disk, and with them the first
+    /// `stops` stops.
     pub fn recorded(&mut self, events: usize, stops: usize) {
         self.recorded += events;
         self.stops.drain(..stops);
@@ -243,7 +248,8 @@ impl Course {
         self.dismissed && !self.writing && !self.is_unrecorded()
     }
 
-    /// Begins anew with `events`, which are on the disk, each with when it happened by the server's clocks over its restarts.
+    /// Starts over with `events`, which are on disk, each with its time by the server's clocks over
+    /// its restarts.
     fn replay(&mut self, events: Vec<(Timestamp, Event)>) {
         self.recorded = events.len();
         self.state = self.state.replayed(&[]);
@@ -280,7 +286,8 @@ impl Course {
         self.latest_comments.push(CommentLine { at: comment.stamp.wall, setting, said: comment.said });
     }
 
-    /// Who is to drive the lens now, as a command to the control loop. None before the session's start and after its end.
+    /// Who is to drive the lens now, as a command to the control loop. None before the session's
+    /// start and after its end.
     pub fn lens_command(&self) -> Option<Command> {
         let segment = self.state.segment();
         let running = self.state.running();

@@ -1,5 +1,6 @@
-//! The way that everything goes. What moves a session on: decide, to disk, into the state, to the screens, to the
-//! control loop. What stops it: decide, into the state, to the control loop, and then to disk and the screens.
+//! The order in which things happen. An action that moves a session on: decide, write to disk,
+//! change the state, show it, tell the control loop. An action that stops it: decide, change the
+//! state, tell the control loop, and then write to disk and show it.
 
 use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -17,14 +18,15 @@ use crate::trial::phase::Phase;
 use crate::trial::role::Role;
 use crate::trial::session::decide_restart;
 
-/// How long the screens wait for the disk to take what stopped a session before they show it as not recorded yet.
+/// How long the screens wait for the disk to take what stopped a session before they show it as not
+/// recorded yet.
 const PROMPTLY: Duration = Duration::from_millis(300);
 
 /// The lens stays where it is, and no session's setting is under way.
 const HOLD: Command = Command::Drive { drive: Drive::Hold { at: None }, segment: None };
 
 impl Shared {
-    /// What is in memory. Never held while anything is waited for.
+    /// What is in memory. Never held while waiting for anything.
     pub(super) fn live(&self) -> MutexGuard<'_, Live> {
         self.live.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -43,11 +45,13 @@ impl Shared {
         }
     }
 
-    /// Does what waits for no disk: the lens is held when this returns, whatever becomes of the record.
+    /// Does what waits for no disk: the lens is held when this returns, whatever becomes of the
+    /// record.
     async fn stop(self: &Arc<Self>, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
         let stopped = {
             let mut live = self.live();
-            let (at, wall) = (self.clock.now(), self.clock.wall());
+            let at = self.clock.now();
+            let wall = self.clock.wall();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
             course.keep_time(at, wall);
             let stopped = course.stop(by, action.clone(), at, wall);
@@ -55,14 +59,14 @@ impl Shared {
             stopped
         };
 
-        // Also where this was refused: the time may have stopped something.
+        // Also when the action was refused: the time limit may have stopped something.
         self.record_promptly().await;
         self.show_and_drive();
         self.wake();
         Ok(stopped?)
     }
 
-    /// Does what is only done once it is on the disk.
+    /// Does what takes effect only once it is on disk.
     async fn move_on(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         let events = loop {
@@ -75,7 +79,7 @@ impl Shared {
 
             let mut live = self.live();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
-            // It was stopped meanwhile, and that goes to the disk first.
+            // The session was stopped in the meantime, and that goes to the disk first.
             if course.is_unrecorded() {
                 continue;
             }
@@ -135,7 +139,8 @@ impl Shared {
     /// Ends the setting under way if its time is up. Whether it did.
     pub(super) fn keep_time(&self) -> bool {
         let mut live = self.live();
-        let (at, wall) = (self.clock.now(), self.clock.wall());
+        let at = self.clock.now();
+        let wall = self.clock.wall();
         let ended = live.course.as_mut().is_some_and(|course| course.keep_time(at, wall));
         if ended {
             self.hold(&mut live);
@@ -143,19 +148,20 @@ impl Shared {
         ended
     }
 
-    /// Writes down what stopped the session, waiting for the disk no longer than the screens can.
+    /// Records what stopped the session. Waits for the disk only as long as the screens can wait.
     pub(super) async fn record_promptly(self: &Arc<Self>) {
         let shared = Arc::clone(self);
-        // Goes on by itself where this no longer waits.
+        // A task of its own, so that it goes on when this no longer waits.
         let recording = tokio::spawn(async move {
             let mut pen = shared.pen.lock().await;
-            // Told on the screens, and tried again.
+            // A failure is shown on the screens, and recording is tried again.
             let _ = shared.record_stops(&mut pen).await;
         });
         let _ = timeout(PROMPTLY, recording).await;
     }
 
-    /// Writes down what stopped the session, in order. Where the disk does not take it, it stays to be written.
+    /// Records what stopped the session, in order. What the disk does not take is kept for the next
+    /// attempt.
     ///
     /// # Errors
     /// When the disk or database failed.
@@ -203,7 +209,8 @@ impl Shared {
         replace_if_changed(&self.operator, operator);
     }
 
-    /// Shows what the session has come to, and only then moves the lens for it: what covers the view comes first.
+    /// Shows where the session stands, and only then moves the lens: a notice that covers the view
+    /// has to be there first.
     pub(super) fn show_and_drive(&self) {
         let mut live = self.live();
         self.publish(&live);
@@ -237,13 +244,14 @@ impl Shared {
         if let Some(command) = wanted.clone() {
             self.control.send(command);
         } else if !is_ready {
-            // The session has ended: its last command no longer holds, and nobody has said who focuses next.
+            // The session has ended: its last command no longer holds, and nobody has said who
+            // focuses next.
             self.control.send(HOLD);
         }
         live.commanded = wanted;
     }
 
-    /// Has both tasks of [`Conductor::run`](super::Conductor::run) look at once.
+    /// Wakes both tasks of [`Conductor::run`](super::Conductor::run).
     pub(super) fn wake(&self) {
         self.changed.notify_one();
         self.to_record.notify_one();

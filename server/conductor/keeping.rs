@@ -69,7 +69,7 @@ impl Conductor {
     async fn record(&self) -> bool {
         {
             let mut pen = self.shared.pen.lock().await;
-            // Told on the screens, and tried again.
+            // A failure is shown on the screens, and recording is tried again.
             let _ = self.shared.record_stops(&mut pen).await;
         }
 

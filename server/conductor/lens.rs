@@ -12,12 +12,15 @@ impl Conductor {
     /// Lets a policy focus, or puts the lens at a focal power, as `focus` says.
     ///
     /// # Errors
-    /// When `by` may not, a session is not closed yet, the focal power is invalid, or the policy is unknown or cannot run.
+    /// When `by` may not, a session is not closed yet, the focal power is invalid, or the policy is
+    /// unknown or cannot run.
     pub fn focus(&self, by: Role, focus: &Focus) -> Result<(), ConductError> {
-        // A policy may have to load, so this comes before the lock, which must be there for whoever stops the lens.
+        // A policy may have to load, so this comes before the lock, which must be there for whoever
+        // stops the lens.
         let drive = self.shared.drive_for(focus);
 
-        // Held until the loop is told: a session that is made in the meantime tells the loop after this.
+        // Held until the loop is told: a session that is made in the meantime tells the loop after
+        // this.
         let live = self.shared.live();
         permission::check(by, Request::MoveLens, CurrentSession::of(live.shown_phase()))?;
         self.shared.control.send(Command::Drive { drive: drive?, segment: None });

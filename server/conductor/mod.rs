@@ -1,7 +1,10 @@
-//! The conductor: carries a session's events from the state machine through the store to the control loop, in that
-//! order, so that what happened is on disk before anyone sees it. One thing waits for no disk: to stop the lens. A pause,
-//! an end and a time limit hold it first; they are recorded as soon as the disk takes them, and shown as what they are
-//! until then.
+//! The conductor carries a session's events in this order: the trial's rules decide, the disk takes
+//! the events, and then the control loop and the screens hear of them. So what anyone has seen is
+//! on disk.
+//!
+//! Only stopping the lens does not wait for the disk. A pause, an end and a time limit hold the
+//! lens first. They are recorded as soon as the disk takes them, and until then the screens show
+//! them as not recorded yet.
 
 mod allocate;
 mod circumstances;
@@ -50,11 +53,12 @@ pub struct Parts {
     pub registry: Registry,
     /// Both clocks.
     pub clock: Arc<dyn Clock>,
-    /// Where the orders and ids of real sessions come from. Nobody may be able to foresee it: the server seeds it from
-    /// the system's random source.
+    /// Where the orders and ids of real sessions come from. Nobody may foresee it: the server seeds
+    /// it from the system's random source.
     pub random: ChaCha12Rng,
-    /// Where those of practice sessions come from, which may be foreseen. The conductor gives each start of the server
-    /// a stream of its own, so that a fixed seed does not make the same ids twice in one database.
+    /// Where those of practice sessions come from, which may be foreseen. Each start of the server
+    /// gets a stream of its own, so that a fixed seed does not make the same ids twice in one
+    /// database.
     pub practice_random: ChaCha12Rng,
 }
 
@@ -72,16 +76,17 @@ struct Shared {
     clock: Arc<dyn Clock>,
     /// The clocks of this start of the server and of those before.
     run_clock: RunClock,
-    /// The session in memory. Held for moments and never while the disk is waited for: to stop the lens takes it.
+    /// The session in memory. Stopping the lens needs this lock, so nobody holds it while waiting
+    /// for the disk.
     live: std::sync::Mutex<Live>,
-    /// Held from the decision on something to its commit, so that what is decided is decided on what is on disk, and
-    /// written in that order.
+    /// Held from a decision until it is on disk, so that the next decision is based on what is on
+    /// disk, and is written after it.
     pen: Mutex<Pen>,
     surgeon: watch::Sender<Option<Arc<SurgeonView>>>,
     operator: watch::Sender<Option<Arc<OperatorView>>>,
-    /// Wakes whoever keeps the time: that of the next change may be another.
+    /// Wakes the task that keeps time: the next change may be due at another time now.
     changed: Notify,
-    /// Wakes whoever records: there may be something.
+    /// Wakes the task that records: there may be something to record.
     to_record: Notify,
 }
 
@@ -89,7 +94,7 @@ struct Live {
     course: Option<Course>,
     /// What the session last told the control loop.
     commanded: Option<Command>,
-    /// Why the disk did not take what stopped the session, when it was last asked to.
+    /// Why the disk did not take what stopped the session, at the last attempt.
     unrecorded_because: Option<String>,
 }
 
@@ -109,13 +114,13 @@ impl Live {
         self.shown().map(|course| course.state.phase())
     }
 
-    /// Lets go of a session that was closed, once the disk has all of it.
+    /// Forgets a closed session once all of it is on disk.
     fn forget_what_is_done_with(&mut self) {
         self.course.take_if(|course| course.is_done_with());
     }
 }
 
-/// The right to write a session's data, and what that takes.
+/// The right to write a session's data, with the random sources that making a session needs.
 struct Pen {
     /// For real sessions.
     random: ChaCha12Rng,
@@ -179,8 +184,8 @@ impl From<Refusal> for ConductError {
 }
 
 impl Conductor {
-    /// Takes up the session that was under way when the server last ended, paused where it was. Something has to await
-    /// [`Conductor::run`] for time limits and prompts to be kept.
+    /// Takes up the session that was under way when the server last ended, paused where it was.
+    /// Something has to await [`Conductor::run`] for time limits and prompts to be kept.
     ///
     /// # Errors
     /// When the disk or database failed.
@@ -213,7 +218,8 @@ impl Conductor {
         Ok(Self { shared: Arc::new(shared) })
     }
 
-    /// The session under way (or just ended, until dismissed) as the surgeon may see it; changes as it changes.
+    /// The session under way (or just ended, until dismissed) as the surgeon may see it; changes as
+    /// it changes.
     #[must_use]
     pub fn surgeon_view(&self) -> watch::Receiver<Option<Arc<SurgeonView>>> {
         self.shared.surgeon.subscribe()
@@ -225,12 +231,14 @@ impl Conductor {
         self.shared.operator.subscribe()
     }
 
-    /// Makes a session for `participant` by `protocol` and draws its allocation; it waits for [`Action::Start`].
+    /// Makes a session for `participant` by `protocol` and draws its allocation; it waits for
+    /// [`Action::Start`].
     ///
     /// # Errors
     /// When one is under way already, or participant or protocol is unknown.
     pub async fn create(&self, by: Role, participant: &str, protocol: &str) -> Result<SessionId, ConductError> {
-        let (participant, protocol) = (participant.to_owned(), protocol.to_owned());
+        let participant = participant.to_owned();
+        let protocol = protocol.to_owned();
         self.to_the_end(|shared| async move { shared.create(by, &participant, &protocol).await }).await
     }
 
@@ -259,7 +267,8 @@ impl Conductor {
         Ok(())
     }
 
-    /// Keeps a comment: when this returns, it is on disk. A comment for a segment just ended is kept with that segment.
+    /// Keeps a comment. When this returns, it is on disk. A comment on a segment that has just
+    /// ended stays with that segment.
     ///
     /// # Errors
     /// When the session does not exist, the text is empty or too long, or the disk failed.
@@ -267,7 +276,7 @@ impl Conductor {
         self.to_the_end(|shared| async move { shared.comment(comment).await }).await
     }
 
-    /// Keeps an answer: when this returns, it is on disk.
+    /// Keeps an answer. When this returns, it is on disk.
     ///
     /// # Errors
     /// When the question has not been asked yet, the value does not fit it, or the disk failed.
@@ -283,8 +292,8 @@ impl Conductor {
         self.to_the_end(move |shared| async move { shared.holding(holding).await }).await
     }
 
-    /// Runs `work` to its end even if the caller is dropped meanwhile, as a handler is when its browser goes away: what
-    /// is on disk and what is in memory stay the same.
+    /// Runs `work` to its end even if the caller is dropped, as a handler is when its browser goes
+    /// away. Otherwise memory could fall behind the disk.
     async fn to_the_end<T, F>(&self, work: impl FnOnce(Arc<Shared>) -> F) -> Result<T, ConductError>
     where
         T: Send + 'static,

@@ -20,7 +20,8 @@ impl Shared {
             None => self.of_earlier(new.session).await?,
         };
         let stamp = self.stamp();
-        // A segment that is not this session's can only come from a broken page: what was said is kept all the same.
+        // A segment that is not this session's can only come from a broken page: what was said is
+        // kept all the same.
         let segment = new.segment.filter(|segment| segments.contains(segment));
         let comment = Comment {
             key: new.key,
@@ -105,8 +106,8 @@ impl Shared {
         Answer { key, session, segment, question, value, origin: origin.plausible(), late, stamp }
     }
 
-    /// The segments of an earlier session, and whether what is said of it still counts: known whether or not its protocol
-    /// can still be read, so that a late comment on it is kept.
+    /// The segments of an earlier session, and whether what is said of it still counts: known
+    /// whether or not its protocol can still be read, so that a late comment on it is kept.
     async fn of_earlier(&self, session: SessionId) -> Result<(Vec<SegmentId>, Grace), ConductError> {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
         let grace = stored.grace(&self.run_clock.clocks);

@@ -197,11 +197,18 @@ fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
 /// is later.
 fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSpan> {
     let mut spans: Vec<PauseSpan> = Vec::new();
-    // Whether a setting is being inspected; since when it went on last, and what had been inspected of it by then.
-    let (mut inspecting, mut since, mut before) = (false, 0.0, 0);
+    let mut inspecting = false;
+    // When the inspection last began or resumed, and how much of the setting, in milliseconds, had
+    // been inspected by then.
+    let mut since = 0.0;
+    let mut before = 0;
     for &(at, kind) in events {
         match kind {
-            EventKind::SegmentStarted { .. } => (inspecting, since, before) = (true, at, 0),
+            EventKind::SegmentStarted { .. } => {
+                inspecting = true;
+                since = at;
+                before = 0;
+            }
             EventKind::SegmentFinished { .. } => inspecting = false,
             EventKind::Paused { inspected_ms, .. } | EventKind::ServerRestarted { inspected_ms } => {
                 if spans.last().is_none_or(|span| span.to.is_some()) {

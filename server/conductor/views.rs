@@ -10,7 +10,8 @@ use crate::trial::question::AnswerValue;
 use crate::trial::session::PauseCause;
 use crate::trial::view::{LogLine, OperatorView, SurgeonView};
 
-/// The surgeon's and the operator's view of `course` at `now`; `because`: why the disk did not take what stopped it.
+/// The surgeon's and the operator's view of `course` at `now`; `because`: why the disk did not take
+/// what stopped it.
 pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {
     let surgeon = surgeon(course, now);
     let operator = OperatorView {
@@ -64,7 +65,8 @@ fn answers(course: &Course) -> BTreeMap<String, AnswerValue> {
     state.questions().iter().filter_map(|question| Some((question.id.clone(), kept(&question.id)?))).collect()
 }
 
-/// The latest events in words. A reason for unblinding may name a policy, so it is the researcher's alone.
+/// The latest events in words. A reason for unblinding may name a policy, so it is the researcher's
+/// alone.
 fn log(course: &Course) -> Vec<LogLine> {
     let line = |event: &Event| {
         let text = event.kind.for_the_blinded().in_words(|segment| course.setting(segment));

@@ -34,15 +34,16 @@ pub enum Failure {
 }
 
 impl Advice {
-    /// Checks `decision`, which took the policy `took`. This is the one place where a policy's decision becomes something to
-    /// act on.
+    /// Checks `decision`, which took the policy `took`. This is the one place where a policy's
+    /// decision becomes something to act on.
     ///
     /// # Errors
     /// When its target is not a focal power.
     pub fn new(decision: Decision, took: Duration) -> Result<Self, Failure> {
         let target = FocalPower::new(decision.target).map_err(|_| Failure::InvalidTarget(decision.target))?;
 
-        // Metric and belief are only shown. A bad one is left out, and the target is still followed.
+        // Metric and belief are only shown. A bad one is left out, and the target is still
+        // followed.
         let metric = decision.metric.filter(|metric| metric.is_finite());
         let belief = decision.belief.filter(|belief| can_be_shown(belief));
 

@@ -1,5 +1,5 @@
-//! Control: the loop camera -> patch -> policy -> lens, its watchdog and its telemetry. Waits for no viewer, disk or
-//! database.
+//! Control: the loop camera -> patch -> policy -> lens, its watchdog and its telemetry. Waits for
+//! no viewer, disk or database.
 
 mod advice;
 mod attribution;
@@ -80,7 +80,8 @@ pub struct StepRecord {
     pub policy: Option<PolicyName>,
     /// Focal power asked of the lens after this frame.
     pub asked: FocalPower,
-    /// Focal power at the middle of the frame's exposure, by the lens's dynamics; none while the lens is away.
+    /// Focal power at the middle of the frame's exposure, by the lens's dynamics; none while the
+    /// lens is away.
     pub measured: Option<FocalPower>,
     /// The policy's focus metric.
     pub metric: Option<f64>,
@@ -115,7 +116,8 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// Whether the policy is the cause. Such holds tell policies apart: only learned ones take time to start and to compute.
+    /// Whether the policy is the cause. Such holds tell policies apart: only learned ones take time
+    /// to start and to compute.
     #[must_use]
     pub const fn caused_by_policy(self) -> bool {
         matches!(self, Self::PolicyPanicked | Self::PolicyNonsense | Self::PolicySlow | Self::PolicyUnavailable)
@@ -151,7 +153,8 @@ pub struct ControlledFrame {
     pub belief: Option<Arc<[f32]>>,
 }
 
-/// The loop's state; published a few times a second and at every change. Each role is told a part of it.
+/// The loop's state; published a few times a second and at every change. Each role is told a part
+/// of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlStatus {
     /// The camera.
@@ -166,8 +169,8 @@ pub struct ControlStatus {
     pub focal_power: FocalPower,
     /// Why the lens is being held, if it is.
     pub held: Option<Hold>,
-    /// For how long it has been held without a break, for the policy's sake or for other reasons: where one follows the other, a
-    /// policy's slow start after a long pause, it counts from there.
+    /// For how long it has been held without a break, for the policy's sake or for other reasons:
+    /// where one follows the other, a policy's slow start after a long pause, it counts from there.
     pub held_for: Duration,
     /// The hold in words, and what to do.
     pub message: Option<Arc<str>>,

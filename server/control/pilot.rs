@@ -10,10 +10,10 @@ use super::runner::Runner;
 use crate::autofocus::{Observation, PolicyName, Registry};
 use crate::clock::{Clock, Moment};
 
-/// Time from a failure to the next attempt: long enough not to flood the log, short enough that the loop is back well
-/// within a second of the reason's end.
+/// Time from a failure to the next attempt: long enough not to flood the log, short enough that the
+/// loop is back well within a second of the reason's end.
 const RETRY: Duration = Duration::from_millis(200);
-/// An instance that has answered before may be late by this much before it is given up.
+/// An instance that has answered before is given up when it is late by this much.
 const HUNG: Duration = Duration::from_millis(250);
 /// A fresh instance may take this long for its first answer: it may have to load.
 const STARTING: Duration = Duration::from_millis(500);
@@ -22,8 +22,8 @@ const MOST_HUNG: usize = 4;
 /// While this many hang, a newly chosen policy is not tried either.
 const MOST_HUNG_AT_ALL: usize = 32;
 
-/// Why the policy's advice cannot be followed, and what is being done. The words do not name the policy, so that they
-/// may be shown during a blinded session.
+/// Why the policy's advice cannot be followed, and what is being done. The words do not name the
+/// policy, so that they may be shown during a blinded session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HoldReason {
     /// The kind.
@@ -100,7 +100,8 @@ impl Pilot {
         }
     }
 
-    /// An instance still busy with an earlier frame is left to it for a while; its answer, being late, is thrown away.
+    /// An instance still busy with an earlier frame is left to it for a while; its answer, being
+    /// late, is thrown away.
     fn clear_late_answer(&mut self, now: Moment) -> Result<(), HoldReason> {
         let Some(runner) = &mut self.runner else { return Ok(()) };
         let Some(since) = runner.open_since() else { return Ok(()) };
@@ -154,8 +155,9 @@ impl Pilot {
     }
 }
 
-/// Why the lens is held after `failure`. The details go to the debug log alone: the operator of a blinded session may read the
-/// log, and only some policies fail in these ways. Outside sessions the status shows them.
+/// Why the lens is held after `failure`. The details go to the debug log alone: the operator of a
+/// blinded session may read the log, and only some policies fail in these ways. Outside sessions
+/// the status shows them.
 fn hold_reason(failure: Failure) -> HoldReason {
     match failure {
         Failure::Panicked(message) => {

@@ -1,4 +1,5 @@
-//! A thread that runs one instance of a policy, so that an instance that hangs or panics takes nothing with it.
+//! A thread that runs one instance of a policy, so that an instance that hangs or panics takes
+//! nothing with it.
 
 use std::any::Any;
 use std::io;
@@ -27,8 +28,8 @@ struct Question {
 /// What came of a question.
 type Answer = Result<Advice, Failure>;
 
-/// One instance of a policy on a thread of its own. At most one question is open at a time. Dropping the runner ends the
-/// thread as soon as the policy's step returns, and waits for nothing.
+/// One instance of a policy on a thread of its own. At most one question is open at a time.
+/// Dropping the runner ends the thread as soon as the policy's step returns, and waits for nothing.
 #[derive(Debug)]
 pub struct Runner {
     questions: SyncSender<Question>,
@@ -65,7 +66,8 @@ impl Runner {
         Ok(Self { questions, answers, thread, id, urgent: false, asked_at: None, proven: false })
     }
 
-    /// Asks; does not wait. Until [`Self::answer`] stops waiting the thread is at real-time priority.
+    /// Asks; does not wait. Until [`Self::answer`] stops waiting the thread is at real-time
+    /// priority.
     pub fn ask(&mut self, now: Moment, seen: &Observation<'_>) {
         self.hurry();
         self.asked_at = Some(now);
@@ -78,7 +80,8 @@ impl Runner {
         self.asked_at
     }
 
-    /// Waits for the answer to the open question, for at most `timeout`; `None` when it did not come.
+    /// Waits for the answer to the open question, for at most `timeout`; `None` when it did not
+    /// come.
     pub fn answer(&mut self, timeout: Duration) -> Option<Result<Advice, Failure>> {
         let answer = match self.answers.recv_timeout(timeout) {
             Ok(answer) => answer,
@@ -93,8 +96,8 @@ impl Runner {
         Some(answer)
     }
 
-    /// Gives the thread up; it ends when the policy's step returns, if ever. One that owes an answer may be spinning, and
-    /// goes behind all others; one that does not ends at once.
+    /// Gives the thread up; it ends when the policy's step returns, if ever. One that owes an
+    /// answer may be spinning, and goes behind all others; one that does not ends at once.
     pub fn abandon(self) -> JoinHandle<()> {
         if self.asked_at.is_some()
             && let Some(thread) = self.running()
@@ -104,7 +107,8 @@ impl Runner {
         self.thread
     }
 
-    /// Lets the policy go before everything but the loop and the devices. It stays so between frames, while it waits.
+    /// Lets the policy go before everything but the loop and the devices. It stays so between
+    /// frames, while it waits.
     fn hurry(&mut self) {
         if !self.urgent
             && let Some(thread) = self.running()
@@ -113,7 +117,8 @@ impl Runner {
         }
     }
 
-    /// A policy that the loop no longer waits for, since it is late or spins, has no claim on a processor.
+    /// A policy that the loop no longer waits for, since it is late or spins, has no claim on a
+    /// processor.
     fn take_time(&mut self) {
         if std::mem::take(&mut self.urgent)
             && let Some(thread) = self.running()
@@ -157,8 +162,8 @@ fn step(policy: &mut dyn Policy, question: &Question, clock: &dyn Clock) -> Answ
     Advice::new(decision, clock.now().since(began))
 }
 
-/// Keeps what a panicking policy says, and where in the code it stood, off the standard error from now on: the operator of a blinded
-/// session may sit before it.
+/// Keeps what a panicking policy says, and where in the code it stood, off the standard error from
+/// now on: the operator of a blinded session may sit before it.
 pub fn keep_policies_quiet() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

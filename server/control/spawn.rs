@@ -56,16 +56,16 @@ pub struct Settings {
     pub dynamics: Option<LensDynamics>,
 }
 
-/// The running loop. Dropping it ends the loop and its camera, and waits for both: the lens is let go first; a camera
-/// that hangs is waited for a second at most.
+/// The running loop. Dropping it ends the loop and its camera, and waits for both: the lens is let
+/// go first; a camera that hangs is waited for a second at most.
 pub struct ControlLoop {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl ControlLoop {
-    /// Starts the loop; the lens stays where it is until told otherwise. Also returned: what others hold of it, and its
-    /// telemetry, which is dropped and counted when it is not taken.
+    /// Starts the loop; the lens stays where it is until told otherwise. Also returned: what others
+    /// hold of it, and its telemetry, which is dropped and counted when it is not taken.
     ///
     /// # Errors
     /// When the system has no thread left.
@@ -182,7 +182,8 @@ impl Worker {
             while let Ok(command) = commands.try_recv() {
                 self.stepper.obey(command);
             }
-            // The last line of defence: whatever a frame brings to light, the next one gets its turn.
+            // The last line of defence: whatever a frame brings to light, the next one gets its
+            // turn.
             if let Err(panic) = guarded(|| self.turn(frame)) {
                 tracing::error!(panic, "a step of the control loop failed");
             }

@@ -1,4 +1,5 @@
-//! One step of the loop: frame -> patch -> policy -> lens command. Knows no thread but the policy's.
+//! One step of the loop: frame -> patch -> policy -> lens command. Knows no thread but the
+//! policy's.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,7 +17,8 @@ use crate::ids::SegmentId;
 use crate::imaging::{ContentArea, View};
 use crate::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth};
 
-/// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation faster than time.
+/// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation
+/// faster than time.
 pub struct Stepper {
     clock: Arc<dyn Clock>,
     lens: Box<dyn Lens>,
@@ -24,7 +26,8 @@ pub struct Stepper {
     pilot: Pilot,
     attribution: Attribution,
     drive: Drive,
-    /// Whether a frame was exposed with the lens where the policy is to begin. Until then the policy is not asked.
+    /// Whether a frame was exposed with the lens where the policy is to begin. Until then the
+    /// policy is not asked.
     placed: bool,
     segment: Option<SegmentId>,
     content_area: Option<ContentArea>,
@@ -39,7 +42,8 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// A loop that holds `lens` where it is until told otherwise, and waits for a policy at most `patience` a frame.
+    /// A loop that holds `lens` where it is until told otherwise, and waits for a policy at most
+    /// `patience` a frame.
     #[must_use]
     pub fn new(lens: Box<dyn Lens>, eye: Eye, registry: Registry, clock: Arc<dyn Clock>, patience: Duration) -> Self {
         let start = lens.measured().unwrap_or(FocalPower::MIDDLE);
@@ -131,8 +135,8 @@ impl Stepper {
         Ok(ControlledFrame { frame, patch: area, content_area: self.content_area, record, belief })
     }
 
-    /// Between frames that do not come: keeps telling the lens, so that a hand on the slider works without a camera and
-    /// a lens that comes back is noticed.
+    /// Between frames that do not come: keeps telling the lens, so that a hand on the slider works
+    /// without a camera and a lens that comes back is noticed.
     pub fn idle(&mut self) {
         self.tell_lens();
     }

@@ -1,5 +1,5 @@
-//! Questionnaires: whether an answer fits its question, how an answer in parts adds up, and the System Usability
-//! Scale's score.
+//! Questionnaires: whether an answer fits its question, how an answer in parts adds up, and the
+//! System Usability Scale's score.
 
 use super::question::{AnswerValue, Question, QuestionKind};
 
@@ -67,8 +67,9 @@ fn is_part_of_sus(items: &[u8]) -> bool {
     items.len() == SUS_ITEMS && items.iter().all(|item| *item <= 5) && items.iter().any(|item| *item > 0)
 }
 
-/// What stands once `given` has come on top of `earlier`: a 0 among points gives nothing and leaves what was there, so
-/// that each item of a questionnaire can be given by itself, from whatever device, and none takes another back.
+/// What stands once `given` has come on top of `earlier`: a 0 among points gives nothing and leaves
+/// what was there, so that each item of a questionnaire can be given by itself, from whatever
+/// device, and none takes another back.
 #[must_use]
 pub fn on_top_of(earlier: Option<&AnswerValue>, given: AnswerValue) -> AnswerValue {
     match (earlier, given) {
@@ -88,9 +89,9 @@ pub fn is_whole(value: &AnswerValue) -> bool {
     !matches!(value, AnswerValue::Points(points) if points.contains(&0))
 }
 
-/// The System Usability Scale's score, 0..=100 in steps of 2.5, of ten items from 1 (strongly disagree) to 5 (strongly
-/// agree): odd items count `item - 1`, even ones `5 - item`, the sum times 2.5 (Brooke 1996). `None` when these are not
-/// ten such items.
+/// The System Usability Scale's score, 0..=100 in steps of 2.5, of ten items from 1 (strongly
+/// disagree) to 5 (strongly agree): odd items count `item - 1`, even ones `5 - item`, the sum times
+/// 2.5 (Brooke 1996). `None` when these are not ten such items.
 #[must_use]
 pub fn sus_score(items: &[u8]) -> Option<f64> {
     if items.len() != SUS_ITEMS || !items.iter().all(|item| (1..=5).contains(item)) {
@@ -113,7 +114,8 @@ mod tests {
         assert_eq!(sus_score(&[5, 1, 5, 1, 5, 1, 5, 1, 5, 1]), Some(100.0));
         assert_eq!(sus_score(&[1, 5, 1, 5, 1, 5, 1, 5, 1, 5]), Some(0.0));
         assert_eq!(sus_score(&[3; 10]), Some(50.0));
-        // Worked by hand: odd items 4+3+4+2+4 = 17 less 5 = 12, even 25 less (2+1+3+2+2) = 15; 27 * 2.5.
+        // Worked by hand: odd items 4+3+4+2+4 = 17 less 5 = 12, even 25 less (2+1+3+2+2) = 15; 27 *
+        // 2.5.
         assert_eq!(sus_score(&[4, 2, 3, 1, 4, 3, 2, 2, 4, 2]), Some(67.5));
         assert_eq!(sus_score(&[3; 9]), None);
         assert_eq!(sus_score(&[0; 10]), None);

@@ -1,8 +1,8 @@
 //! Balanced sets: sessions whose orders were drawn together, from one seed.
 //!
-//! Within a set every order is a relabelling of every other, and two sessions at the same place have the same order. So whoever
-//! knows one order knows something of the others, and whoever knows the seed knows them all. The rules here keep sessions
-//! blinded in spite of that.
+//! Within a set every order is a relabelling of every other, and two sessions at the same place
+//! have the same order. So whoever knows one order knows something of the others, and whoever knows
+//! the seed knows them all. The rules here keep sessions blinded in spite of that.
 
 use jiff::Timestamp;
 
@@ -38,7 +38,8 @@ pub struct Member {
 }
 
 impl BalancedSet {
-    /// The first place, of `size` in the set, that a new session may take. None where the set is full or closed.
+    /// The first place, of `size` in the set, that a new session may take. None where the set is
+    /// full or closed.
     #[must_use]
     pub fn free_place(&self, size: usize) -> Option<usize> {
         // Unblinding one session closes the set: its order tells the others' apart.

@@ -1,5 +1,6 @@
-//! The commitment: a hash, made public when a session is created, by which anyone can check after unblinding that the
-//! order was not changed since. The seed's 256 random bits keep the order from being guessed from it.
+//! The commitment: a hash, made public when a session is created, by which anyone can check after
+//! unblinding that the order was not changed since. The seed's 256 random bits keep the order from
+//! being guessed from it.
 
 use sha2::{Digest, Sha256};
 
@@ -26,7 +27,8 @@ pub struct Allocation {
 }
 
 impl Allocation {
-    /// Draws the order of a new `session` by `protocol`: that of place `index` among the sessions that share `seed`.
+    /// Draws the order of a new `session` by `protocol`: that of place `index` among the sessions
+    /// that share `seed`.
     #[must_use]
     pub fn draw(session: SessionId, protocol: &Protocol, seed: Seed, index: usize) -> Self {
         let algorithm = protocol.order.algorithm();

@@ -1,4 +1,5 @@
-//! Events: everything that happens to a session, in order. They are the one truth; its state follows from them.
+//! Events: everything that happens to a session, in order. They are the one truth; its state
+//! follows from them.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -22,7 +23,8 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-/// What happened. `inspected_ms`: time inspected in the segment so far, without pauses, milliseconds.
+/// What happened. `inspected_ms`: time inspected in the segment so far, without pauses,
+/// milliseconds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum EventKind {
@@ -120,7 +122,8 @@ impl EventKind {
         }
     }
 
-    /// The same without what only the researcher may read: a reason for unblinding may name a policy.
+    /// The same without what only the researcher may read: a reason for unblinding may name a
+    /// policy.
     #[must_use]
     pub fn for_the_blinded(&self) -> Self {
         match self {

@@ -1,4 +1,5 @@
-//! Trials: protocol, allocation, the session's state machine, questionnaires. Pure: clock and random source are handed in.
+//! Trials: protocol, allocation, the session's state machine, questionnaires. Pure: clock and
+//! random source are handed in.
 
 pub mod action;
 pub mod allocation;

@@ -1,4 +1,5 @@
-//! Who may do and see what outside the course of a session. Who may do what within it: [`session::decide`](super::session::decide).
+//! Who may do and see what outside the course of a session. Who may do what within it:
+//! [`session::decide`](super::session::decide).
 
 use super::phase::Phase;
 use super::refusal::Refusal;
@@ -68,9 +69,10 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
     }
 }
 
-/// Whether `role` may see the focal power on the live view, and everything else there that tells policies apart: which policy
-/// runs, its focus metric, its belief, and how long its steps take. The surgeon never may. Nobody may until the session is
-/// closed, because operator and researcher can talk to the surgeon.
+/// Whether `role` may see the focal power on the live view, and everything else there that tells
+/// policies apart: which policy runs, its focus metric, its belief, and how long its steps take.
+/// The surgeon never may. Nobody may until the session is closed, because operator and researcher
+/// can talk to the surgeon.
 #[must_use]
 pub fn may_see_focal_power(role: Role, current: CurrentSession) -> bool {
     role != Role::Surgeon && current == CurrentSession::None

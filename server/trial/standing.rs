@@ -36,7 +36,8 @@ pub struct Standing {
     pub disagrees: bool,
 }
 
-/// What became of each of `answers`, which are all to one question, in the order in which they arrived.
+/// What became of each of `answers`, which are all to one question, in the order in which they
+/// arrived.
 #[must_use]
 pub fn standings(answers: &[Given]) -> Vec<Standing> {
     let order = in_order(answers);
@@ -91,7 +92,8 @@ pub fn counted(answers: &[Given]) -> Option<AnswerValue> {
 fn in_order(answers: &[Given]) -> Vec<usize> {
     let mut at: Vec<Timestamp> = answers.iter().map(|given| given.at).collect();
 
-    // The order on one device is certain. Times are not: a wait may have been measured by a clock that was set meanwhile.
+    // The order on one device is certain. Times are not: a wait may have been measured by a clock
+    // that was set meanwhile.
     let place_on_device = |(place, given): (usize, &Given)| Some((given.device?, given.sequence?, place));
     let mut on_devices: Vec<_> = answers.iter().enumerate().filter_map(place_on_device).collect();
     on_devices.sort_unstable();
@@ -166,7 +168,8 @@ mod tests {
 
     #[test]
     fn on_one_device_its_own_order_counts_whatever_its_clock_did() {
-        // Two tabs; the second answer's wait was measured across a clock that was set, so it looks older.
+        // Two tabs; the second answer's wait was measured across a clock that was set, so it looks
+        // older.
         let answers = [given(1, 7, 100, 3), given(1, 8, 40, 5)];
         assert_eq!(counts(&answers), Some(AnswerValue::Point(5)));
         let arrived_the_other_way = [given(1, 8, 40, 5), given(1, 7, 100, 3)];

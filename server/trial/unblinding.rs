@@ -20,10 +20,12 @@ pub struct Circumstances {
 }
 
 impl Circumstances {
-    /// The events that `action` by `by` on `session` brings about at `now`. None where it was done before.
+    /// The events that `action` by `by` on `session` brings about at `now`. None where it was done
+    /// before.
     ///
     /// # Errors
-    /// When `by` may not, the action does not fit where the session stands, or it does not fit these circumstances.
+    /// When `by` may not, the action does not fit where the session stands, or it does not fit
+    /// these circumstances.
     pub fn decide(
         &self,
         session: SessionId,

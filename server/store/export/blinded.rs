@@ -1,12 +1,12 @@
-//! The blinded part of an export. What it holds has no field for a policy, the order, the seed, or a reason that may
-//! name them.
+//! The blinded part of an export. What it holds has no field for a policy, the order, the seed, or
+//! a reason that may name them.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::ExportError;
-use super::description::{ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS, TELEMETRY};
+use super::description::{AnswerRow, CommentRow, DeviceRow, EventRow, SegmentRow, SessionRow};
 use super::folder::Folder;
-use super::table::{FORMAT, Row, TEXTS_IN_CSV, Table};
+use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
@@ -18,6 +18,10 @@ use crate::trial::protocol::Protocol;
 use crate::trial::question::{AnswerValue, QuestionKind};
 use crate::trial::remark::WaitClock;
 use crate::trial::standing::Standing;
+
+/// What an export says of itself first.
+const ABOUT: &str = "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, comparable within a run. \
+    Focal power is normalised to 0..1 over the lens's range. session.json holds all tables but telemetry and policy_steps.";
 
 /// A session without what unblinding tells.
 pub struct Blinded {
@@ -74,25 +78,21 @@ impl Blinded {
 
     /// Writes all its files but the description.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
-        let tables: [(Table, Vec<Row>); 7] = [
-            (RUNS, reader.export_runs(self.session()).await?),
-            (SESSIONS, vec![self.session_row()]),
-            (SEGMENTS, self.segment_rows()),
-            (COMMENTS, self.comment_rows()),
-            (ANSWERS, self.answer_rows()),
-            (EVENTS, self.event_rows()),
-            (DEVICES, device_rows(&reader.device_events(self.session()).await?)),
-        ];
-        let mut all = json!({});
-        for (table, rows) in &tables {
-            folder.table(table, rows).await?;
-            all[table.name] = table.objects(rows);
-        }
-        folder.json("session.json", &all).await?;
+        let mut copies = Map::new();
+        copy(folder, &mut copies, &reader.export_runs(self.session()).await?).await?;
+        copy(folder, &mut copies, &[self.session_row()]).await?;
+        copy(folder, &mut copies, &self.segment_rows()).await?;
+        copy(folder, &mut copies, &self.comment_rows()).await?;
+        copy(folder, &mut copies, &self.answer_rows()).await?;
+        copy(folder, &mut copies, &self.event_rows()).await?;
+        copy(folder, &mut copies, &device_rows(reader.device_events(self.session()).await?)).await?;
+        folder.json("session.json", &Value::Object(copies)).await?;
+
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
-        let mut file = folder.begin(&TELEMETRY)?;
-        reader.export_telemetry(self.session(), async |row| file.row(&row).await).await?;
-        file.end().await
+
+        let mut telemetry = folder.begin()?;
+        reader.export_telemetry(self.session(), async |row| telemetry.row(&row).await).await?;
+        telemetry.end().await
     }
 
     /// The description of the whole, without its tables.
@@ -102,7 +102,7 @@ impl Blinded {
             "profile": "tabular-data-package",
             "name": name,
             "title": format!("Usability trial of autofocus policies: session {}", self.session()),
-            "description": format!("Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json holds all tables but telemetry and policy_steps. {TEXTS_IN_CSV}"),
+            "description": format!("{ABOUT} {TEXTS_IN_CSV}"),
             "parfocal": {
                 "version": env!("CARGO_PKG_VERSION"),
                 "format": FORMAT,
@@ -125,154 +125,154 @@ impl Blinded {
         self.segments.iter().position(|&known| Some(known) == segment).map(|position| position + 1)
     }
 
-    fn session_row(&self) -> Row {
+    fn session_row(&self) -> SessionRow {
         let line = &self.line;
-        vec![
-            text(line.session),
-            json!(line.participant),
-            json!(line.protocol),
-            json!(self.protocol_sha256),
-            json!(line.practice),
-            json!(self.algorithm),
-            json!(self.commitment),
-            text(line.created),
-            json!(self.run),
-            json!(line.status),
-            json!(line.settings),
-            json!(line.finished_settings),
-            json!(line.comments),
-            json!(self.unblinded()),
-            json!(self.grace.until()),
-        ]
+        SessionRow {
+            session: line.session,
+            participant: line.participant.clone(),
+            protocol: line.protocol.clone(),
+            protocol_sha256: self.protocol_sha256.clone(),
+            practice: line.practice,
+            algorithm: self.algorithm,
+            commitment: self.commitment.clone(),
+            wall: line.created,
+            run: self.run,
+            status: line.status,
+            settings: line.settings,
+            finished_settings: line.finished_settings,
+            comments: line.comments,
+            unblinded: self.unblinded(),
+            counts_until: self.grace.until(),
+        }
     }
 
-    fn segment_rows(&self) -> Vec<Row> {
-        let row = |&segment: &SegmentId| {
-            let of_it =
-                || self.events.iter().map(|(_, event)| event).filter(move |e| e.kind.segment() == Some(segment));
+    fn segment_rows(&self) -> Vec<SegmentRow> {
+        let row = |(&segment, setting): (&SegmentId, usize)| {
+            let events = self.events.iter().map(|(_, event)| event);
+            let of_it = || events.clone().filter(move |event| event.kind.segment() == Some(segment));
             let started = of_it().find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }));
             let finished = of_it().find(|event| matches!(event.kind, EventKind::SegmentFinished { .. }));
-            vec![
-                text(self.session()),
-                json!(self.setting(Some(segment))),
-                text(segment),
-                json!(started.map(|event| event.wall)),
-                json!(finished.map(|event| event.wall)),
-                json!(finished.map(|event| event.by)),
-                json!(finished.and_then(|event| event.kind.inspected_ms()).map(seconds)),
-            ]
+            SegmentRow {
+                session: self.session(),
+                setting,
+                segment,
+                started: started.map(|event| event.wall),
+                finished: finished.map(|event| event.wall),
+                finished_by: finished.map(|event| event.by),
+                inspected_seconds: finished.and_then(|event| event.kind.inspected_ms()).map(seconds),
+            }
         };
-        self.segments.iter().map(row).collect()
+        self.segments.iter().zip(1..).map(row).collect()
     }
 
-    fn comment_rows(&self) -> Vec<Row> {
-        let row = |((run, comment), number): (&(i64, Comment), u32)| {
-            let (kind, said) = said_columns(&comment.said);
-            vec![
-                json!(number),
-                text(comment.key),
-                text(comment.session),
-                json!(self.setting(comment.segment)),
-                json!(comment.segment),
-                json!(kind),
-                json!(said),
-                json!(comment.frame),
-                json!(comment.frame_run),
-                text(comment.stamp.wall),
-                json!(run),
-                json!(nanoseconds(comment.stamp.at)),
-                json!(comment.origin.client_millis),
-                json!(comment.origin.waited_millis),
-                json!(comment.origin.waited_by.map(WaitClock::name)),
-                json!(comment.origin.device),
-                json!(comment.origin.sequence),
-                json!(comment.late),
-            ]
+    fn comment_rows(&self) -> Vec<CommentRow> {
+        let row = |((run, comment), number): (&(i64, Comment), usize)| {
+            let (kind, text) = said_columns(&comment.said);
+            CommentRow {
+                number,
+                key: comment.key,
+                session: comment.session,
+                setting: self.setting(comment.segment),
+                segment: comment.segment,
+                kind,
+                text: text.map(str::to_owned),
+                frame: comment.frame,
+                frame_run: comment.frame_run,
+                wall: comment.stamp.wall,
+                run: *run,
+                monotonic_ns: nanoseconds(comment.stamp.at),
+                client_millis: comment.origin.client_millis,
+                waited_ms: comment.origin.waited_millis,
+                waited_by: comment.origin.waited_by.map(WaitClock::name),
+                device: comment.origin.device,
+                sequence: comment.origin.sequence,
+                late: comment.late,
+            }
         };
         self.comments.iter().zip(1..).map(row).collect()
     }
 
-    fn answer_rows(&self) -> Vec<Row> {
+    fn answer_rows(&self) -> Vec<AnswerRow> {
         let standings = standings(&self.answers, &self.clocks);
-        let row = |(((run, answer), standing), number): ((&(i64, Answer), Standing), u32)| {
+        let row = |(((run, answer), standing), number): ((&(i64, Answer), Standing), usize)| {
             let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
             let kind = question.map(|question| &question.kind);
-            let score = match (kind, &standing.value) {
+            let sus_score = match (kind, &standing.value) {
                 (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
                 _ => None,
             };
-            vec![
-                json!(number),
-                text(answer.key),
-                text(answer.session),
-                json!(self.setting(answer.segment)),
-                json!(answer.segment),
-                json!(answer.question),
-                json!(question.map(|question| &question.text)),
-                json!(kind.map(QuestionKind::name)),
-                json!(standing.revision),
-                json!(standing.counts),
-                json!(serde_json::to_string(&standing.value).ok()),
-                json!(score),
-                text(answer.stamp.wall),
-                json!(run),
-                json!(nanoseconds(answer.stamp.at)),
-                json!(self.clocks.said(*run, answer.stamp.at, &answer.origin)),
-                json!(answer.origin.client_millis),
-                json!(answer.origin.waited_millis),
-                json!(answer.origin.waited_by.map(WaitClock::name)),
-                json!(answer.origin.device),
-                json!(answer.origin.sequence),
-                json!(answer.late),
-                json!(standing.disagrees),
-            ]
+            AnswerRow {
+                number,
+                key: answer.key,
+                session: answer.session,
+                setting: self.setting(answer.segment),
+                segment: answer.segment,
+                question: answer.question.clone(),
+                question_text: question.map(|question| question.text.clone()),
+                kind: kind.map(QuestionKind::name),
+                revision: standing.revision,
+                counts: standing.counts,
+                value: serde_json::to_string(&standing.value).ok(),
+                sus_score,
+                wall: answer.stamp.wall,
+                run: *run,
+                monotonic_ns: nanoseconds(answer.stamp.at),
+                given: self.clocks.said(*run, answer.stamp.at, &answer.origin),
+                client_millis: answer.origin.client_millis,
+                waited_ms: answer.origin.waited_millis,
+                waited_by: answer.origin.waited_by.map(WaitClock::name),
+                device: answer.origin.device,
+                sequence: answer.origin.sequence,
+                late: answer.late,
+                disagrees: standing.disagrees,
+            }
         };
         self.answers.iter().zip(standings).zip(1..).map(row).collect()
     }
 
-    fn event_rows(&self) -> Vec<Row> {
+    fn event_rows(&self) -> Vec<EventRow> {
         let row = |(run, event): &(i64, Event)| {
             let (reason, emergency) = match &event.kind {
                 EventKind::Paused { reason, .. } | EventKind::Aborted { reason, .. } => (Some(reason), None),
-                EventKind::Unblinded { emergency, .. } => (None, Some(emergency)),
+                EventKind::Unblinded { emergency, .. } => (None, Some(*emergency)),
                 _ => (None, None),
             };
-            vec![
-                text(self.session()),
-                json!(event.number),
-                text(event.wall),
-                json!(run),
-                json!(nanoseconds(event.at)),
-                json!(event.by),
-                json!(event.kind.name()),
-                json!(self.setting(event.kind.segment())),
-                json!(event.kind.segment()),
-                json!(event.kind.inspected_ms()),
-                json!(reason),
-                json!(emergency),
-            ]
+            EventRow {
+                session: self.session(),
+                number: event.number,
+                wall: event.wall,
+                run: *run,
+                monotonic_ns: nanoseconds(event.at),
+                role: event.by,
+                kind: event.kind.name(),
+                setting: self.setting(event.kind.segment()),
+                segment: event.kind.segment(),
+                inspected_ms: event.kind.inspected_ms(),
+                reason: reason.cloned(),
+                emergency,
+            }
         };
         self.events.iter().map(row).collect()
     }
 }
 
-fn device_rows(events: &[(i64, i64, DeviceEvent)]) -> Vec<Row> {
-    let row = |(number, run, event): &(i64, i64, DeviceEvent)| {
-        vec![
-            json!(number),
-            text(event.wall),
-            json!(run),
-            json!(nanoseconds(event.at)),
-            json!(event.device),
-            json!(event.working),
-            json!(event.message),
-        ]
-    };
-    events.iter().map(row).collect()
+/// Writes a table, and copies it into `copies`, which become session.json.
+async fn copy<R: Row>(folder: &mut Folder, copies: &mut Map<String, Value>, rows: &[R]) -> Result<(), ExportError> {
+    copies.insert(R::TABLE.name.to_owned(), objects(rows));
+    folder.table(rows).await
 }
 
-fn text(value: impl std::fmt::Display) -> Value {
-    Value::String(value.to_string())
+fn device_rows(events: Vec<(i64, i64, DeviceEvent)>) -> Vec<DeviceRow> {
+    let row = |(number, run, event): (i64, i64, DeviceEvent)| DeviceRow {
+        number,
+        wall: event.wall,
+        run,
+        monotonic_ns: nanoseconds(event.at),
+        device: event.device,
+        working: event.working,
+        message: event.message,
+    };
+    events.into_iter().map(row).collect()
 }
 
 fn seconds(milliseconds: u64) -> f64 {

@@ -1,312 +1,375 @@
-//! The data dictionary: every table and column of an export.
+//! The data dictionary: every table of an export, a struct a row. A new column is a new field here,
+//! and the compiler shows where its value is still missing.
 
-use super::table::Type::{Boolean, Datetime, Integer, Number, String};
-use super::table::{Column, Table, Type};
+use jiff::Timestamp;
+use serde_json::Value;
 
-const fn column(name: &'static str, kind: Type, unit: &'static str, description: &'static str) -> Column {
-    Column { name, kind, unit, description, since: 1 }
-}
+use super::table::{Cell, Meaning, Row, Table, means, table};
+use crate::autofocus::PolicyName;
+use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
+use crate::trial::phase::SessionStatus;
+use crate::trial::role::Role;
 
-/// `column`, which exports of the first format did not have.
-const fn new_in_2(column: Column) -> Column {
-    Column { since: 2, ..column }
-}
+const SESSION: Meaning = means("Session's random id");
+const SETTING: Meaning = means("Number of the setting in the session, from 1, as the surgeon read it");
+const SEGMENT: Meaning = means("Segment's random id, never shared by two segments");
+const WALL: Meaning = means("When it was recorded, by the server's wall clock").in_unit("UTC");
+const RUN: Meaning = means("Start of the server that recorded it; see runs");
+const MONOTONIC: Meaning = means("When it was recorded, by the monotonic clock; comparable within a run").in_unit("ns");
+const DEVICE: Meaning =
+    means("Random id of the surgeon's device, kept by its browser; empty where the page told none").since(2);
+const SEQUENCE: Meaning =
+    means("Counts up with everything that was said on the device, in whatever tab; gaps mean nothing").since(2);
+const WAITED_BY: Meaning = means(
+    "Clock that measured waited_ms: page-clock, which nobody can set; or wall-clock, the device's, \
+     which may have been set meanwhile, where the page was loaded anew or the device slept before \
+     sending",
+)
+.since(2);
+const CLIENT_MILLIS: Meaning =
+    means("The browser's clock when it was said, milliseconds since 1970-01-01 UTC").in_unit("ms");
+const WAITED: Meaning =
+    means("Time between saying and sending, on the surgeon's device: said at wall less this").in_unit("ms");
+const LATE: Meaning = means(
+    "Whether it arrived after counts_until of sessions.csv; always false of what was kept by a version \
+     without that time",
+)
+.since(2);
+const FRAME: Meaning = means("Frame's number within the run");
+const EXPOSED: Meaning = means("End of the exposure, by the monotonic clock").in_unit("ns");
+const KEY: Meaning = means("Key by which the browser could send it again without it counting twice");
 
-const SESSION: Column = column("session", String, "", "Session's random id");
-const SETTING: Column =
-    column("setting", Integer, "", "Number of the setting in the session, from 1, as the surgeon read it");
-const SEGMENT: Column = column("segment", String, "", "Segment's random id, never shared by two segments");
-const WALL: Column = column("wall", Datetime, "UTC", "When it was recorded, by the server's wall clock");
-const RUN: Column = column("run", Integer, "", "Start of the server that recorded it; see runs");
-const MONOTONIC: Column =
-    column("monotonic_ns", Integer, "ns", "When it was recorded, by the monotonic clock; comparable within a run");
-const DEVICE: Column = new_in_2(column(
-    "device",
-    String,
-    "",
-    "Random id of the surgeon's device, kept by its browser; empty where the page told none",
-));
-const SEQUENCE: Column = new_in_2(column(
-    "sequence",
-    Integer,
-    "",
-    "Counts up with everything that was said on the device, in whatever tab; gaps mean nothing",
-));
-const WAITED_BY: Column = new_in_2(column(
-    "waited_by",
-    String,
-    "",
-    "Clock that measured waited_ms: page-clock, which nobody can set; or wall-clock, the device's, which may have been set meanwhile, where the page was loaded anew or the device slept before sending",
-));
-const CLIENT_MILLIS: Column =
-    column("client_millis", Integer, "ms", "The browser's clock when it was said, milliseconds since 1970-01-01 UTC");
-const WAITED: Column = column(
-    "waited_ms",
-    Integer,
-    "ms",
-    "Time between saying and sending, on the surgeon's device: said at wall less this",
-);
-const LATE: Column = new_in_2(column(
-    "late",
-    Boolean,
-    "",
-    "Whether it arrived after counts_until of sessions.csv; always false of what was kept by a version without that time",
-));
-const FRAME: Column = column("frame", Integer, "", "Frame's number within the run");
-const EXPOSED: Column = column("exposed_ns", Integer, "ns", "End of the exposure, by the monotonic clock");
-const KEY: Column = column("key", String, "", "Key by which the browser could send it again without it counting twice");
-
-/// Starts of the server.
-pub const RUNS: Table = Table {
+table! {
     name: "runs",
-    description: "The starts of the server that the session's records belong to; by their clocks a monotonic time has a time of day",
-    columns: &[
-        column("run", Integer, "", "Start of the server, counting from 1"),
-        column("wall", Datetime, "UTC", "The wall clock at the start"),
-        column("monotonic_ns", Integer, "ns", "The monotonic clock at the start"),
-        column("version", String, "", "Version of parfocal"),
-        column("camera", String, "", "The camera"),
-        column("lens", String, "", "The lens"),
-        column("calibration", String, "", "The sensor's calibration: name, unit, version and date"),
-    ],
-    key: &["run"],
-};
+    description:
+        "The starts of the server that the session's records belong to; by their clocks a monotonic \
+         time has a time of day",
+    key: [run],
+    row:
+    /// A start of the server.
+    #[derive(Debug, Clone)]
+    RunRow {
+        run: i64 = means("Start of the server, counting from 1"),
+        wall: Timestamp = means("The wall clock at the start").in_unit("UTC"),
+        monotonic_ns: i64 = means("The monotonic clock at the start").in_unit("ns"),
+        version: String = means("Version of parfocal"),
+        camera: String = means("The camera"),
+        lens: String = means("The lens"),
+        calibration: String = means("The sensor's calibration: name, unit, version and date"),
+    }
+}
 
-/// The session.
-pub const SESSIONS: Table = Table {
+table! {
     name: "sessions",
     description: "The session",
-    columns: &[
-        SESSION,
-        column("participant", String, "", "Participant's code"),
-        column("protocol", String, "", "Protocol's name; its text is protocol.toml"),
-        column("protocol_sha256", String, "", "SHA-256 of protocol.toml"),
-        column("practice", Boolean, "", "Whether it is practice, never to be mixed with real data"),
-        column("algorithm", String, "", "Algorithm that drew the order from the seed"),
-        column("commitment", String, "", "SHA-256 published when the session was made; commits to seed and order"),
-        column("wall", Datetime, "UTC", "When it was made, by the server's wall clock"),
-        column("run", Integer, "", "Start of the server that made it; see runs"),
-        column("status", String, "", "under-way, completed or aborted"),
-        column("settings", Integer, "", "Settings in all"),
-        column("finished_settings", Integer, "", "Settings inspected to the end"),
-        column("comments", Integer, "", "Comments kept"),
-        column("unblinded", String, "", "no; after-end; or while-under-way, which is emergency unblinding"),
-        new_in_2(column(
-            "counts_until",
-            Datetime,
-            "UTC",
-            "Until when what arrived counts: the session's end and the protocol's grace_minutes, or unblinding if that came first; empty while the session is under way",
-        )),
-    ],
-    key: &["session"],
-};
+    key: [session],
+    row:
+    /// A session.
+    #[derive(Debug, Clone)]
+    SessionRow {
+        session: SessionId = SESSION,
+        participant: String = means("Participant's code"),
+        protocol: String = means("Protocol's name; its text is protocol.toml"),
+        protocol_sha256: String = means("SHA-256 of protocol.toml"),
+        practice: bool = means("Whether it is practice, never to be mixed with real data"),
+        algorithm: &'static str = means("Algorithm that drew the order from the seed"),
+        commitment: String =
+            means("SHA-256 published when the session was made; commits to seed and order"),
+        wall: Timestamp = means("When it was made, by the server's wall clock").in_unit("UTC"),
+        run: i64 = means("Start of the server that made it; see runs"),
+        status: SessionStatus = means("under-way, completed or aborted"),
+        settings: i64 = means("Settings in all"),
+        finished_settings: i64 = means("Settings inspected to the end"),
+        comments: i64 = means("Comments kept"),
+        unblinded: &'static str =
+            means("no; after-end; or while-under-way, which is emergency unblinding"),
+        counts_until: Option<Timestamp> = means(
+            "Until when what arrived counts: the session's end and the protocol's grace_minutes, or \
+             unblinding if that came first; empty while the session is under way",
+        )
+        .in_unit("UTC")
+        .since(2),
+    }
+}
 
-/// Its segments.
-pub const SEGMENTS: Table = Table {
+table! {
     name: "segments",
-    description: "The session's settings in order, one policy's segment each; which, allocation.csv tells after unblinding",
-    columns: &[
-        SESSION,
-        SETTING,
-        SEGMENT,
-        column("started", Datetime, "UTC", "When inspection began, by the server's wall clock; empty if it never did"),
-        column("finished", Datetime, "UTC", "When inspection ended, by the server's wall clock"),
-        column("finished_by", String, "", "Who ended it: surgeon, operator, or system at the time limit"),
-        column("inspected_seconds", Number, "s", "Time inspected, without pauses"),
-    ],
-    key: &["segment"],
-};
+    description:
+        "The session's settings in order, one policy's segment each; which, allocation.csv tells after \
+         unblinding",
+    key: [segment],
+    row:
+    /// A segment of a session.
+    #[derive(Debug, Clone)]
+    SegmentRow {
+        session: SessionId = SESSION,
+        setting: usize = SETTING,
+        segment: SegmentId = SEGMENT,
+        started: Option<Timestamp> = means(
+            "When inspection began, by the server's wall clock; empty if it never did",
+        )
+        .in_unit("UTC"),
+        finished: Option<Timestamp> =
+            means("When inspection ended, by the server's wall clock").in_unit("UTC"),
+        finished_by: Option<Role> =
+            means("Who ended it: surgeon, operator, or system at the time limit"),
+        inspected_seconds: Option<f64> = means("Time inspected, without pauses").in_unit("s"),
+    }
+}
 
-/// What was said.
-pub const COMMENTS: Table = Table {
+table! {
     name: "comments",
     description: "What the surgeon said, in the order it was kept",
-    columns: &[
-        column("number", Integer, "", "Order of the comment in the session, from 1"),
-        KEY,
-        SESSION,
-        SETTING,
-        SEGMENT,
-        column("kind", String, "", "text (typed), quick (one tap) or mark (\"mark this moment\")"),
-        column("text", String, "", "What was said, as it was said; empty for a mark"),
-        column("frame", Integer, "", "Number of the frame on the surgeon's screen"),
-        column("frame_run", Integer, "", "Start of the server that counted that frame; see runs"),
-        WALL,
-        RUN,
-        MONOTONIC,
-        CLIENT_MILLIS,
-        WAITED,
-        WAITED_BY,
-        DEVICE,
-        SEQUENCE,
-        LATE,
-    ],
-    key: &["key"],
-};
+    key: [key],
+    row:
+    /// A comment.
+    #[derive(Debug, Clone)]
+    CommentRow {
+        number: usize = means("Order of the comment in the session, from 1"),
+        key: IdempotencyKey = KEY,
+        session: SessionId = SESSION,
+        setting: Option<usize> = SETTING,
+        segment: Option<SegmentId> = SEGMENT,
+        kind: &'static str = means("text (typed), quick (one tap) or mark (\"mark this moment\")"),
+        text: Option<String> = means("What was said, as it was said; empty for a mark"),
+        frame: Option<u64> = means("Number of the frame on the surgeon's screen"),
+        frame_run: Option<i64> = means("Start of the server that counted that frame; see runs"),
+        wall: Timestamp = WALL,
+        run: i64 = RUN,
+        monotonic_ns: i64 = MONOTONIC,
+        client_millis: Option<i64> = CLIENT_MILLIS,
+        waited_ms: Option<i64> = WAITED,
+        waited_by: Option<&'static str> = WAITED_BY,
+        device: Option<DeviceId> = DEVICE,
+        sequence: Option<i64> = SEQUENCE,
+        late: bool = LATE,
+    }
+}
 
-/// Answers.
-pub const ANSWERS: Table = Table {
+table! {
     name: "answers",
     description: "Answers in the order they were kept, those that do not count included",
-    columns: &[
-        column("number", Integer, "", "Order of the answer in the session, from 1"),
-        KEY,
-        SESSION,
-        column("setting", Integer, "", "Setting asked about, from 1; empty for a closing question"),
-        column("segment", String, "", "Segment asked about; empty for a closing question"),
-        column("question", String, "", "Question's id in the protocol"),
-        column("question_text", String, "", "The question as the surgeon read it"),
-        column("kind", String, "", "text, likert, ranking or sus"),
-        column("revision", Integer, "", "Place among the answers to the question in the order they were given, from 1"),
-        column("counts", Boolean, "", "Whether it is the answer that counts: the one given last, late ones left aside"),
-        column(
-            "value",
-            String,
-            "",
-            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of 1..5 (sus), 0 for an item still open; as it stood after this revision; of a late answer, as it was given",
+    key: [key],
+    row:
+    /// An answer.
+    #[derive(Debug, Clone)]
+    AnswerRow {
+        number: usize = means("Order of the answer in the session, from 1"),
+        key: IdempotencyKey = KEY,
+        session: SessionId = SESSION,
+        setting: Option<usize> = means("Setting asked about, from 1; empty for a closing question"),
+        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question"),
+        question: String = means("Question's id in the protocol"),
+        question_text: Option<String> = means("The question as the surgeon read it"),
+        kind: Option<&'static str> = means("text, likert, ranking or sus"),
+        revision: usize =
+            means("Place among the answers to the question in the order they were given, from 1"),
+        counts: bool =
+            means("Whether it is the answer that counts: the one given last, late ones left aside"),
+        value: Option<String> = means(
+            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of \
+             1..5 (sus), 0 for an item still open; as it stood after this revision; of a late answer, \
+             as it was given",
         ),
-        column("sus_score", Number, "points", "System Usability Scale score, 0..100"),
-        WALL,
-        RUN,
-        MONOTONIC,
-        new_in_2(column(
-            "given",
-            Datetime,
-            "UTC",
-            "When it was given, by the server's clocks: when it arrived less waited_ms; answers of one device are ordered by sequence all the same",
-        )),
-        new_in_2(CLIENT_MILLIS),
-        new_in_2(WAITED),
-        WAITED_BY,
-        DEVICE,
-        SEQUENCE,
-        LATE,
-        new_in_2(column(
-            "disagrees",
-            Boolean,
-            "",
-            "Whether it is its device's last answer to the question, and another device's last answer differs",
-        )),
-    ],
-    key: &["key"],
-};
+        sus_score: Option<f64> = means("System Usability Scale score, 0..100").in_unit("points"),
+        wall: Timestamp = WALL,
+        run: i64 = RUN,
+        monotonic_ns: i64 = MONOTONIC,
+        given: Timestamp = means(
+            "When it was given, by the server's clocks: when it arrived less waited_ms; answers of one \
+             device are ordered by sequence all the same",
+        )
+        .in_unit("UTC")
+        .since(2),
+        client_millis: Option<i64> = CLIENT_MILLIS.since(2),
+        waited_ms: Option<i64> = WAITED.since(2),
+        waited_by: Option<&'static str> = WAITED_BY,
+        device: Option<DeviceId> = DEVICE,
+        sequence: Option<i64> = SEQUENCE,
+        late: bool = LATE,
+        disagrees: bool = means(
+            "Whether it is its device's last answer to the question, and another device's last answer \
+             differs",
+        )
+        .since(2),
+    }
+}
 
-/// Events.
-pub const EVENTS: Table = Table {
+table! {
     name: "events",
     description: "Everything that happened to the session, in order and without gaps",
-    columns: &[
-        SESSION,
-        column("number", Integer, "", "Order of the event in the session, from 1"),
-        WALL,
-        RUN,
-        MONOTONIC,
-        column("role", String, "", "Who: surgeon, operator, researcher, or system (a time limit, a restart)"),
-        column(
-            "kind",
-            String,
-            "",
-            "created, started, segment-started, segment-finished, questions-finished, paused, resumed, server-restarted, completed, aborted or unblinded",
+    key: [session, number],
+    row:
+    /// An event.
+    #[derive(Debug, Clone)]
+    EventRow {
+        session: SessionId = SESSION,
+        number: u32 = means("Order of the event in the session, from 1"),
+        wall: Timestamp = WALL,
+        run: i64 = RUN,
+        monotonic_ns: i64 = MONOTONIC,
+        role: Role = means("Who: surgeon, operator, researcher, or system (a time limit, a restart)"),
+        kind: &'static str = means(
+            "created, started, segment-started, segment-finished, questions-finished, paused, resumed, \
+             server-restarted, completed, aborted or unblinded",
         ),
-        SETTING,
-        SEGMENT,
-        column("inspected_ms", Integer, "ms", "Time inspected in the segment by then, without pauses"),
-        column(
-            "reason",
-            String,
-            "",
+        setting: Option<usize> = SETTING,
+        segment: Option<SegmentId> = SEGMENT,
+        inspected_ms: Option<u64> =
+            means("Time inspected in the segment by then, without pauses").in_unit("ms"),
+        reason: Option<String> = means(
             "Reason given; an unblinding's stands in allocation.json alone, as it may name a policy",
         ),
-        column("emergency", Boolean, "", "For an unblinding: whether the session was still under way"),
-    ],
-    key: &["session", "number"],
-};
+        emergency: Option<bool> = means("For an unblinding: whether the session was still under way"),
+    }
+}
 
-/// Camera and lens.
-pub const DEVICES: Table = Table {
+table! {
     name: "devices",
-    description: "When camera and lens ceased to work and, once they had for a second, worked again, in words, and what the operator changed of the camera; from the start of each run of the server that served the session, so that the state in which the session began is told, to the session's end",
-    columns: &[
-        column("number", Integer, "", "Order of the record in the database"),
-        WALL,
-        RUN,
-        MONOTONIC,
-        column("device", String, "", "camera or lens"),
-        column("working", Boolean, "", "Whether it worked from then on"),
-        column("message", String, "", "What it said of itself, or what was changed"),
-    ],
-    key: &["number"],
-};
+    description:
+        "When camera and lens ceased to work and, once they had for a second, worked again, in words, \
+         and what the operator changed of the camera; from the start of each run of the server that \
+         served the session, so that the state in which the session began is told, to the session's \
+         end",
+    key: [number],
+    row:
+    /// A change in the state of camera or lens.
+    #[derive(Debug, Clone)]
+    DeviceRow {
+        number: i64 = means("Order of the record in the database"),
+        wall: Timestamp = WALL,
+        run: i64 = RUN,
+        monotonic_ns: i64 = MONOTONIC,
+        device: String = means("camera or lens"),
+        working: bool = means("Whether it worked from then on"),
+        message: String = means("What it said of itself, or what was changed"),
+    }
+}
 
-/// Telemetry, blinded.
-pub const TELEMETRY: Table = Table {
+table! {
     name: "telemetry",
-    description: "Every step of the control loop during the settings. Metric and timing are left to policy_steps.csv, as they tell the policy; the focal path itself, and frames left out where the loop waited, may suggest one to an expert",
-    columns: &[
-        SETTING,
-        RUN,
-        FRAME,
-        EXPOSED,
-        column("asked", Number, "focal power, 0..1", "Focal power asked of the lens after the frame"),
-        column(
-            "measured",
-            Number,
-            "focal power, 0..1",
-            "Focal power at the middle of the frame's exposure, by the lens's dynamics; empty while the lens was away",
+    description:
+        "Every step of the control loop during the settings. Metric and timing are left to \
+         policy_steps.csv, as they tell the policy; the focal path itself, and frames left out where \
+         the loop waited, may suggest one to an expert",
+    key: [run, frame],
+    row:
+    /// A step of the control loop, without what tells the policy.
+    #[derive(Debug, Clone, sqlx::FromRow)]
+    TelemetryRow {
+        setting: i64 = SETTING,
+        run: i64 = RUN,
+        frame: i64 = FRAME,
+        exposed_ns: i64 = EXPOSED,
+        asked: f64 =
+            means("Focal power asked of the lens after the frame").in_unit("focal power, 0..1"),
+        measured: Option<f64> = means(
+            "Focal power at the middle of the frame's exposure, by the lens's dynamics; empty while \
+             the lens was away",
+        )
+        .in_unit("focal power, 0..1"),
+        held: bool = means(
+            "Whether the lens was held by a pause or because lens or camera failed; holds for the \
+             policy's sake are in policy_steps.csv, as they tell the policy",
         ),
-        column(
-            "held",
-            Boolean,
-            "",
-            "Whether the lens was held by a pause or because lens or camera failed; holds for the policy's sake are in policy_steps.csv, as they tell the policy",
-        ),
-        column("optimal", Number, "focal power, 0..1", "The optimum, where camera and lens are simulated"),
-    ],
-    key: &["run", "frame"],
-};
+        optimal: Option<f64> =
+            means("The optimum, where camera and lens are simulated").in_unit("focal power, 0..1"),
+    }
+}
 
-/// Which policy ran.
-pub const ALLOCATION: Table = Table {
+table! {
     name: "allocation",
     description: "Which policy ran in which setting",
-    columns: &[SESSION, SETTING, SEGMENT, column("policy", String, "", "Policy's name")],
-    key: &["segment"],
-};
+    key: [segment],
+    row:
+    /// The policy of a segment.
+    #[derive(Debug, Clone)]
+    AllocationRow {
+        session: SessionId = SESSION,
+        setting: usize = SETTING,
+        segment: SegmentId = SEGMENT,
+        policy: PolicyName = means("Policy's name"),
+    }
+}
 
-/// What a learned policy was.
-pub const WEIGHTS: Table = Table {
+table! {
     name: "weights",
-    description: "The weights that the session's learned policies had in each start of the server that served it",
-    columns: &[
-        RUN,
-        column("policy", String, "", "Policy's name"),
-        column("sha256", String, "", "SHA-256 of the file of its weights"),
-    ],
-    key: &["run", "policy"],
-};
+    description:
+        "The weights that the session's learned policies had in each start of the server that served \
+         it",
+    key: [run, policy],
+    row:
+    /// The weights that a learned policy had in a start of the server.
+    #[derive(Debug, Clone, sqlx::FromRow)]
+    WeightsRow {
+        run: i64 = RUN,
+        policy: String = means("Policy's name"),
+        sha256: String = means("SHA-256 of the file of its weights"),
+    }
+}
 
-/// Telemetry that tells the policy.
-pub const POLICY_STEPS: Table = Table {
+table! {
     name: "policy_steps",
     description: "What of each step tells the policy; belongs to telemetry.csv by run and frame",
-    columns: &[
-        SETTING,
-        RUN,
-        FRAME,
-        column("policy", String, "", "Policy that was asked; empty where none was"),
-        column("metric", Number, "", "The policy's focus metric (mean gradient magnitude or mean local ratio)"),
-        column("policy_micros", Integer, "us", "Duration of the policy's step"),
-        column("latency_micros", Integer, "us", "From the end of the exposure to the lens command"),
-        column(
-            "held",
-            String,
-            "",
-            "Why the lens was held: paused, policy-panicked, policy-nonsense, policy-slow, policy-unavailable, lens-failed or camera-failed",
+    key: [run, frame],
+    row:
+    /// What of a step of the control loop tells the policy.
+    #[derive(Debug, Clone, sqlx::FromRow)]
+    PolicyStepRow {
+        setting: i64 = SETTING,
+        run: i64 = RUN,
+        frame: i64 = FRAME,
+        policy: Option<String> = means("Policy that was asked; empty where none was"),
+        metric: Option<f64> =
+            means("The policy's focus metric (mean gradient magnitude or mean local ratio)"),
+        policy_micros: i64 = means("Duration of the policy's step").in_unit("us"),
+        latency_micros: i64 = means("From the end of the exposure to the lens command").in_unit("us"),
+        held: Option<String> = means(
+            "Why the lens was held: paused, policy-panicked, policy-nonsense, policy-slow, \
+             policy-unavailable, lens-failed or camera-failed",
         ),
-    ],
-    key: &["run", "frame"],
-};
+    }
+}
 
 /// Every table that an export may have.
-pub const ALL: [Table; 11] =
-    [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES, TELEMETRY, ALLOCATION, WEIGHTS, POLICY_STEPS];
+pub const ALL: [Table; 11] = [
+    RunRow::TABLE,
+    SessionRow::TABLE,
+    SegmentRow::TABLE,
+    CommentRow::TABLE,
+    AnswerRow::TABLE,
+    EventRow::TABLE,
+    DeviceRow::TABLE,
+    TelemetryRow::TABLE,
+    AllocationRow::TABLE,
+    WeightsRow::TABLE,
+    PolicyStepRow::TABLE,
+];
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_every_key_is_made_of_columns() {
+        let tables: BTreeSet<_> = ALL.iter().map(|table| table.name).collect();
+        assert_eq!(tables.len(), ALL.len());
+
+        for table in ALL {
+            let columns: BTreeSet<_> = table.header().collect();
+            assert_eq!(columns.len(), table.columns.len(), "{}", table.name);
+            assert!(table.key.iter().all(|part| columns.contains(part)), "{}", table.name);
+        }
+    }
+
+    #[test]
+    fn every_column_says_what_it_means() {
+        for table in ALL {
+            for column in table.columns {
+                assert!(!column.description.is_empty(), "{}.{}", table.name, column.name);
+            }
+        }
+    }
+}

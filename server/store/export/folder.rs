@@ -1,5 +1,7 @@
-//! The files of an export as they are written: each described, with its checksum, whether they go to a folder or into a ZIP file.
+//! The files of an export as they are written, to a folder or into a ZIP file: each described, with
+//! its checksum.
 
+use std::marker::PhantomData;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -7,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::ExportError;
 use super::destination::{Destination, NewFolder, ZipStream};
-use super::table::{Column, Row, Table};
+use super::table::{Row, Table};
 
 /// Name of the file of checksums, in the form of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
@@ -44,20 +46,28 @@ impl Folder {
         Self { destination, files: Vec::new(), resources: Vec::new() }
     }
 
-    /// Begins the CSV file of `table`.
-    pub fn begin<'a>(&'a mut self, table: &'a Table) -> Result<CsvFile<'a>, ExportError> {
-        let name = table.file();
+    /// Begins the CSV file of the rows `R`.
+    pub fn begin<R: Row>(&mut self) -> Result<CsvFile<'_, R>, ExportError> {
+        let name = R::TABLE.file();
         self.destination.begin(&name)?;
-        let header: Vec<_> = table.header().map(str::to_owned).collect();
-        let mut file =
-            CsvFile { folder: self, table, name, csv: new_block(), sha256: Sha256::new(), bytes: 0, gathered: 0 };
+        let header: Vec<_> = R::TABLE.header().map(str::to_owned).collect();
+
+        let mut file = CsvFile {
+            folder: self,
+            name,
+            csv: new_block(),
+            sha256: Sha256::new(),
+            bytes: 0,
+            gathered: 0,
+            rows: PhantomData,
+        };
         file.record(&header)?;
         Ok(file)
     }
 
-    /// Writes `table` whole.
-    pub async fn table(&mut self, table: &Table, rows: &[Row]) -> Result<(), ExportError> {
-        let mut file = self.begin(table)?;
+    /// Writes a table whole.
+    pub async fn table<R: Row>(&mut self, rows: &[R]) -> Result<(), ExportError> {
+        let mut file = self.begin()?;
         for row in rows {
             file.row(row).await?;
         }
@@ -113,9 +123,8 @@ impl Folder {
 }
 
 /// A CSV file being written.
-pub struct CsvFile<'a> {
+pub struct CsvFile<'a, R> {
     folder: &'a mut Folder,
-    table: &'a Table,
     name: String,
     /// Rows that have not gone on yet.
     csv: csv::Writer<Vec<u8>>,
@@ -123,13 +132,16 @@ pub struct CsvFile<'a> {
     gathered: usize,
     sha256: Sha256,
     bytes: usize,
+    /// A file takes the rows of its own table.
+    rows: PhantomData<fn(&R)>,
 }
 
-impl CsvFile<'_> {
+impl<R: Row> CsvFile<'_, R> {
     /// Writes a row.
-    pub async fn row(&mut self, row: &Row) -> Result<(), ExportError> {
-        let cells: Vec<_> =
-            self.table.columns.iter().zip(row).map(|(column, cell)| Column::csv(column, cell)).collect();
+    pub async fn row(&mut self, row: &R) -> Result<(), ExportError> {
+        let cells = row.cells();
+        let columns = R::TABLE.columns.iter();
+        let cells: Vec<_> = columns.zip(&cells).map(|(column, cell)| column.csv(cell)).collect();
         self.record(&cells)?;
         if self.gathered >= BLOCK {
             self.pass_on().await?;
@@ -142,7 +154,7 @@ impl CsvFile<'_> {
         self.pass_on().await?;
         self.folder.destination.end(&self.name)?;
         let written = Written { sha256: hex::encode(self.sha256.finalize()), bytes: self.bytes };
-        self.folder.tabulated(self.table, written);
+        self.folder.tabulated(&R::TABLE, written);
         Ok(())
     }
 

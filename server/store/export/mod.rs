@@ -1,5 +1,5 @@
-//! Export: a session as a folder of CSV and JSON with a description of every column and checksums. Blinded unless asked
-//! otherwise after unblinding; the blinded files are the same in both kinds.
+//! Export: a session as a folder of CSV and JSON with a description of every column and checksums.
+//! Blinded unless asked otherwise after unblinding; the blinded files are the same in both kinds.
 
 mod blinded;
 mod description;
@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 pub use self::description::ALL as TABLES;
+pub(super) use self::description::{PolicyStepRow, RunRow, TelemetryRow, WeightsRow};
 pub use self::destination::ZipStream;
 pub use self::table::{Column, TEXTS_IN_CSV, Table, Type};
 
@@ -105,11 +106,18 @@ impl Export {
             Err(error) => Err(error),
         };
         self.snapshot.close().await;
-        let (unblinded, practice) = (self.telling.is_some(), self.blinded.practice());
-        Ok(Summary { session: self.session, folder: out.to_owned(), unblinded, practice, files: outcome? })
+
+        Ok(Summary {
+            session: self.session,
+            folder: out.to_owned(),
+            unblinded: self.telling.is_some(),
+            practice: self.blinded.practice(),
+            files: outcome?,
+        })
     }
 
-    /// Sends the same files into `zip`, no faster than they are taken, so that nothing gathers anywhere.
+    /// Sends the same files into `zip`, no faster than they are taken, so that nothing gathers
+    /// anywhere.
     ///
     /// # Errors
     /// When they are no longer taken or the database fails; then the ZIP file is cut off.
@@ -147,10 +155,12 @@ async fn read(
     Ok((Blinded::of(reader, stored).await?, telling))
 }
 
-/// Exports `session` into the folder `out`, which must be new or empty. The folder appears whole or not at all.
+/// Exports `session` into the folder `out`, which must be new or empty. The folder appears whole or
+/// not at all.
 ///
 /// # Errors
-/// When there is no such session, it is asked for unblinded before it was, or `out` cannot be written.
+/// When there is no such session, it is asked for unblinded before it was, or `out` cannot be
+/// written.
 pub async fn export(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
     Export::prepare(reader, session, unblinded).await?.into_folder(out).await
 }

@@ -1,6 +1,13 @@
-//! Tables: rows of typed cells under described columns. CSV, JSON and the data dictionary come from the same.
+//! Tables: a struct a row, whose fields know what their columns mean. CSV, JSON and the data
+//! dictionary come from them.
 
+use jiff::Timestamp;
 use serde_json::{Map, Value, json};
+
+use crate::autofocus::PolicyName;
+use crate::ids::{DeviceId, IdempotencyKey, SegmentId, SessionId};
+use crate::trial::phase::SessionStatus;
+use crate::trial::role::Role;
 
 /// Type of a column, by its Frictionless name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,8 +39,8 @@ pub struct Column {
     pub since: u64,
 }
 
-/// The format of exports that this version writes. The second tells what was said late and on which device; the first
-/// did not name itself.
+/// The format of exports that this version writes. The second tells what was said late and on which
+/// device; the first did not name itself.
 pub const FORMAT: u64 = 2;
 
 /// A table without its rows.
@@ -49,8 +56,126 @@ pub struct Table {
     pub key: &'static [&'static str],
 }
 
-/// A row: a cell for each column, null where there is nothing.
-pub type Row = Vec<Value>;
+/// A row of a table. The macro `table!` makes the struct and this together.
+pub trait Row {
+    /// The table.
+    const TABLE: Table;
+
+    /// A cell for each column, in order, null where there is nothing.
+    fn cells(&self) -> Vec<Value>;
+}
+
+/// What a field of a row may be.
+pub trait Cell {
+    /// The type of its column.
+    const KIND: Type;
+
+    /// The cell, null where there is nothing.
+    fn value(&self) -> Value;
+}
+
+macro_rules! cells {
+    ($($kind:ident: $($cell:ty),+;)+) => {
+        $($(
+            impl Cell for $cell {
+                const KIND: Type = Type::$kind;
+
+                fn value(&self) -> Value {
+                    json!(self)
+                }
+            }
+        )+)+
+    };
+}
+
+cells! {
+    String: String, &'static str, SessionId, SegmentId, DeviceId, IdempotencyKey, PolicyName, Role, SessionStatus;
+    Integer: i64, u32, u64, usize;
+    Number: f64;
+    Boolean: bool;
+    Datetime: Timestamp;
+}
+
+impl<T: Cell> Cell for Option<T> {
+    const KIND: Type = T::KIND;
+
+    fn value(&self) -> Value {
+        self.as_ref().map_or(Value::Null, Cell::value)
+    }
+}
+
+/// What a column means.
+#[derive(Debug, Clone, Copy)]
+pub struct Meaning {
+    unit: &'static str,
+    description: &'static str,
+    since: u64,
+}
+
+/// A column that means `description`, has no unit, and has been there since the first format.
+pub const fn means(description: &'static str) -> Meaning {
+    Meaning { unit: "", description, since: 1 }
+}
+
+impl Meaning {
+    /// The same in `unit`.
+    pub const fn in_unit(self, unit: &'static str) -> Self {
+        Self { unit, ..self }
+    }
+
+    /// The same in a column that exports before `format` did not have.
+    pub const fn since(self, format: u64) -> Self {
+        Self { since: format, ..self }
+    }
+
+    /// The column called `name`.
+    pub const fn column(self, name: &'static str, kind: Type) -> Column {
+        Column { name, kind, unit: self.unit, description: self.description, since: self.since }
+    }
+}
+
+/// Defines a table and the struct of its rows. Each field has the name of its column and says what
+/// the column means.
+macro_rules! table {
+    (
+        name: $table:literal,
+        description: $description:literal,
+        key: [$($key:ident),+],
+        row:
+        $(#[$attribute:meta])*
+        $row:ident { $($field:ident: $cell:ty = $meaning:expr,)+ }
+    ) => {
+        $(#[$attribute])*
+        pub struct $row {
+            $(pub $field: $cell,)+
+        }
+
+        impl Row for $row {
+            const TABLE: Table = Table {
+                name: $table,
+                description: $description,
+                columns: &[$($meaning.column(stringify!($field), <$cell as Cell>::KIND),)+],
+                key: &[$(stringify!($key),)+],
+            };
+
+            fn cells(&self) -> Vec<Value> {
+                vec![$(self.$field.value(),)+]
+            }
+        }
+    };
+}
+
+pub(super) use table;
+
+/// `rows` as JSON objects.
+#[must_use]
+pub fn objects<R: Row>(rows: &[R]) -> Value {
+    let object = |row: &R| {
+        let names = R::TABLE.header().map(str::to_owned);
+        Value::Object(names.zip(row.cells()).collect::<Map<_, _>>())
+    };
+    rows.iter().map(object).collect()
+}
 
 impl Type {
     /// Its Frictionless name.
@@ -95,16 +220,6 @@ impl Table {
         self.columns.iter().filter(move |column| column.since <= format)
     }
 
-    /// Its rows as JSON objects.
-    #[must_use]
-    pub fn objects(&self, rows: &[Row]) -> Value {
-        let object = |row: &Row| {
-            let cells = self.header().map(str::to_owned).zip(row.iter().cloned());
-            Value::Object(cells.collect::<Map<_, _>>())
-        };
-        rows.iter().map(object).collect()
-    }
-
     /// Its Frictionless schema.
     pub fn schema(&self) -> Value {
         let fields: Vec<Value> = self.columns.iter().map(Column::field).collect();
@@ -123,11 +238,13 @@ impl Column {
 }
 
 /// How texts stand in the CSV files, for the data dictionary.
-pub const TEXTS_IN_CSV: &str = "In the CSV files a text that a spreadsheet would run as a formula, one that begins with =, +, -, @, \
-    their full-width forms, a tab or a line break, has an apostrophe before it; so has one that begins with apostrophes and goes on like \
+pub const TEXTS_IN_CSV: &str = "In the CSV files a text that a spreadsheet would run as a formula, one that \
+    begins with =, +, -, @, their full-width forms, a tab or a line break, has an \
+    apostrophe before it; so has one that begins with apostrophes and goes on like \
     that. Take away one apostrophe to read it. session.json has every text as it is.";
 
-/// What a spreadsheet takes for the beginning of a formula, in itself or once it has dropped it (OWASP, "CSV Injection").
+/// What a spreadsheet takes for the beginning of a formula, in itself or once it has dropped it
+/// (OWASP, "CSV Injection").
 const FORMULA: [char; 11] = ['=', '+', '-', '@', '＝', '＋', '－', '＠', '\t', '\r', '\n'];
 
 impl Column {
@@ -140,7 +257,8 @@ impl Column {
         }
     }
 
-    /// Whether a CSV file that has `csv` in this column tells of `cell`. Earlier versions left texts as they were.
+    /// Whether a CSV file that has `csv` in this column tells of `cell`. Earlier versions left
+    /// texts as they were.
     #[must_use]
     pub fn tells(&self, csv: &str, cell: &Value) -> bool {
         csv == self.csv(cell) || csv == plain(cell)
@@ -177,6 +295,41 @@ mod tests {
         for harmless in ["", "sharp = good", "'quoted'", "1-2", " =1", "\"=1\""] {
             assert_eq!(text.csv(&json!(harmless)), harmless);
         }
+    }
+
+    table! {
+        name: "marks",
+        description: "Marks",
+        key: [number, at],
+        row:
+        #[derive(Debug)]
+        MarkRow {
+            number: u32 = means("Order"),
+            at: Option<Timestamp> = means("When").in_unit("UTC").since(2),
+            text: Option<String> = means("What"),
+        }
+    }
+
+    #[test]
+    fn a_row_knows_its_columns() {
+        let columns: Vec<_> = MarkRow::TABLE
+            .columns
+            .iter()
+            .map(|column| (column.name, column.kind, column.unit, column.description, column.since))
+            .collect();
+        let expected = [
+            ("number", Type::Integer, "", "Order", 1),
+            ("at", Type::Datetime, "UTC", "When", 2),
+            ("text", Type::String, "", "What", 1),
+        ];
+        assert_eq!(columns, expected);
+        assert_eq!(MarkRow::TABLE.key, ["number", "at"]);
+        let first: Vec<_> = MarkRow::TABLE.columns_of(1).map(|column| column.name).collect();
+        assert_eq!(first, ["number", "text"]);
+
+        let row = MarkRow { number: 3, at: Some(Timestamp::UNIX_EPOCH), text: None };
+        assert_eq!(row.cells(), [json!(3), json!("1970-01-01T00:00:00Z"), Value::Null]);
+        assert_eq!(objects(&[row]), json!([{ "number": 3, "at": "1970-01-01T00:00:00Z", "text": null }]));
     }
 
     #[test]

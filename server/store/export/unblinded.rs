@@ -1,14 +1,19 @@
-//! What unblinding adds to an export: the policies, and the seed by which anyone can rebuild the order.
+//! What unblinding adds to an export: the policies, and the seed by which anyone can rebuild the
+//! order.
 
 use serde_json::{Value, json};
 
 use super::ExportError;
-use super::description::{ALLOCATION, POLICY_STEPS, WEIGHTS};
+use super::description::AllocationRow;
 use super::folder::Folder;
-use super::table::Row;
+use crate::autofocus::PolicyName;
+use crate::ids::SegmentId;
 use crate::store::sessions::StoredSession;
 use crate::store::{NewSession, Reader, StoreError};
 use crate::trial::event::EventKind;
+
+/// Why the seed is not told.
+const SEED_WITHHELD: &str = "it would unblind other sessions of the same balanced set; unblind those and export again";
 
 /// A session's allocation. There is one only for a session that was unblinded.
 pub struct Unblinded {
@@ -32,23 +37,25 @@ impl Unblinded {
 
     /// Writes its files.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
-        folder.table(&ALLOCATION, &self.rows()).await?;
+        folder.table(&self.rows()).await?;
 
-        let mut file = folder.begin(&WEIGHTS)?;
-        reader.export_weights(self.made.session, async |row| file.row(&row).await).await?;
-        file.end().await?;
+        let mut weights = folder.begin()?;
+        reader.export_weights(self.made.session, async |row| weights.row(&row).await).await?;
+        weights.end().await?;
 
-        let mut file = folder.begin(&POLICY_STEPS)?;
-        reader.export_policy_steps(self.made.session, async |row| file.row(&row).await).await?;
-        file.end().await?;
+        let mut steps = folder.begin()?;
+        reader.export_policy_steps(self.made.session, async |row| steps.row(&row).await).await?;
+        steps.end().await?;
 
         folder.json("allocation.json", &self.json()).await
     }
 
-    fn rows(&self) -> Vec<Row> {
-        let session = self.made.session.to_string();
-        let row = |((segment, policy), setting): (&(_, _), u32)| {
-            vec![json!(session), json!(setting), json!(segment), json!(policy)]
+    fn rows(&self) -> Vec<AllocationRow> {
+        let row = |((segment, policy), setting): (&(SegmentId, PolicyName), usize)| AllocationRow {
+            session: self.made.session,
+            setting,
+            segment: *segment,
+            policy: policy.clone(),
         };
         self.made.segments.iter().zip(1..).map(row).collect()
     }
@@ -59,7 +66,7 @@ impl Unblinded {
             "session": self.made.session,
             "algorithm": self.made.algorithm,
             "seed": self.seed_told.then(|| self.made.seed.to_hex()),
-            "seed_withheld": (!self.seed_told).then_some("it would unblind other sessions of the same balanced set; unblind those and export again"),
+            "seed_withheld": (!self.seed_told).then_some(SEED_WITHHELD),
             "index": self.made.set_index,
             "protocol_sha256": self.made.protocol_sha256,
             "schedule": schedule,

@@ -1,4 +1,5 @@
-//! Verification of an export: what anyone can check of it with no database and no trust in the server.
+//! Verification of an export: what anyone can check of it with no database and no trust in the
+//! server.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -7,9 +8,9 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::description::{ALL, ANSWERS, COMMENTS, DEVICES, EVENTS, RUNS, SEGMENTS, SESSIONS};
+use super::description::{ALL, AnswerRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow};
 use super::folder::SUMS;
-use super::table::FORMAT;
+use super::table::{FORMAT, Row, Table};
 use super::verify_allocation::{commitment, schedule};
 
 /// One thing checked.
@@ -120,7 +121,8 @@ fn events(folder: &Path) -> Outcome {
 }
 
 fn said(folder: &Path) -> Outcome {
-    let (comments, answers) = (numbered(folder, "comments.csv")?, numbered(folder, "answers.csv")?);
+    let comments = numbered(folder, "comments.csv")?;
+    let answers = numbered(folder, "answers.csv")?;
     let told = session_cell(folder, "comments")?;
     if told != comments.to_string() {
         return Err(format!("comments.csv holds {comments} comments, but sessions.csv counts {told}"));
@@ -134,8 +136,11 @@ fn said(folder: &Path) -> Outcome {
 /// Checks that of the answers to a question at most one counts, and none that is late.
 fn counting(folder: &Path) -> Result<(), String> {
     let column = |name| cells(folder, "answers.csv", name);
-    let (segments, questions, counts, late) =
-        (column("segment")?, column("question")?, column("counts")?, column("late")?);
+    let segments = column("segment")?;
+    let questions = column("question")?;
+    let counts = column("counts")?;
+    let late = column("late")?;
+
     let mut counted = BTreeSet::new();
     for place in (0..counts.len()).filter(|&place| counts[place] == "true") {
         let number = place + 1;
@@ -161,6 +166,17 @@ fn numbered(folder: &Path, file: &str) -> Result<usize, String> {
 /// Files that an unblinded export has, and a blinded one must not have.
 const UNBLINDED: [&str; 4] = ["allocation.csv", "allocation.json", "weights.csv", "policy_steps.csv"];
 
+/// Tables that session.json repeats.
+const COPIED: [Table; 7] = [
+    RunRow::TABLE,
+    SessionRow::TABLE,
+    SegmentRow::TABLE,
+    CommentRow::TABLE,
+    AnswerRow::TABLE,
+    EventRow::TABLE,
+    DeviceRow::TABLE,
+];
+
 fn copies(folder: &Path) -> Outcome {
     let package = json(folder, "datapackage.json")?;
     let blinded =
@@ -169,14 +185,16 @@ fn copies(folder: &Path) -> Outcome {
         let (is, has) = if blinded { ("", "there") } else { ("un", "missing") };
         return Err(format!("datapackage.json says that the export is {is}blinded, and {file} is {has}"));
     }
+
     let session = json(folder, "session.json")?;
     let format = format(folder)?;
-    for table in [RUNS, SESSIONS, SEGMENTS, COMMENTS, ANSWERS, EVENTS, DEVICES] {
+    for table in COPIED {
         let file = table.file();
         let differs = || format!("session.json and {file} disagree");
         let objects = session[table.name].as_array().ok_or_else(differs)?;
         let mut reader = csv(folder, &file)?;
         let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(|error| format!("{file}: {error}"))?;
+
         let same = |object: &Value, row: &csv::StringRecord| {
             let columns: Vec<_> = table.columns_of(format).collect();
             row.len() == columns.len()

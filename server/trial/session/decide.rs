@@ -1,5 +1,5 @@
-//! What an action brings about: the events to record, none where it was done already, or why not. Who may do what is
-//! decided here too.
+//! What an action brings about: the events to record, none where it was done already, or why not.
+//! Who may do what is decided here too.
 
 use std::time::Duration;
 
@@ -17,7 +17,8 @@ use crate::trial::role::Role;
 /// Longest reason, characters.
 const LONGEST_REASON: usize = 1000;
 
-/// The events that `action` by `by` brings about at `now`; none when it was done before (a double click, a stale tab).
+/// The events that `action` by `by` brings about at `now`; none when it was done before (a double
+/// click, a stale tab).
 ///
 /// # Errors
 /// When `by` may not, or it does not fit where the session stands.
@@ -45,7 +46,8 @@ pub fn decide_time(state: &SessionState, now: Moment) -> Vec<EventKind> {
     state.segment().map_or_else(Vec::new, |segment| finish(state, segment, state.plan.limit))
 }
 
-/// The events that a restart of the server brings about; `inspected` is the time inspected as far as is known.
+/// The events that a restart of the server brings about; `inspected` is the time inspected as far
+/// as is known.
 #[must_use]
 pub fn decide_restart(state: &SessionState, inspected: Duration) -> Vec<EventKind> {
     if state.ended() || state.phase == Phase::Ready {

@@ -199,8 +199,8 @@ impl SessionState {
         answered.counts = counted(&answered.given);
     }
 
-    /// Whether answers to questions about `segment` (none: about the whole) are kept: always, once they have been shown.
-    /// Whether a late one counts, [`Grace`](super::grace::Grace) says.
+    /// Whether answers to questions about `segment` (none: about the whole) are kept: always, once
+    /// they have been shown. Whether a late one counts, [`Grace`](super::grace::Grace) says.
     #[must_use]
     pub fn takes_answers(&self, segment: Option<SegmentId>) -> bool {
         match segment {
