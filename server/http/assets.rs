@@ -24,37 +24,37 @@ macro_rules! assets {
     };
 }
 
-/// Every file of `web/static/`, by name.
+/// Every file of `web/static/`, by folder and name. A test compares this table with the folder.
 static ASSETS: &[Asset] = &assets![
-    "api.js",
-    "camera.js",
-    "canvas.js",
-    "change.js",
-    "compose.js",
-    "devices.js",
-    "dialogs.js",
-    "dom.js",
-    "drafts.js",
-    "focus.js",
-    "given.js",
-    "holding.js",
-    "icon.svg",
-    "live.js",
-    "operator.css",
-    "operator.js",
-    "outbox.js",
-    "overlay.js",
-    "questions.js",
-    "researcher.css",
-    "researcher.js",
-    "style.css",
-    "surgeon.css",
-    "surgeon.js",
-    "timeline.js",
-    "traces.js",
-    "twice.js",
-    "viewer.css",
-    "viewer.js",
+    "operator/camera_card.js",
+    "operator/devices.js",
+    "operator/focus.js",
+    "operator/page.css",
+    "operator/page.js",
+    "operator/traces.js",
+    "researcher/page.css",
+    "researcher/session.js",
+    "researcher/timeline.js",
+    "shared/api.js",
+    "shared/canvas.js",
+    "shared/dialogs.js",
+    "shared/dom.js",
+    "shared/icon.svg",
+    "shared/live.js",
+    "shared/overlay.js",
+    "shared/style.css",
+    "shared/viewer.css",
+    "shared/viewer.js",
+    "surgeon/comment_box.js",
+    "surgeon/confirm.js",
+    "surgeon/drafts.js",
+    "surgeon/holding.js",
+    "surgeon/notice.js",
+    "surgeon/origin.js",
+    "surgeon/outbox.js",
+    "surgeon/page.css",
+    "surgeon/page.js",
+    "surgeon/question_form.js",
 ];
 
 /// Hash of all files, in hexadecimal.
@@ -68,22 +68,39 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     hex::encode(&hash.finalize()[..8])
 });
 
-/// Address of static file `name`. Files that import each other by relative addresses find each other.
+/// Address of static file `name`, such as `shared/api.js`. Relative imports between the files keep the hash.
 #[must_use]
 pub fn url(name: &str) -> String {
     format!("/static/{}/{name}", *VERSION)
 }
 
 /// A static file: a script, a style sheet, an icon.
-#[utoipa::path(get, path = "/static/{version}/{name}", tag = "assets",
-    params(("version" = String, Path, description = "hash of all static files"), ("name" = String, Path, description = "file name")),
-    responses((status = 200, description = "The file"), (status = 304, description = "It is as the browser has it"), (status = 404, description = "No such file", body = super::error::ErrorBody)))]
-async fn asset(Path((version, name)): Path<(String, String)>, headers: HeaderMap) -> Result<Response, Error> {
+#[utoipa::path(
+    get,
+    path = "/static/{version}/{folder}/{name}",
+    tag = "assets",
+    params(
+        ("version" = String, Path, description = "hash of all static files"),
+        ("folder" = String, Path, description = "the page that the file belongs to, or `shared`"),
+        ("name" = String, Path, description = "file name"),
+    ),
+    responses(
+        (status = 200, description = "The file"),
+        (status = 304, description = "It is as the browser has it"),
+        (status = 404, description = "No such file", body = super::error::ErrorBody),
+    )
+)]
+async fn asset(
+    Path((version, folder, name)): Path<(String, String, String)>,
+    headers: HeaderMap,
+) -> Result<Response, Error> {
+    let name = format!("{folder}/{name}");
     let asset = ASSETS
         .iter()
         .find(|asset| asset.name == name)
         .ok_or_else(|| Error::NotFound(format!("There is no file {name}.")))?;
-    // A page of an older program asks by the older hash: it gets what there is, and keeps it for no longer than needed.
+
+    // A page of an older program asks by the older hash. It gets the present file, and must not keep it.
     let cache = if version == *VERSION { "public, max-age=31536000, immutable" } else { "no-cache" };
     let etag = format!("\"{}\"", *VERSION);
     let common = [(CACHE_CONTROL, cache.to_owned()), (ETAG, etag.clone())];
@@ -112,15 +129,25 @@ pub fn routes() -> OpenApiRouter<AppState> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::path::Path;
+
+    use super::{ASSETS, content_type};
 
     #[test]
     fn every_file_of_the_folder_is_part_of_the_program() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/web/static");
-        for file in std::fs::read_dir(folder).unwrap() {
-            let name = file.unwrap().file_name().into_string().unwrap();
-            assert!(ASSETS.iter().any(|asset| asset.name == name), "{name} is missing from the table");
-            assert_ne!(content_type(&name), "application/octet-stream", "{name}");
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/web/static");
+        let mut found = 0;
+
+        for folder in std::fs::read_dir(root).unwrap() {
+            let folder = folder.unwrap();
+            for file in std::fs::read_dir(folder.path()).unwrap() {
+                let name = Path::new(&folder.file_name()).join(file.unwrap().file_name());
+                let name = name.to_str().unwrap().to_owned();
+                assert!(ASSETS.iter().any(|asset| asset.name == name), "{name} is missing from the table");
+                assert_ne!(content_type(&name), "application/octet-stream", "{name}");
+                found += 1;
+            }
         }
+        assert_eq!(found, ASSETS.len(), "a file stands in the table twice");
     }
 }

@@ -32,7 +32,7 @@ pub struct Document;
 pub type Finished = Arc<OnceLock<String>>;
 
 /// What answers without a key.
-const OPEN: [&str; 3] = ["/enter", "/healthz", "/static/{version}/{name}"];
+const OPEN: [&str; 3] = ["/enter", "/healthz", "/static/{version}/{folder}/{name}"];
 
 /// What any request may be answered, whoever asks for what.
 const ALWAYS: [(&str, &str); 5] = [

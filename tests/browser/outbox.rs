@@ -8,8 +8,8 @@ use crate::webdriver::{Browser, Driver};
 /// A fresh outbox as `outbox`; `answers` are given in turn, and what was posted is in `posted`.
 const OUTBOX: &str = r#"
     localStorage.clear();
-    const page = document.querySelector('script[src*="surgeon.js"]').src;
-    const { Outbox } = await import(page.replace("surgeon.js", "outbox.js"));
+    const page = document.querySelector('script[src$="surgeon/page.js"]').src;
+    const { Outbox } = await import(page.replace("page.js", "outbox.js"));
     const posted = [];
     const bodies = [];
     const answers = [];

@@ -30,7 +30,7 @@ async fn a_surgeon_completes_a_blinded_trial() {
     let seen = blinding::check(&theatre.proxy.recorded());
     assert_eq!(seen.segments.len(), 6);
     assert!(seen.texts > 100 && seen.pictures > 100, "{} texts, {} pictures", seen.texts, seen.pictures);
-    assert!(seen.files.contains("surgeon.js") && seen.files.contains("style.css"), "{:?}", seen.files);
+    assert!(seen.files.contains("surgeon/page.js") && seen.files.contains("shared/style.css"), "{:?}", seen.files);
 }
 
 /// The operator adds a participant and prepares and starts a session; the surgeon waits.

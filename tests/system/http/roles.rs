@@ -11,7 +11,7 @@ use crate::support::{Server, client};
 const ROLES: [&str; 3] = ["surgeon", "operator", "researcher"];
 
 /// What anyone may ask for.
-const OPEN: [&str; 3] = ["/healthz", "/enter", "/static/{version}/{name}"];
+const OPEN: [&str; 3] = ["/healthz", "/enter", "/static/{version}/{folder}/{name}"];
 
 /// A server that others can reach.
 fn open_server() -> Server {

@@ -135,12 +135,18 @@ async fn static_files_are_kept_for_ever_by_their_hash() {
     let known = server.get(address).header(IF_NONE_MATCH, &file.headers()[ETAG]).send().await.unwrap();
     assert_eq!(known.status(), StatusCode::NOT_MODIFIED);
 
-    let old = server.get("/static/0123456789abcdef/viewer.js").send().await.unwrap();
+    let old = server.get("/static/0123456789abcdef/shared/viewer.js").send().await.unwrap();
     assert_eq!(old.status(), StatusCode::OK);
     assert_eq!(old.headers()[CACHE_CONTROL], "no-cache");
     assert_eq!(old.headers()[CONTENT_TYPE], "text/javascript; charset=utf-8");
 
-    for missing in ["/static/0/none.js", "/static/0/..%2f..%2fCargo.toml", "/static/viewer.js"] {
+    for missing in [
+        "/static/0/shared/none.js",
+        "/static/0/shared/..%2f..%2f..%2fCargo.toml",
+        "/static/0/..%2f..%2fCargo.toml",
+        "/static/0/viewer.js",
+        "/static/viewer.js",
+    ] {
         assert_eq!(server.get(missing).send().await.unwrap().status(), StatusCode::NOT_FOUND, "{missing}");
     }
 }

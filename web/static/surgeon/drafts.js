@@ -2,8 +2,8 @@
 // when asked to, and sends it as it stands once its place is gone. It carries the key under which it will be sent, so that
 // it is kept once even if two tabs send it.
 
-import { uuid } from "./dom.js";
-import { stamp } from "./given.js";
+import { uuid } from "../shared/dom.js";
+import { stamp } from "./origin.js";
 
 const PREFIX = "parfocal.draft.";
 const TAB = "parfocal.tab";

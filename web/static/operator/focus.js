@@ -1,7 +1,7 @@
 // Who focuses outside a session: a policy, or the operator's hand on the slider.
 
-import { post, tellTrouble } from "./api.js";
-import { byId, setText } from "./dom.js";
+import { post, tellTrouble } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
 
 export const BY_HAND = "by-hand";
 /** What the list of policies shows while nobody is told which one runs. */

@@ -1,6 +1,6 @@
 // The devices' health as the operator sees it: a lamp each, and every warning as a sentence that says what to do.
 
-import { make, redraw } from "./dom.js";
+import { make, redraw } from "../shared/dom.js";
 
 /** Draws a lamp for camera, lens and loop into `list`. */
 export function drawDevices(list, status) {

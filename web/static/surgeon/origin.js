@@ -1,7 +1,7 @@
 // Where and when something is said: on which device, as which of all that is said there, and how long ago. An entry may
 // wait for the network; its wait is measured by the page's monotonic clock, which nobody can set.
 
-import { uuid } from "./dom.js";
+import { uuid } from "../shared/dom.js";
 
 const DEVICE = "parfocal.device";
 const SEQUENCE = "parfocal.sequence";

@@ -1,7 +1,7 @@
 // The protocol's questions as a form. Each answer goes to the outbox the moment it is given and shows whether it is
 // saved; what stands in the form is what the server has, unless something newer is on its way.
 
-import { make, setText } from "./dom.js";
+import { make, setText } from "../shared/dom.js";
 
 const SUS_ITEMS = [
   "I think that I would like to use this system frequently.",

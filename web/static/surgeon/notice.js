@@ -1,7 +1,7 @@
 // The full-screen notice at each change of setting. It needs a tap meant for it: one that began before it was there, or
 // the second half of a double tap, does not count.
 
-import { byId, setText } from "./dom.js";
+import { byId, setText } from "../shared/dom.js";
 
 const NOT_MEANT_MS = 600;
 /** A key this soon after another belongs to what was being typed. */

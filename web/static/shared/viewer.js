@@ -3,7 +3,7 @@
 import { makeCanvas, onResize, pixelsPerCss } from "./canvas.js";
 import { Live } from "./live.js";
 import { drawContentArea, drawPatch, Peaking } from "./overlay.js";
-import { Traces } from "./traces.js";
+import { Traces } from "../operator/traces.js";
 
 /** A picture older than this is no longer live, and says so. */
 const STALE_MS = 500;

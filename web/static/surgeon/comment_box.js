@@ -1,7 +1,7 @@
 // The comment box, the quick comments and "Mark this moment". A comment belongs to the setting it was begun under, even
 // when the setting changes while it is being written. One begun in another tab is offered, not shown.
 
-import { byId, make, setText } from "./dom.js";
+import { byId, make, setText } from "../shared/dom.js";
 import { Draft, draftsOf, followDrafts, forgetDraft } from "./drafts.js";
 
 const PATH = "/api/surgeon/comments";

@@ -1,8 +1,8 @@
 // One session as the researcher sees it: the timeline and the list of comments move together; unblinding asks for a reason.
 
-import { get, inWords, post } from "./api.js";
-import { askReason } from "./dialogs.js";
-import { byId, clockText, make, setText } from "./dom.js";
+import { get, inWords, post } from "../shared/api.js";
+import { askReason } from "../shared/dialogs.js";
+import { byId, clockText, make, setText } from "../shared/dom.js";
 import { drawTimeline, whyAside } from "./timeline.js";
 
 const { session, ended, unblinded } = byId("session").dataset;

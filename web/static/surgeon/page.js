@@ -1,16 +1,16 @@
 // The surgeon's page: follows the session's state as the server sends it, and shows the same whatever is being tried.
 
-import { get, heardAgain, post, Refused, tellTrouble } from "./api.js";
-import { changeNotice } from "./change.js";
-import { composer } from "./compose.js";
-import { byId, clockText, make, setText } from "./dom.js";
+import { get, heardAgain, post, Refused, tellTrouble } from "../shared/api.js";
+import { changeNotice } from "./notice.js";
+import { composer } from "./comment_box.js";
+import { byId, clockText, make, setText } from "../shared/dom.js";
 import { Draft, draftsOf, forgetDraft } from "./drafts.js";
 import { holdingTeller } from "./holding.js";
-import { unlessOvertaken } from "./live.js";
+import { unlessOvertaken } from "../shared/live.js";
 import { Outbox } from "./outbox.js";
-import { onTopOf, questionForm } from "./questions.js";
-import { twoTaps } from "./twice.js";
-import { mountViewer } from "./viewer.js";
+import { onTopOf, questionForm } from "./question_form.js";
+import { twoTaps } from "./confirm.js";
+import { mountViewer } from "../shared/viewer.js";
 
 const ANSWERS = "/api/surgeon/answers";
 const outbox = new Outbox();

@@ -1,9 +1,9 @@
 // Tells the server how much of what was said in a session this device still holds, so that nobody unblinds it over that
 // unasked: once when a session is first shown, and from its end on whenever that changes.
 
-import { post, Refused } from "./api.js";
+import { post, Refused } from "../shared/api.js";
 import { draftsOf } from "./drafts.js";
-import { device } from "./given.js";
+import { device } from "./origin.js";
 
 const PATH = "/api/surgeon/holding";
 const TRY_AGAIN_MS = 5000;

@@ -3,9 +3,9 @@
 // twice harmless, and what it tells of where and when it was said makes the order of sending harmless. What the server
 // refuses stays on this device too, and is tried again when the page is next opened.
 
-import { keep, Refused, inWords } from "./api.js";
-import { uuid } from "./dom.js";
-import { origin, stamp } from "./given.js";
+import { keep, Refused, inWords } from "../shared/api.js";
+import { uuid } from "../shared/dom.js";
+import { origin, stamp } from "./origin.js";
 
 const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;

@@ -1,7 +1,7 @@
 // Exposure, gain and frame rate of a camera that lets them be changed: a figure to type, and a button either way.
 
-import { inWords, post } from "./api.js";
-import { byId, make, setText } from "./dom.js";
+import { inWords, post } from "../shared/api.js";
+import { byId, make, setText } from "../shared/dom.js";
 
 // Exposure comes in microseconds and is shown in milliseconds. A third of a stop is the step that photographers know.
 const THIRD = 2 ** (1 / 3);

@@ -1,13 +1,13 @@
 // The operator's page: the devices and the session from preparing it to its end.
 
-import { get, heardAgain, post, Refused, tellTrouble } from "./api.js";
-import { drawCamera } from "./camera.js";
-import { askIn, askReason, askWhetherMeant } from "./dialogs.js";
-import { byId, clockText, make, redraw, setText } from "./dom.js";
+import { get, heardAgain, post, Refused, tellTrouble } from "../shared/api.js";
+import { drawCamera } from "./camera_card.js";
+import { askIn, askReason, askWhetherMeant } from "../shared/dialogs.js";
+import { byId, clockText, make, redraw, setText } from "../shared/dom.js";
 import { drawDevices, drawDeviceWords, drawWarnings } from "./devices.js";
 import { BY_HAND, drawFocus, UNTOLD } from "./focus.js";
-import { unlessOvertaken } from "./live.js";
-import { mountViewer } from "./viewer.js";
+import { unlessOvertaken } from "../shared/live.js";
+import { mountViewer } from "../shared/viewer.js";
 
 const viewer = mountViewer(byId("view"), { role: "operator", traces: byId("traces") });
 const followAnswer = unlessOvertaken(viewer.live, followSession);

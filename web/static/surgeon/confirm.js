@@ -1,7 +1,7 @@
 // A button that does what cannot be undone, and so wants a second tap that is meant: neither the other half of a double
 // tap nor one long after. Its two labels lie on each other, so that nothing moves when they change.
 
-import { setText } from "./dom.js";
+import { setText } from "../shared/dom.js";
 
 /** Sooner than this after the first tap it is the same tap. */
 const SAME_TAP_MS = 400;

@@ -1,6 +1,6 @@
 // Focal power, focus metric and belief over the last seconds, on one scale of focal power from 0 (bottom) to 1 (top).
 
-import { makeCanvas, onResize, pixelsPerCss } from "./canvas.js";
+import { makeCanvas, onResize, pixelsPerCss } from "../shared/canvas.js";
 
 const ASKED = { colour: "#ffd166", label: "asked" };
 const MEASURED = { colour: "#5cf2ff", label: "measured" };
