@@ -106,6 +106,7 @@ fn complete(api: &mut utoipa::openapi::OpenApi) {
             if !OPEN.contains(&path.as_str()) {
                 operation.security = Some(shown_by(operation));
             }
+            operation.operation_id = unique_id(operation);
         }
     }
 
@@ -115,6 +116,13 @@ fn complete(api: &mut utoipa::openapi::OpenApi) {
         let cookie = ApiKey::Cookie(ApiKeyValue::new(cookie_name(role)));
         components.add_security_scheme(role_name(role), SecurityScheme::ApiKey(cookie));
     }
+}
+
+/// The operation's id, with its tag in front: two roles have handlers of the same name, and ids must differ.
+fn unique_id(operation: &Operation) -> Option<String> {
+    let id = operation.operation_id.as_deref()?;
+    let tag = operation.tags.iter().flatten().next();
+    Some(tag.map_or_else(|| id.to_owned(), |tag| format!("{tag}_{id}")))
 }
 
 /// What the layers around the handler of `operation` may answer.
