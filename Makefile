@@ -8,7 +8,7 @@ ARGS ?=
 # GigE Vision and USB3 Vision are checked wherever their library is. Every check is built once, with it or without; `make run` needs neither.
 FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
 
-.PHONY: run test check lint unit interface readme bench fuzz
+.PHONY: run test check lint web web-types unit interface readme bench fuzz
 
 run:
 	@.ci/setup build
@@ -20,12 +20,22 @@ test:
 	@$(MAKE) --no-print-directory check
 
 # The checks alone, on a machine that is already set up.
-check: lint unit interface readme
+check: lint web unit interface readme
 
 lint:
 	cargo fmt --check
 	cargo clippy --all-targets --locked $(FEATURES) -- --deny warnings
 	cargo deny --locked check licenses bans sources
+
+# The pages' code: format, lint, types, unit tests.
+web:
+	npm --prefix web run --silent check
+	npm --prefix web run --silent test
+
+# After a change of the HTTP interface: the types that the pages are checked against.
+web-types:
+	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --quiet --locked $(FEATURES) --test http the_pages_are_checked
+	npm --prefix web run --silent api
 
 unit:
 	cargo test --locked $(FEATURES)

@@ -9,7 +9,7 @@ use crate::webdriver::{Browser, Driver};
 const OUTBOX: &str = r#"
     localStorage.clear();
     const page = document.querySelector('script[src$="surgeon/page.js"]').src;
-    const { Outbox } = await import(page.replace("page.js", "outbox.js"));
+    const { openOutbox } = await import(page.replace("page.js", "device.js"));
     const posted = [];
     const bodies = [];
     const answers = [];
@@ -21,7 +21,7 @@ const OUTBOX: &str = r#"
         return answers.shift() ?? Promise.resolve(new Response(null, { status: 204 }));
     };
     const ours = (status) => new Response('{"error": "so it is"}', { status, headers: { "content-type": "application/json" } });
-    const saved = (outbox) => new Promise((done) => outbox.addEventListener("change", () => outbox.waiting.length === 0 && done()));
+    const saved = (outbox) => new Promise((done) => outbox.subscribe(() => outbox.waiting.length === 0 && done()));
     const kept = () => Object.keys(localStorage).filter((key) => key.startsWith("parfocal.outbox.")).length;
 "#;
 
@@ -38,7 +38,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 
     // An answer changed while its first value is on its way to a server whose disk is full.
     let script = r#"
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         let fail;
         answers.push(new Promise((done) => (fail = () => done(ours(507)))));
         const arrived = new Promise((done) => arrivals.push(done));
@@ -59,7 +59,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 
     // The same, when the tablet's clock was set back between the two.
     let script = r#"
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         const clock = Date.now;
         let fail;
         answers.push(new Promise((done) => (fail = () => done(ours(507)))));
@@ -78,7 +78,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 
     // Only the server's own word that it is kept takes it off the device.
     let script = r#"
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         answers.push(Promise.resolve(new Response("", { status: 200 })), Promise.resolve(new Response("{}", { status: 200 })));
         const done = saved(outbox);
         outbox.add("/comments", { value: "d" });
@@ -89,7 +89,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 
     // A page of a proxy's is no answer of the server's.
     let script = r#"
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         answers.push(Promise.resolve(new Response("<h1>Not found</h1>", { status: 404 })));
         const done = saved(outbox);
         outbox.add("/comments", { value: "a" });
@@ -100,13 +100,13 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 
     // What the server refuses stays on the device, and is tried again by the next page.
     let script = r#"
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         answers.push(Promise.resolve(ours(404)));
         const refused = saved(outbox);
         outbox.add("/comments", { session: "s", value: "b" });
         await refused;
         const after = [kept(), outbox.refused("s").length, outbox.refused("t").length];
-        const next = new Outbox();
+        const next = openOutbox();
         await saved(next);
         return [posted, ...after, kept(), next.refused("s").length];
     "#;
@@ -114,7 +114,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 
     // Half an emoji, where a text was cut, does not stop the rest.
     let script = r#"
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         const done = saved(outbox);
         outbox.add("/comments", { value: "cut \ud83d" });
         await done;
@@ -124,7 +124,7 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 
     // Who waits for the answers hears that the server is not heard, also while a comment is the first in line.
     let script = r#"
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         answers.push(Promise.reject(new TypeError("Failed to fetch")));
         outbox.add("/comments", { value: "c" });
         outbox.add("/answers", { value: 4 }, "sharpness");
@@ -141,7 +141,7 @@ const WAIT: &str = r#"
     const wait = ({ waited_millis: waited, waited_by: by }, expected) => [Math.abs(waited - expected * 1000) < 30000, by];
     /** An entry that the server does not take at first; `meanwhile` happens before it is sent again. */
     const heldBack = async (meanwhile) => {
-        const outbox = new Outbox();
+        const outbox = openOutbox();
         let fail;
         answers.push(new Promise((done) => (fail = () => done(ours(507)))));
         const arrived = new Promise((done) => arrivals.push(done));
@@ -185,13 +185,13 @@ async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_ta
     // Kept over a reload, where no page's clock knows how long; the real server knows no such address and takes nothing.
     let keep = "answers.push(new Promise(() => {}));
         Date.now = () => clock() - 600000;
-        new Outbox().add('/comments', { session: 's', value: 'kept' });
+        openOutbox().add('/comments', { session: 's', value: 'kept' });
         Date.now = clock;";
     waits(keep).await;
     page.reload().await;
     let again = OUTBOX.replace("localStorage.clear();", "");
     let script = format!(
-        "return (async () => {{ {again} {WAIT} const outbox = new Outbox(); await saved(outbox); return wait(bodies[0], 600); }})()"
+        "return (async () => {{ {again} {WAIT} const outbox = openOutbox(); await saved(outbox); return wait(bodies[0], 600); }})()"
     );
     assert_eq!(page.run(&script, json!([])).await, json!([true, "wall-clock"]));
 }

@@ -235,3 +235,23 @@ async fn a_camera_without_settings_offers_none() {
     assert_eq!(answer.status(), StatusCode::CONFLICT);
     assert!(answer.text().await.unwrap().contains("does not offer this setting"));
 }
+
+/// The pages' types are made from this file by `make web-types`, which sets `PARFOCAL_WRITE_DESCRIPTION`.
+#[tokio::test]
+async fn the_pages_are_checked_against_the_present_description() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/web/types/openapi.json");
+    let server = Server::start();
+    let document: Value = server.get_as("operator", "/api/openapi.json").send().await.unwrap().json().await.unwrap();
+
+    if std::env::var_os("PARFOCAL_WRITE_DESCRIPTION").is_some() {
+        let text = serde_json::to_string_pretty(&document).unwrap();
+        std::fs::write(file, text + "\n").unwrap();
+    }
+    let known: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+    assert!(known == document, "the HTTP interface has changed: run `make web-types` and commit what it writes");
+
+    let operations = document["paths"].as_object().unwrap().values().flat_map(|path| path.as_object().unwrap());
+    let mut ids: Vec<_> = operations.filter_map(|(_, operation)| operation["operationId"].as_str()).collect();
+    ids.sort_unstable();
+    assert!(ids.windows(2).all(|pair| pair[0] != pair[1]), "two operations share an id: {ids:?}");
+}

@@ -1,70 +1,83 @@
 // Who focuses outside a session: a policy, or the operator's hand on the slider.
 
-import { post, tellTrouble } from "../shared/api.js";
+import { post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
+import { tell, tellTrouble } from "../shared/trouble.js";
+import { Orders } from "./orders.js";
 
 export const BY_HAND = "by-hand";
-/** What the list of policies shows while nobody is told which one runs. */
+
+/** What the list of policies shows during a session, when nobody is told which one runs. */
 export const UNTOLD = "";
 
+const MIDDLE = 0.5;
+
+const policies = byId("policy", HTMLSelectElement);
+const slider = byId("focal-power", HTMLInputElement);
+const orders = new Orders(send);
+
+/** @type {Stream.OperatorStatus | null} */
 let status = null;
 let dragging = false;
-let ordered = null;
-let ordering = false;
 
-/** Draws what `next`, the loop's status, tells of the focus: during a session, `blinded`, nothing. */
+/**
+ * Draws what the loop's status tells about the focus. During a session, `blinded`, it draws nothing of it.
+ *
+ * @param {Stream.OperatorStatus} next
+ * @param {boolean} blinded
+ */
 export function drawFocus(next, blinded) {
   status = next;
+  const { focal_power: power } = next;
   // The status that tells again comes after the word that the session is closed.
-  const untold = blinded || status.focal_power === null;
-  const wasUntold = byId("policy").value === UNTOLD;
-  byId("focus-controls").disabled = untold;
+  const untold = blinded || power === null;
+  const wasUntold = policies.value === UNTOLD;
+  byId("focus-controls", HTMLFieldSetElement).disabled = untold;
   byId("traces-hidden").hidden = !untold;
-  if (untold) return drawUntold();
-  const power = status.focal_power.toFixed(3);
-  setText(byId("focus-now"), `focal power ${power}`);
-  if (dragging || ordering) return;
-  byId("policy").value = status.policy ?? BY_HAND;
-  if (status.policy === null && !wasUntold) return;
-  byId("focal-power").value = status.focal_power;
-  setText(byId("focal-power-value"), power);
+  if (untold) {
+    drawUntold();
+    return;
+  }
+
+  const text = power.toFixed(3);
+  setText(byId("focus-now"), `focal power ${text}`);
+  if (dragging || orders.busy) return;
+  policies.value = next.policy ?? BY_HAND;
+  if (next.policy === null && !wasUntold) return;
+  slider.value = String(power);
+  setText(byId("focal-power-value"), text);
 }
 
-/** Nothing of before the session stays, which would look as if it held now. */
+/** Nothing from before the session stays, which would look as if it held now. */
 function drawUntold() {
   setText(byId("focus-now"), "The session decides until it is closed.");
-  byId("policy").value = UNTOLD;
-  byId("focal-power").value = 0.5;
+  policies.value = UNTOLD;
+  slider.value = String(MIDDLE);
   setText(byId("focal-power-value"), "");
 }
 
-/** One order at a time, so that the last one given is the last to arrive; those overtaken meanwhile are left out. */
-async function focus(order) {
-  ordered = order;
-  if (ordering) return;
-  ordering = true;
-  while (ordered) {
-    const next = ordered;
-    ordered = null;
-    try {
-      await post("/api/operator/focus", next);
-      setText(byId("focus-trouble"), "");
-    } catch (error) {
-      tellTrouble(byId("focus-trouble"), error);
-    }
+/** @param {Api.Focus} order */
+async function send(order) {
+  try {
+    await post("/api/operator/focus", order);
+    tell(byId("focus-trouble"), "");
+  } catch (error) {
+    tellTrouble(byId("focus-trouble"), error);
   }
-  ordering = false;
 }
 
-const slider = byId("focal-power");
 slider.addEventListener("input", () => {
   dragging = true;
-  setText(byId("focal-power-value"), Number(slider.value).toFixed(3));
-  byId("policy").value = BY_HAND;
-  focus({ focal_power: Number(slider.value) });
+  const power = Number(slider.value);
+  setText(byId("focal-power-value"), power.toFixed(3));
+  policies.value = BY_HAND;
+  orders.give({ focal_power: power });
 });
-slider.addEventListener("change", () => (dragging = false));
-byId("policy").addEventListener("change", () => {
-  const policy = byId("policy").value;
-  focus(policy === BY_HAND ? { focal_power: status?.focal_power ?? 0.5 } : { policy });
+slider.addEventListener("change", () => {
+  dragging = false;
+});
+
+policies.addEventListener("change", () => {
+  const policy = policies.value;
+  orders.give(policy === BY_HAND ? { focal_power: status?.focal_power ?? MIDDLE } : { policy });
 });

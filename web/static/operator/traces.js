@@ -13,63 +13,94 @@ const SECONDS = 10;
 /** Width of the belief's bars at the right end: share of the whole. */
 const BELIEF_SHARE = 0.12;
 
+/**
+ * @typedef {object} Point
+ * @property {number} time milliseconds
+ * @property {number} asked
+ * @property {number | null} measured
+ * @property {number | null} metric
+ */
+
 /** Drawn by a canvas of its own within `element`, with the legend above. */
 export class Traces {
-  #context = makeCanvas("viewer-traces").getContext("2d");
+  #element;
+  #context = makeCanvas("viewer-traces");
+  /** @type {Point[]} */
   #points = [];
+  /** @type {number[] | null} */
   #belief = null;
-  #on = false;
-  #beliefOn = false;
+  /** @type {Set<"traces" | "belief">} */
+  #shown = new Set();
 
+  /** @param {HTMLElement} element */
   constructor(element) {
+    this.#element = element;
     this.#context.canvas.setAttribute("aria-hidden", "true");
     element.append(this.#context.canvas);
     element.hidden = true;
     onResize(this.#context.canvas, () => this.#draw());
   }
 
-  /** Shows or hides the traces, and the belief beside them. */
-  show(on, belief) {
-    this.#on = on || belief;
-    this.#beliefOn = belief;
-    this.#context.canvas.parentElement.hidden = !this.#on;
+  /**
+   * Shows or hides the traces, or the belief beside them.
+   *
+   * @param {"traces" | "belief"} what
+   * @param {boolean} on
+   */
+  show(what, on) {
+    if (on) this.#shown.add(what);
+    else this.#shown.delete(what);
+    this.#element.hidden = this.#shown.size === 0;
     this.#draw();
   }
 
-  /** Keeps what came with a frame that was exposed at `time` (milliseconds). While a session is under way nothing does. */
-  add({ asked, measured, metric, belief }, time) {
+  /**
+   * Keeps what came with a frame that was exposed at `time` (milliseconds). While a session is under way nothing does.
+   *
+   * @param {Stream.Header} header
+   * @param {number} time
+   */
+  add({ asked = null, measured = null, metric = null, belief = null }, time) {
     if (asked === null) {
       this.#points = [];
-      return this.#draw();
+      this.#draw();
+      return;
     }
-    this.#points.push({ time, asked, measured, metric });
     this.#belief = belief;
-    const past = this.#points.findIndex((point) => point.time > time - SECONDS * 1000);
-    this.#points.splice(0, past);
+    this.#points.push({ time, asked, measured, metric });
+    const kept = this.#points.findIndex((point) => point.time > time - SECONDS * 1000);
+    this.#points.splice(0, kept);
     this.#draw();
   }
 
   #draw() {
-    const context = this.#context;
-    const { width, height } = context.canvas;
-    context.clearRect(0, 0, width, height);
+    const { width, height } = this.#context.canvas;
+    this.#context.clearRect(0, 0, width, height);
     const last = this.#points.at(-1);
-    if (!this.#on || !last) return;
-    const dpr = pixelsPerCss(context.canvas);
+    if (this.#shown.size === 0 || !last) return;
+
+    const dpr = pixelsPerCss(this.#context.canvas);
     const line = 1.5 * dpr;
     const top = 20 * dpr;
     const right = width * (1 - BELIEF_SHARE);
-    const x = ({ time }) => right * (1 - (last.time - time) / (SECONDS * 1000));
-    const y = (share) => height - line - (height - top - 2 * line) * share;
+    const x = (/** @type {Point} */ { time }) => right * (1 - (last.time - time) / (SECONDS * 1000));
+    const y = (/** @type {number} */ share) => height - line - (height - top - 2 * line) * share;
     const greatest = this.#points.reduce((most, { metric }) => Math.max(most, metric ?? 0), 1e-9);
-    this.#trace(METRIC, line, x, ({ metric }) => (metric == null ? null : y(metric / greatest)));
-    this.#trace(MEASURED, line, x, ({ measured }) => (measured == null ? null : y(measured)));
-    this.#trace(ASKED, line, x, ({ asked }) => y(asked));
+
+    this.#trace(METRIC.colour, line, x, ({ metric }) => (metric === null ? null : y(metric / greatest)));
+    this.#trace(MEASURED.colour, line, x, ({ measured }) => (measured === null ? null : y(measured)));
+    this.#trace(ASKED.colour, line, x, ({ asked }) => y(asked));
     this.#legend(last, dpr);
-    if (this.#beliefOn && this.#belief) this.#bars(this.#belief, right, y, dpr);
+    if (this.#shown.has("belief") && this.#belief) this.#bars(this.#belief, right, y, dpr);
   }
 
-  #trace({ colour }, line, x, y) {
+  /**
+   * @param {string} colour
+   * @param {number} line
+   * @param {(point: Point) => number} x
+   * @param {(point: Point) => number | null} y null where there is nothing to draw
+   */
+  #trace(colour, line, x, y) {
     const context = this.#context;
     Object.assign(context, { strokeStyle: colour, lineWidth: line, lineJoin: "round" });
     context.beginPath();
@@ -85,24 +116,45 @@ export class Traces {
     context.stroke();
   }
 
-  #legend(last, dpr) {
+  /**
+   * @param {Point} last
+   * @param {number} dpr
+   */
+  #legend({ asked, measured, metric }, dpr) {
     const context = this.#context;
     Object.assign(context, { font: `${12 * dpr}px system-ui, sans-serif`, textBaseline: "top" });
-    [ASKED, MEASURED, METRIC].forEach(({ colour, label }, index) => {
-      const value = last[label];
+    const entries = [
+      { ...ASKED, value: asked },
+      { ...MEASURED, value: measured },
+      { ...METRIC, value: metric },
+    ];
+    for (const [index, { colour, label, value }] of entries.entries()) {
       context.fillStyle = colour;
-      context.fillText(`${label} ${value == null ? "–" : value.toPrecision(3)}`, (8 + 120 * index) * dpr, 4 * dpr);
-    });
+      const text = `${label} ${value === null ? "–" : value.toPrecision(3)}`;
+      context.fillText(text, (8 + 120 * index) * dpr, 4 * dpr);
+    }
   }
 
+  /**
+   * @param {number[]} belief
+   * @param {number} left
+   * @param {(share: number) => number} y
+   * @param {number} dpr
+   */
   #bars(belief, left, y, dpr) {
     const context = this.#context;
     const longest = context.canvas.width - left;
     const greatest = Math.max(...belief, 1e-9);
     context.fillStyle = BELIEF_COLOUR;
-    belief.forEach((probability, slice) => {
-      const [from, to] = [y((slice + 1) / belief.length), y(slice / belief.length)];
-      context.fillRect(left, from, (probability / greatest) * longest, Math.max(to - from - dpr / 2, dpr / 2));
-    });
+    for (const [slice, probability] of belief.entries()) {
+      const from = y((slice + 1) / belief.length);
+      const to = y(slice / belief.length);
+      context.fillRect(
+        left,
+        from,
+        (probability / greatest) * longest,
+        Math.max(to - from - dpr / 2, dpr / 2),
+      );
+    }
   }
 }

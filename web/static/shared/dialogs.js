@@ -1,16 +1,34 @@
-// Native dialogs that ask for something and stay open, with the reason, until it has been done.
+// Dialogs that ask for something. They stay open, and say why, until it has been done.
 
 import { inWords } from "./api.js";
-import { setText } from "./dom.js";
+import { byId, setText } from "./dom.js";
 
 /**
- * Opens `dialog`; on submit awaits `done()`, and closes if it worked. `trouble` is where a refusal is told.
+ * @typedef {object} Ask
+ * @property {string} heading
+ * @property {string} consequence what will happen
+ * @property {string} go the button's label
+ * @property {boolean} [danger]
+ * @property {string} [confirm] a statement that has to be ticked too
+ */
+
+/**
+ * Opens `dialog`. On submit it awaits `done()`, and closes if that worked; `trouble` shows why it did not.
+ *
+ * @param {HTMLDialogElement} dialog
+ * @param {HTMLElement} trouble
+ * @param {() => Promise<void>} done
  */
 export function askIn(dialog, trouble, done) {
   const form = dialog.querySelector("form");
-  const submit = form.querySelector("[type=submit]");
+  const submit = /** @type {HTMLButtonElement | null} */ (dialog.querySelector("[type=submit]"));
+  if (!form || !submit) throw new Error(`#${dialog.id} has no form to submit`);
+
   setText(trouble, "");
-  for (const button of dialog.querySelectorAll("[data-close]")) button.onclick = () => dialog.close();
+  for (const button of dialog.querySelectorAll("button")) {
+    if (button.dataset.close !== undefined) button.onclick = () => dialog.close();
+  }
+
   form.onsubmit = async (event) => {
     event.preventDefault();
     submit.disabled = true;
@@ -27,35 +45,48 @@ export function askIn(dialog, trouble, done) {
   dialog.showModal();
 }
 
-/** Asks in the page's reason dialog whether something is meant. `ask` is `{ heading, consequence, go, done() }`. */
+/**
+ * Asks whether something is meant.
+ *
+ * @param {Ask & { done: () => Promise<void> }} ask
+ */
 export function askWhetherMeant(ask) {
-  open({ ...ask, unreasoned: true });
+  openReasonDialog(ask, false);
 }
 
 /**
- * Asks for a reason in the page's reason dialog. `ask` is `{ heading, consequence, go, danger, confirm, done(reason) }`; where
- * there is a `confirm`, its box has to be ticked too.
+ * Asks for a reason.
+ *
+ * @param {Ask & { done: (reason: string) => Promise<void> }} ask
  */
 export function askReason(ask) {
-  open(ask);
+  openReasonDialog(ask, true);
 }
 
-function open(ask) {
-  const dialog = document.getElementById("reason-dialog");
-  const go = document.getElementById("reason-go");
-  setText(document.getElementById("reason-heading"), ask.heading);
-  setText(document.getElementById("reason-consequence"), ask.consequence);
+/**
+ * @param {Ask & { done: (reason: string) => Promise<void> }} ask
+ * @param {boolean} reasoned whether a reason has to be given
+ */
+function openReasonDialog(ask, reasoned) {
+  setText(byId("reason-heading"), ask.heading);
+  setText(byId("reason-consequence"), ask.consequence);
+
+  const go = byId("reason-go", HTMLButtonElement);
   setText(go, ask.go);
   go.className = ask.danger ? "danger filled" : "primary";
-  const reason = document.getElementById("reason");
-  document.getElementById("reason-field").hidden = ask.unreasoned ?? false;
-  reason.required = !ask.unreasoned;
+
+  const reason = byId("reason", HTMLInputElement);
+  byId("reason-field").hidden = !reasoned;
+  reason.required = reasoned;
   reason.value = "";
-  const confirm = document.getElementById("reason-confirm");
-  confirm.hidden = !ask.confirm;
-  setText(confirm.querySelector("span"), ask.confirm ?? "");
-  const confirmed = document.getElementById("reason-confirmed");
+
+  byId("reason-confirm").hidden = !ask.confirm;
+  setText(byId("reason-confirm-text"), ask.confirm ?? "");
+  const confirmed = byId("reason-confirmed", HTMLInputElement);
   confirmed.required = Boolean(ask.confirm);
   confirmed.checked = false;
-  askIn(dialog, document.getElementById("reason-trouble"), () => ask.done(reason.value.trim()));
+
+  askIn(byId("reason-dialog", HTMLDialogElement), byId("reason-trouble"), () =>
+    ask.done(reason.value.trim()),
+  );
 }

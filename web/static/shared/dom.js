@@ -1,47 +1,65 @@
-// Small helpers for making and finding elements. Text only ever goes in as text, never as markup.
-
-/** The element with this id. */
-export const byId = (id) => document.getElementById(id);
+// Finding and making elements. Text is only ever set as text, never as markup.
 
 /**
- * A new element. Properties are set as properties (`className`, `onclick`), except names with a dash and `role`, `for`,
- * which become attributes; children are nodes or text, and nothing is made of null or false.
+ * The element with this id, of the kind that the page's template gives it.
+ *
+ * @template {HTMLElement} [Kind=HTMLElement]
+ * @param {string} id
+ * @param {new () => Kind} [kind]
+ * @returns {Kind}
+ */
+export function byId(id, kind) {
+  const element = document.getElementById(id);
+  if (!(element instanceof (kind ?? HTMLElement))) throw new Error(`the page has no such element as #${id}`);
+  return /** @type {Kind} */ (element);
+}
+
+/**
+ * A new element. Properties are set as properties (`className`, `onclick`). Names with a dash, `role` and `for` become
+ * attributes. Children are nodes or text; null and false are left out.
+ *
+ * @template {keyof HTMLElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Record<string, unknown>} [properties]
+ * @param {...(Node | string | false | null | undefined)} children
+ * @returns {HTMLElementTagNameMap[Tag]}
  */
 export function make(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
     if (value === null || value === undefined) continue;
-    if (name.includes("-") || name === "role" || name === "for") element.setAttribute(name, value);
-    else element[name] = value;
+    if (name.includes("-") || name === "role" || name === "for") element.setAttribute(name, String(value));
+    else Reflect.set(element, name, value);
   }
-  element.append(...children.filter((child) => child !== null && child !== undefined && child !== false));
+
+  for (const child of children) {
+    if (child !== null && child !== undefined && child !== false) element.append(child);
+  }
   return element;
 }
 
-/** Sets text only where it differs, so that screen readers hear changes and nothing else. */
+/**
+ * Sets text only where it differs, so that screen readers hear changes and nothing else.
+ *
+ * @param {HTMLElement} element
+ * @param {string} text
+ */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Replaces the children of `parent` only where they differ: nothing is heard twice, and focus and selection stay. */
+/** @type {WeakMap<HTMLElement, string>} */
+const drawn = new WeakMap();
+
+/**
+ * Replaces the children of `parent` only where they differ: nothing is read out twice, and focus and selection stay.
+ *
+ * @param {HTMLElement} parent
+ * @param {HTMLElement[]} nodes
+ */
 export function redraw(parent, nodes) {
   const markup = nodes.map((node) => node.outerHTML).join("");
-  if (parent.dataset.markup === markup) return;
-  parent.dataset.markup = markup;
+  if (drawn.get(parent) === markup) return;
+  drawn.set(parent, markup);
   parent.replaceChildren(...nodes);
-}
-
-/** A random UUID, version 4. `crypto.randomUUID` is missing on plain http, which is what a tablet in theatre uses. */
-export function uuid() {
-  const bytes = crypto.getRandomValues(new Uint8Array(16));
-  bytes[6] = (bytes[6] & 0x0f) | 0x40;
-  bytes[8] = (bytes[8] & 0x3f) | 0x80;
-  const hex = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-  return hex.replace(/^(.{8})(.{4})(.{4})(.{4})(.{12})$/, "$1-$2-$3-$4-$5");
-}
-
-/** Seconds as `1:05`: those gone by, counted when whole; with `Math.ceil`, those left. */
-export function clockText(seconds, round = Math.floor) {
-  const whole = Math.max(0, round(seconds));
-  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
 }

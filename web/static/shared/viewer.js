@@ -1,66 +1,69 @@
 // The live view: the picture, the overlays on it, and how old it is.
 
 import { makeCanvas, onResize, pixelsPerCss } from "./canvas.js";
+import { make, setText } from "./dom.js";
 import { Live } from "./live.js";
 import { drawContentArea, drawPatch, Peaking } from "./overlay.js";
-import { Traces } from "../operator/traces.js";
 
-/** A picture older than this is no longer live, and says so. */
+/** @typedef {"patch" | "content-area" | "peaking"} Overlay */
+
+/** A picture older than this is no longer live. */
 const STALE_MS = 500;
+const LOOK_MS = 250;
 
-/**
- * Puts a live view into `element`, which must be positioned and have a size of its own.
- *
- * @param {HTMLElement} element
- * @param {{role: "surgeon"|"operator"|"researcher", traces?: HTMLElement}} options `traces`: where the traces of focal
- *   power and metric go; they come to operator and researcher alone
- * @returns {Viewer}
- */
-export function mountViewer(element, options) {
-  return new Viewer(element, options);
-}
-
-/** Emits "frame" (a CustomEvent whose detail is the header of the frame now on screen). */
-class Viewer extends EventTarget {
-  /** Number of the frame on screen; null before the first. */
-  frame = null;
-  /** The server's run that counted it. */
-  run = null;
-  /** The stream: emits "session", "status" and "connection". */
+/** A live view within an element, which must be positioned and have a size of its own. */
+export class Viewer {
+  /** The stream, which brings the session and the devices' state too. */
   live;
 
   #element;
-  #picture = makeCanvas("viewer-picture").getContext("2d", { alpha: false });
-  #overlay = makeCanvas("viewer-overlay").getContext("2d");
-  #stale = Object.assign(document.createElement("p"), { className: "viewer-stale" });
-  #heard = Object.assign(document.createElement("p"), { className: "viewer-heard visually-hidden" });
-  #colour = Object.assign(document.createElement("p"), { className: "viewer-colour", hidden: true });
+  #picture = makeCanvas("viewer-picture", { alpha: false });
+  #overlay = makeCanvas("viewer-overlay");
+  #stale = make("p", { className: "viewer-stale", "aria-hidden": "true" });
+  #heard = make("p", { className: "viewer-heard visually-hidden", role: "status" });
+  #colour = make(
+    "p",
+    { className: "viewer-colour", hidden: true },
+    "Colours estimated from 460–600 nm; reds are inferred.",
+  );
+  /** @type {Set<string>} */
   #shown = new Set();
   #peaking = new Peaking();
-  #traces;
+  /** @type {{ header: Stream.Header, receivedAt: number } | null} */
   #last = null;
   #connected = false;
 
-  constructor(element, { role, traces }) {
-    super();
+  /**
+   * @param {HTMLElement} element
+   * @param {"surgeon" | "operator" | "researcher"} role
+   */
+  constructor(element, role) {
     this.#element = element;
     this.#picture.canvas.setAttribute("role", "img");
     this.#picture.canvas.setAttribute("aria-label", "Live view");
-    // Its seconds count on; only that it is not live, and that it is again, are worth a screen reader's word.
-    this.#stale.setAttribute("aria-hidden", "true");
-    this.#heard.setAttribute("role", "status");
-    this.#colour.textContent = "Colours estimated from 460–600 nm; reds are inferred.";
     element.append(this.#picture.canvas, this.#overlay.canvas, this.#colour, this.#stale, this.#heard);
-    this.#traces = traces && new Traces(traces);
     onResize(this.#overlay.canvas, () => this.#drawOverlays());
+
     this.live = new Live(role);
-    this.live.addEventListener("frame", ({ detail }) => this.#show(detail));
-    this.live.addEventListener("connection", ({ detail }) => {
-      this.#connected = detail.open;
-      this.#tellAge();
+    this.live.listen({
+      frame: (frame) => this.#show(frame),
+      connection: (open) => {
+        this.#connected = open;
+        this.#tellAge();
+      },
     });
-    setInterval(() => this.#tellAge(), 250);
+    setInterval(() => this.#tellAge(), LOOK_MS);
     this.#tellAge();
+  }
+
+  /** Number of the frame on screen; null before the first. */
+  get frame() {
+    return this.#last?.header.frame ?? null;
+  }
+
+  /** The server's run that counted the frame on screen. */
+  get run() {
+    return this.#last?.header.run ?? null;
   }
 
   /** Milliseconds since the picture on screen was exposed; null before the first. */
@@ -71,16 +74,16 @@ class Viewer extends EventTarget {
   /**
    * Switches an overlay.
    *
-   * @param {"patch"|"content-area"|"peaking"|"traces"|"belief"} name
+   * @param {Overlay} name
    * @param {boolean} on
    */
   overlay(name, on) {
     if (on) this.#shown.add(name);
     else this.#shown.delete(name);
-    this.#traces?.show(this.#shown.has("traces"), this.#shown.has("belief"));
     this.#drawOverlays();
   }
 
+  /** @param {Stream.Frame} frame */
   #show({ header, bitmap, receivedAt }) {
     const { canvas } = this.#picture;
     if (canvas.width !== header.width || canvas.height !== header.height) {
@@ -88,14 +91,11 @@ class Viewer extends EventTarget {
     }
     this.#picture.drawImage(bitmap, 0, 0, header.width, header.height);
     this.#last = { header, receivedAt };
-    this.frame = header.frame;
-    this.run = header.run;
+
     if (this.#shown.has("peaking")) this.#peaking.look(bitmap, header.area);
     this.#drawOverlays();
-    this.#traces?.add(header, receivedAt - header.age);
     this.#colour.hidden = !header.estimated;
     if (!this.#stale.hidden) this.#tellAge();
-    this.dispatchEvent(new CustomEvent("frame", { detail: header }));
   }
 
   #drawOverlays() {
@@ -104,12 +104,16 @@ class Viewer extends EventTarget {
     context.resetTransform();
     context.clearRect(0, 0, width, height);
     if (!this.#last) return;
-    const { header } = this.#last;
+
     // The picture keeps its shape within the element; the overlay lies on the picture.
+    const { header } = this.#last;
     const scale = Math.min(width / header.width, height / header.height);
     context.translate((width - header.width * scale) / 2, (height - header.height * scale) / 2);
+
     const line = 1.5 * pixelsPerCss(context.canvas);
-    if (this.#shown.has("peaking")) this.#peaking.draw(context, header.width * scale, header.height * scale);
+    if (this.#shown.has("peaking")) {
+      this.#peaking.draw(context, header.width * scale, header.height * scale);
+    }
     if (this.#shown.has("content-area") && header.area) drawContentArea(context, header.area, scale, line);
     if (this.#shown.has("patch")) drawPatch(context, header.patch, scale, line);
   }
@@ -118,16 +122,28 @@ class Viewer extends EventTarget {
     const { age } = this;
     const isStale = age === null || age > STALE_MS;
     this.#element.classList.toggle("viewer-is-stale", isStale);
-    if (this.#stale.hidden === isStale) this.#heard.textContent = isStale ? "The picture is not live" : "The picture is live again";
+
+    // The seconds count on. A screen reader is told only when the picture stops being live, and when it is again.
+    if (this.#stale.hidden === isStale) {
+      setText(this.#heard, isStale ? "The picture is not live" : "The picture is live again");
+    }
     this.#stale.hidden = !isStale;
-    if (!isStale) return;
-    const told = age === null ? "Waiting for the first picture" : `Not live: the picture is ${inWords(age)} old`;
-    const text = this.#connected ? told : `${told} · connecting`;
-    if (this.#stale.textContent !== text) this.#stale.textContent = text;
+    if (isStale) setText(this.#stale, staleText(age, this.#connected));
   }
 }
 
-function inWords(ms) {
+/**
+ * @param {number | null} age milliseconds; null before the first picture
+ * @param {boolean} connected
+ */
+function staleText(age, connected) {
+  const told =
+    age === null ? "Waiting for the first picture" : `Not live: the picture is ${ageText(age)} old`;
+  return connected ? told : `${told} · connecting`;
+}
+
+/** @param {number} ms */
+function ageText(ms) {
   const seconds = Math.round(ms / 1000);
   if (seconds < 2) return "more than half a second";
   return seconds < 120 ? `${seconds} seconds` : `${Math.round(seconds / 60)} minutes`;

@@ -1,91 +1,145 @@
-// What is being written, kept on this device. A draft belongs to the tab that it is written in: another tab may take it over
-// when asked to, and sends it as it stands once its place is gone. It carries the key under which it will be sent, so that
-// it is kept once even if two tabs send it.
-
-import { uuid } from "../shared/dom.js";
-import { stamp } from "./origin.js";
+// What is being written, kept on this device. A draft belongs to the tab that it is written in. Another tab may take it
+// over when asked to, and sends it as it stands once its place is gone. It carries the key under which it will be sent,
+// so that it is saved once even if two tabs send it.
 
 const PREFIX = "parfocal.draft.";
-const TAB = "parfocal.tab";
 
-/** This tab, also after a reload. */
-const tab = tabName() ?? uuid();
+/** @typedef {import("./origin.js").Stamp} Stamp */
 
-function tabName() {
-  try {
-    return sessionStorage.getItem(TAB);
-  } catch {
-    return null;
+/**
+ * A draft as stored.
+ *
+ * @typedef {{ key: string, given: Stamp, value: any }} Kept
+ */
+
+/**
+ * A draft of any tab: `rest` is what follows the asked-for start of its name, `owner` its tab, `slot` where it is stored.
+ *
+ * @typedef {Kept & { rest: string, owner: string, slot: string }} Found
+ */
+
+export class Drafts {
+  /** This tab, also after a reload. */
+  tab;
+  #store;
+  #origins;
+  #newId;
+
+  /**
+   * @param {import("../shared/storage.js").Store} store
+   * @param {import("./origin.js").Origins} origins
+   * @param {() => string} newId
+   * @param {string} tab
+   */
+  constructor(store, origins, newId, tab) {
+    this.#store = store;
+    this.#origins = origins;
+    this.#newId = newId;
+    this.tab = tab;
   }
-}
 
-/** While the page is in sight its name is stored nowhere, so that a tab duplicated from it gets a name of its own. */
-function noteTab(leaving) {
-  try {
-    if (leaving) sessionStorage.setItem(TAB, tab);
-    else sessionStorage.removeItem(TAB);
-  } catch {
-    // switched off: after a reload this tab is another
+  /**
+   * This tab's draft called `name`.
+   *
+   * @param {string} name
+   */
+  open(name) {
+    return new Draft(this, name);
   }
-}
 
-noteTab(document.hidden);
-document.addEventListener("visibilitychange", () => noteTab(document.hidden));
-addEventListener("pagehide", () => noteTab(true));
-addEventListener("pageshow", () => noteTab(document.hidden));
-
-/** Calls `changed` when another tab has written a draft, or with its slot when it has sent it or taken it over. */
-export function followDrafts(changed) {
-  addEventListener("storage", ({ key, newValue }) => key?.startsWith(PREFIX) && changed(newValue === null ? key : null));
-}
-
-/** The drafts on this device whose names begin with `start`, in whatever tab: `{ rest, owner, slot, key, given, value }`. */
-export function draftsOf(start) {
-  try {
-    return Object.keys(localStorage)
-      .filter((slot) => slot.startsWith(PREFIX + start))
-      .flatMap((slot) => {
-        const [name, owner = ""] = slot.slice(PREFIX.length).split("#");
-        const kept = parsed(slot);
-        return kept ? [{ rest: name.slice(start.length), owner, slot, ...kept }] : [];
-      });
-  } catch {
-    return [];
+  /**
+   * The drafts on this device whose names begin with `start`, of whatever tab.
+   *
+   * @param {string} start
+   * @returns {Found[]}
+   */
+  of(start) {
+    return this.#store.names(PREFIX + start).flatMap((slot) => {
+      const [name = "", owner = ""] = slot.slice(PREFIX.length).split("#");
+      const kept = this.#read(slot);
+      return kept ? [{ ...kept, rest: name.slice(start.length), owner, slot }] : [];
+    });
   }
-}
 
-/** What stands in `slot`. An older page kept the value alone. */
-function parsed(slot) {
-  try {
-    const kept = JSON.parse(localStorage.getItem(slot));
-    if (kept === null) return null;
-    return kept.given ? kept : { key: uuid(), given: stamp(), value: kept };
-  } catch {
-    return null;
+  /**
+   * What stands in `slot`. An older page stored the value alone.
+   *
+   * @param {string} slot
+   * @returns {Kept | null}
+   */
+  #read(slot) {
+    try {
+      const kept = JSON.parse(this.#store.read(slot) ?? "null");
+      if (kept === null) return null;
+      return kept.given ? kept : { key: this.#newId(), given: this.#origins.stamp(), value: kept };
+    } catch {
+      return null;
+    }
   }
-}
 
-/** Takes a draft of any tab off this device: it is sent, or taken over. */
-export function forgetDraft({ slot }) {
-  try {
-    localStorage.removeItem(slot);
-  } catch {
-    // switched off: there was nothing to remove
+  /** @param {string} name */
+  slotOf(name) {
+    return `${PREFIX}${name}#${this.tab}`;
+  }
+
+  /**
+   * A value that is written now, under the key of what was written before it.
+   *
+   * @param {any} value
+   * @param {string} [key]
+   * @returns {Kept}
+   */
+  stamped(value, key = this.#newId()) {
+    return { key, given: this.#origins.stamp(), value };
+  }
+
+  /**
+   * Whether the device keeps it.
+   *
+   * @param {string} slot
+   * @param {Kept} kept
+   */
+  keep(slot, kept) {
+    return this.#store.write(slot, JSON.stringify(kept));
+  }
+
+  /**
+   * Takes a draft of any tab off this device: it is sent, or taken over.
+   *
+   * @param {{ slot: string }} draft
+   */
+  forget({ slot }) {
+    this.#store.remove(slot);
+  }
+
+  /**
+   * Whether `name`, of something in storage, is a draft's.
+   *
+   * @param {string} name
+   */
+  isSlot(name) {
+    return name.startsWith(PREFIX);
   }
 }
 
 /** A draft of this tab. */
 export class Draft {
+  #drafts;
   #name;
   #slot;
-  /** `{ key, given, value }`, or null while nothing is being written. */
+  /** @type {Kept | null} */
   #kept;
   #stored;
 
-  constructor(name) {
+  /**
+   * @param {Drafts} drafts
+   * @param {string} name
+   */
+  constructor(drafts, name) {
+    this.#drafts = drafts;
     this.#name = name;
-    this.#slot = `${PREFIX}${name}#${tab}`;
-    this.#kept = draftsOf(name).find(({ rest, owner }) => rest === "" && owner === tab) ?? null;
+    this.#slot = drafts.slotOf(name);
+    this.#kept = drafts.of(name).find(({ rest, owner }) => rest === "" && owner === drafts.tab) ?? null;
     this.#stored = this.#kept !== null;
   }
 
@@ -94,51 +148,62 @@ export class Draft {
     return this.#kept?.value ?? null;
   }
 
-  /** Keeps `value`; null forgets it. */
+  /**
+   * Keeps `value`; null forgets it.
+   *
+   * @param {any} value
+   */
   write(value) {
     if (value === null) {
       this.take();
       return;
     }
-    const { key } = this.#kept ?? { key: uuid() };
-    this.#kept = { key, given: stamp(), value };
-    try {
-      localStorage.setItem(this.#slot, JSON.stringify(this.#kept));
-      this.#stored = true;
-    } catch {
-      // full or switched off: the text is still in its box
-      this.#stored = false;
-    }
+    this.#kept = this.#drafts.stamped(value, this.#kept?.key);
+    this.#stored = this.#drafts.keep(this.#slot, this.#kept);
   }
 
-  /** Gives `{ key, given }`, under which what was written is to be sent, and forgets it; nothing where nothing was written. */
+  /**
+   * Gives the key and stamp under which to send what was written, and forgets it. Both are missing where nothing was
+   * written.
+   *
+   * @returns {{ key?: string, given?: Stamp }}
+   */
   take() {
     const { key, given } = this.#kept ?? {};
     this.#kept = null;
-    forgetDraft({ slot: this.#slot });
+    this.#drafts.forget({ slot: this.#slot });
     this.#stored = false;
     return { key, given };
   }
 
-  /** Whether this draft stands in `slot`. */
+  /**
+   * Whether this draft stands in `slot`.
+   *
+   * @param {string | null} slot
+   */
   isIn(slot) {
     return this.#stored && slot === this.#slot;
   }
 
   /** Whether another tab has taken this draft over. */
   get claimed() {
-    return this.#kept !== null && this.elsewhere().some(({ key }) => key === this.#kept.key);
+    const kept = this.#kept;
+    return kept !== null && this.elsewhere().some(({ key }) => key === kept.key);
   }
 
   /** The drafts of the same thing in other tabs. */
   elsewhere() {
-    return draftsOf(this.#name).filter(({ rest, owner }) => rest === "" && owner !== tab);
+    return this.#drafts.of(this.#name).filter(({ rest, owner }) => rest === "" && owner !== this.#drafts.tab);
   }
 
-  /** Takes over `other`, one of those elsewhere. */
+  /**
+   * Takes over `other`, one of those elsewhere.
+   *
+   * @param {Found} other
+   */
   claim(other) {
     this.#kept = { key: other.key, given: other.given, value: other.value };
     this.write(other.value);
-    forgetDraft(other);
+    this.#drafts.forget(other);
   }
 }

@@ -1,73 +1,108 @@
-// Tells the server how much of what was said in a session this device still holds, so that nobody unblinds it over that
-// unasked: once when a session is first shown, and from its end on whenever that changes.
+// Tells the server how much of what was said in a session this device still holds, so that nobody unblinds the session
+// without knowing. It tells once when a session is first shown, and from the session's end on whenever that changes.
 
-import { post, Refused } from "../shared/api.js";
-import { draftsOf } from "./drafts.js";
-import { device } from "./origin.js";
+import { Refused } from "../shared/api.js";
 
-const PATH = "/api/surgeon/holding";
 const TRY_AGAIN_MS = 5000;
 const UNDER_WAY = "under way";
 
-/** A session that the server does not know is nobody's business. */
+/** @typedef {Api.SurgeonView | null} View */
+
+/**
+ * A session that the server does not know needs no telling.
+ *
+ * @param {unknown} error
+ */
 function unlessFinal(error) {
   if (!(error instanceof Refused && error.final)) throw error;
 }
 
-/** `unsent()` is whether the comment box holds a text. */
-export function holdingTeller(outbox, unsent) {
-  /** What the server knows, by session. */
-  const known = new Map();
-  const sessions = new Set(outbox.sessions);
-  let shown = null;
-  let telling = false;
-  let timer = null;
+export class Holding {
+  #outbox;
+  #drafts;
+  #unsent;
+  #post;
+  #later;
+  /** What the server knows, by session. @type {Map<string, string>} */
+  #known = new Map();
+  #sessions;
+  /** @type {View} */
+  #shown = null;
+  #telling = false;
+  #cancel = () => {};
 
-  function follow(state) {
-    shown = state;
-    if (state) sessions.add(state.session);
-    tell();
+  /**
+   * @param {object} around
+   * @param {import("./outbox.js").Outbox} around.outbox
+   * @param {import("./drafts.js").Drafts} around.drafts
+   * @param {() => boolean} around.unsent whether the comment box holds a text
+   * @param {(session: string, holding: number) => Promise<unknown>} around.post
+   * @param {(run: () => void, ms: number) => () => void} around.later
+   */
+  constructor({ outbox, drafts, unsent, post, later }) {
+    this.#outbox = outbox;
+    this.#drafts = drafts;
+    this.#unsent = unsent;
+    this.#post = post;
+    this.#later = later;
+    this.#sessions = new Set(outbox.sessions);
+    outbox.subscribe(() => this.tell());
   }
 
-  /** Entries and half-written texts; an order of settings that was not confirmed is no answer. */
-  function held(session) {
-    const comments = draftsOf(`comment.${session}`).map(({ value }) => value.text);
-    const answers = draftsOf(`answer.${session}/`).map(({ value }) => value);
-    const written = [...comments, ...answers].filter((text) => typeof text === "string" && text.trim() !== "").length;
-    const inBox = shown?.session === session && unsent() && written === 0 ? 1 : 0;
-    return outbox.held(session) + written + inBox;
+  /** @param {View} state */
+  follow(state) {
+    this.#shown = state;
+    if (state) this.#sessions.add(state.session);
+    this.tell();
   }
 
-  const underWay = (session) => shown?.session === session && !/completed|aborted/.test(shown.phase);
+  /**
+   * Entries and half-written texts. An order of settings that was not confirmed is no answer.
+   *
+   * @param {string} session
+   */
+  #held(session) {
+    const comments = this.#drafts.of(`comment.${session}`).map(({ value }) => value.text);
+    const answers = this.#drafts.of(`answer.${session}/`).map(({ value }) => value);
+    const written = [...comments, ...answers].filter(
+      (text) => typeof text === "string" && text.trim() !== "",
+    );
+
+    const onlyInBox = this.#shown?.session === session && this.#unsent() && written.length === 0;
+    return this.#outbox.held(session) + written.length + (onlyInBox ? 1 : 0);
+  }
+
+  /** @param {string} session */
+  #underWay(session) {
+    const shown = this.#shown;
+    return shown?.session === session && shown.phase !== "completed" && shown.phase !== "aborted";
+  }
 
   /** What the server does not know yet, or null. */
-  function news() {
-    for (const session of outbox.sessions) sessions.add(session);
-    for (const session of sessions) {
-      if (underWay(session) && known.get(session) === UNDER_WAY) continue;
-      const holding = held(session);
-      const word = underWay(session) ? UNDER_WAY : `holds ${holding}`;
-      if (known.get(session) !== word) return { session, holding, word };
+  #news() {
+    for (const session of this.#outbox.sessions) this.#sessions.add(session);
+
+    for (const session of this.#sessions) {
+      if (this.#underWay(session) && this.#known.get(session) === UNDER_WAY) continue;
+      const holding = this.#held(session);
+      const word = this.#underWay(session) ? UNDER_WAY : `holds ${holding}`;
+      if (this.#known.get(session) !== word) return { session, holding, word };
     }
     return null;
   }
 
-  async function tell() {
-    if (telling) return;
-    telling = true;
-    clearTimeout(timer);
+  async tell() {
+    if (this.#telling) return;
+    this.#telling = true;
+    this.#cancel();
     try {
-      for (let next = news(); next; next = news()) {
-        const { session, holding, word } = next;
-        await post(PATH, { session, device: device(), holding }).catch(unlessFinal);
-        known.set(session, word);
+      for (let next = this.#news(); next; next = this.#news()) {
+        await this.#post(next.session, next.holding).catch(unlessFinal);
+        this.#known.set(next.session, next.word);
       }
     } catch {
-      timer = setTimeout(tell, TRY_AGAIN_MS);
+      this.#cancel = this.#later(() => this.tell(), TRY_AGAIN_MS);
     }
-    telling = false;
+    this.#telling = false;
   }
-
-  outbox.addEventListener("change", tell);
-  return { follow, tell };
 }

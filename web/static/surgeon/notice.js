@@ -1,72 +1,59 @@
-// The full-screen notice at each change of setting. It needs a tap meant for it: one that began before it was there, or
-// the second half of a double tap, does not count.
+// Whether a tap or a key is meant for the full-screen notice at a change of setting. One that began before the notice
+// was there, or the second half of a double tap, is not. Keys of a comment that is being typed are not either.
 
-import { byId, setText } from "../shared/dom.js";
-
+/** A tap this soon after the notice appeared was meant for what was there before. */
 const NOT_MEANT_MS = 600;
+
 /** A key this soon after another belongs to what was being typed. */
 const TYPING_MS = 600;
 
-/**
- * `accept(segment)` is called when the surgeon taps the notice of `segment`. Who is writing in `box` when it appears goes on
- * writing there: keys that are not meant for the notice do not accept it.
- */
-export function changeNotice(box, accept) {
-  const dialog = byId("change");
-  const button = byId("change-tap");
-  let segment = null;
-  let shownAt = 0;
-  let focusBefore = null;
-  let keyAt = -Infinity;
-  let typedAt = -Infinity;
+/** @typedef {{ key: string, repeat: boolean, ctrlKey: boolean, metaKey: boolean, altKey: boolean }} Key */
 
-  document.addEventListener("keydown", (event) => {
-    const now = performance.now();
-    const typing = event.repeat || now - keyAt < TYPING_MS || now - shownAt < NOT_MEANT_MS;
-    keyAt = now;
-    if (!dialog.open) return;
-    const letter = event.key.length === 1 && !event.ctrlKey && !event.metaKey && !event.altKey;
-    const writing = focusBefore === box && box.value !== "";
-    if (event.key === "Enter" ? !typing : !letter || (!typing && !writing)) return;
-    event.preventDefault();
-    typedAt = now;
-    if (!letter || !writing) return;
-    box.setRangeText(event.key, box.selectionStart, box.selectionEnd, "end");
-    box.dispatchEvent(new Event("input"));
-  }, true);
-  dialog.addEventListener("cancel", (event) => event.preventDefault());
-  // A browser may close a dialog against that (Escape, a tablet's back gesture): then it comes back.
-  dialog.addEventListener("close", () => segment !== null && dialog.showModal());
-  button.onclick = ({ detail }) => {
-    const now = performance.now();
-    // Some browsers take a space's release for a click, whatever became of its press.
-    if (now - shownAt < NOT_MEANT_MS || (detail === 0 && now - typedAt < TYPING_MS)) return;
-    setText(byId("change-go"), "One moment…");
-    accept(segment);
-  };
+export class NoticeGuard {
+  #shownAt = 0;
+  #keyAt = Number.NEGATIVE_INFINITY;
+  #typedAt = Number.NEGATIVE_INFINITY;
 
-  function show(state) {
-    if (dialog.open && segment === state.segment) return;
-    segment = state.segment;
-    shownAt = performance.now();
-    setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
-    setText(byId("change-what"), `${state.setting === 1 ? "This is the first setting." : "The setting has changed."} Look around as you would in surgery, and write down what you notice.`);
-    ask("Tap to continue");
-    byId("change-practice").hidden = !state.practice;
-    if (dialog.open) return;
-    focusBefore = document.activeElement;
-    dialog.showModal();
-    button.focus();
+  /**
+   * The notice appeared.
+   *
+   * @param {number} now milliseconds
+   */
+  shown(now) {
+    this.#shownAt = now;
   }
 
-  function hide() {
-    if (!dialog.open) return;
-    segment = null;
-    dialog.close();
-    if (focusBefore?.isConnected) focusBefore.focus();
+  /**
+   * What to do with a key pressed while the notice is `open`: let it through, swallow it, or write it into the comment
+   * box, where the surgeon was `writing` when the notice appeared.
+   *
+   * @param {Key} key
+   * @param {number} now
+   * @param {{ open: boolean, writing: boolean }} page
+   * @returns {"pass" | "swallow" | "write"}
+   */
+  key(key, now, { open, writing }) {
+    const sinceKey = now - this.#keyAt;
+    const typing = key.repeat || sinceKey < TYPING_MS || now - this.#shownAt < NOT_MEANT_MS;
+    this.#keyAt = now;
+    if (!open) return "pass";
+
+    const letter = key.key.length === 1 && !key.ctrlKey && !key.metaKey && !key.altKey;
+    const meant = key.key === "Enter" ? !typing : !letter || (!typing && !writing);
+    if (meant) return "pass";
+
+    this.#typedAt = now;
+    return letter && writing ? "write" : "swallow";
   }
 
-  /** Asks (again) for the tap. */
-  const ask = (text) => setText(byId("change-go"), text);
-  return { show, hide, ask };
+  /**
+   * Whether a click is meant. Some browsers take a space's release for a click, whatever became of its press.
+   *
+   * @param {number} now
+   * @param {boolean} byKey
+   */
+  click(now, byKey) {
+    if (now - this.#shownAt < NOT_MEANT_MS) return false;
+    return !(byKey && now - this.#typedAt < TYPING_MS);
+  }
 }

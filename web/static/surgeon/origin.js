@@ -1,77 +1,116 @@
 // Where and when something is said: on which device, as which of all that is said there, and how long ago. An entry may
-// wait for the network; its wait is measured by the page's monotonic clock, which nobody can set.
-
-import { uuid } from "../shared/dom.js";
+// wait for the network. Its wait is measured by the page's monotonic clock, which nobody can set.
 
 const DEVICE = "parfocal.device";
 const SEQUENCE = "parfocal.sequence";
-/** This load of the page: only two readings of one page's clock can be compared. */
-const PAGE = uuid();
-/** The clocks of a page that was hidden may differ by this much; by more, the device slept, or a clock was set. */
+
+/** The clocks of a hidden page may differ by this much. By more, the device slept, or its clock was set. */
 const DRIFT_MS = 1000;
 
-/** What stands where this device stores nothing: then each load of the page counts as a device. */
-let ownDevice = uuid();
-let latest = 0;
+/**
+ * @typedef {object} Clock
+ * @property {() => number} page milliseconds since this page was loaded; stands still while the device sleeps
+ * @property {() => number} wall milliseconds since 1970; anybody may set it
+ */
 
-/** For how long this page's clock stood still while the device slept, as far as the wall clock tells. */
-let slept = 0;
-let hidden = document.hidden ? readClocks() : null;
+/**
+ * What is kept with something that is said. `clock` is missing in entries of an older page.
+ *
+ * @typedef {object} Stamp
+ * @property {string} [device]
+ * @property {number} [sequence]
+ * @property {number} client_millis
+ * @property {{ page: string, at: number, slept: number }} [clock]
+ */
 
-function readClocks() {
-  return { page: performance.now(), wall: Date.now() };
-}
+export class Origins {
+  #store;
+  #clock;
+  /** This load of the page: only two readings of one page's clock can be compared. */
+  #page;
+  /** The device's name where nothing can be stored: then each load of the page counts as a device. */
+  #ownDevice;
+  #latest = 0;
+  /** For how long the page's clock stood still while the device slept, as far as the wall clock tells. */
+  #slept = 0;
+  /** @type {{ page: number, wall: number } | null} */
+  #hiddenSince = null;
 
-document.addEventListener("visibilitychange", () => {
-  const now = readClocks();
-  if (!document.hidden && hidden) {
-    const gap = now.wall - hidden.wall - (now.page - hidden.page);
-    if (gap > DRIFT_MS) slept += gap;
+  /**
+   * @param {import("../shared/storage.js").Store} store
+   * @param {Clock} clock
+   * @param {() => string} newId
+   */
+  constructor(store, clock, newId) {
+    this.#store = store;
+    this.#clock = clock;
+    this.#page = newId();
+    this.#ownDevice = newId();
   }
-  hidden = document.hidden ? now : null;
-});
 
-/** This device: the same in all tabs of its browser. */
-export function device() {
-  const known = read(DEVICE);
-  if (known) return known;
-  write(DEVICE, ownDevice);
-  // Another tab may have been first.
-  ownDevice = read(DEVICE) ?? ownDevice;
-  return ownDevice;
-}
-
-function next() {
-  latest = Math.max(latest, Number(read(SEQUENCE)) || 0) + 1;
-  write(SEQUENCE, String(latest));
-  return latest;
-}
-
-/** To be kept with what is said now. */
-export function stamp() {
-  return { device: device(), sequence: next(), client_millis: Date.now(), clock: { page: PAGE, at: performance.now(), slept } };
-}
-
-/** What the server is told of `stamp`, at the moment of sending. */
-export function origin({ clock, ...told }) {
-  const samePage = clock?.page === PAGE;
-  const waited = samePage ? performance.now() - clock.at + slept - clock.slept : Date.now() - told.client_millis;
-  const awake = samePage && slept === clock.slept;
-  return { ...told, waited_millis: Math.max(0, Math.round(waited)), waited_by: awake ? "page-clock" : "wall-clock" };
-}
-
-function read(name) {
-  try {
-    return localStorage.getItem(name);
-  } catch {
-    return null;
+  /**
+   * The page went out of sight or came back: it may have slept meanwhile.
+   *
+   * @param {boolean} hidden
+   */
+  sight(hidden) {
+    const page = this.#clock.page();
+    const wall = this.#clock.wall();
+    if (!hidden && this.#hiddenSince) {
+      const gap = wall - this.#hiddenSince.wall - (page - this.#hiddenSince.page);
+      if (gap > DRIFT_MS) this.#slept += gap;
+    }
+    this.#hiddenSince = hidden ? { page, wall } : null;
   }
-}
 
-function write(name, value) {
-  try {
-    localStorage.setItem(name, value);
-  } catch {
-    // full or switched off: this page remembers
+  /** This device: the same in all tabs of its browser. */
+  device() {
+    const known = this.#store.read(DEVICE);
+    if (known) return known;
+
+    // Another tab may have been first.
+    this.#store.write(DEVICE, this.#ownDevice);
+    this.#ownDevice = this.#store.read(DEVICE) ?? this.#ownDevice;
+    return this.#ownDevice;
+  }
+
+  #next() {
+    this.#latest = Math.max(this.#latest, Number(this.#store.read(SEQUENCE)) || 0) + 1;
+    this.#store.write(SEQUENCE, String(this.#latest));
+    return this.#latest;
+  }
+
+  /**
+   * To be kept with what is said now.
+   *
+   * @returns {Stamp}
+   */
+  stamp() {
+    return {
+      device: this.device(),
+      sequence: this.#next(),
+      client_millis: this.#clock.wall(),
+      clock: { page: this.#page, at: this.#clock.page(), slept: this.#slept },
+    };
+  }
+
+  /**
+   * What the server is told of a stamp at the moment of sending.
+   *
+   * @param {Stamp} stamp
+   * @returns {Api.Origin}
+   */
+  tell({ clock, ...told }) {
+    const onThisPage = clock?.page === this.#page ? clock : null;
+    const waited = onThisPage
+      ? this.#clock.page() - onThisPage.at + this.#slept - onThisPage.slept
+      : this.#clock.wall() - told.client_millis;
+    const awake = onThisPage !== null && this.#slept === onThisPage.slept;
+
+    return {
+      ...told,
+      waited_millis: Math.max(0, Math.round(waited)),
+      waited_by: awake ? "page-clock" : "wall-clock",
+    };
   }
 }

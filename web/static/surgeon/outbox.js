@@ -1,41 +1,89 @@
-// Keeps what was said until the server says that it is saved. Every entry is written to this device first, under a key of
-// its own, so that a reload, a Wi-Fi gap or a second tab loses nothing; the entry's idempotency key makes sending it
-// twice harmless, and what it tells of where and when it was said makes the order of sending harmless. What the server
-// refuses stays on this device too, and is tried again when the page is next opened.
+// Keeps what was said until the server says that it is saved. Every entry is first written to this device, under a key
+// of its own, so that a reload, a Wi-Fi gap or a second tab loses nothing. The entry's idempotency key makes sending it
+// twice harmless, and its origin makes the order of sending harmless. What the server refuses stays on this device too,
+// and is tried again when the page is next opened.
 
-import { keep, Refused, inWords } from "../shared/api.js";
-import { uuid } from "../shared/dom.js";
-import { origin, stamp } from "./origin.js";
+import { inWords, Refused } from "../shared/api.js";
 
 const PREFIX = "parfocal.outbox.";
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
 
-/** Fires `change` whenever an entry is added, saved or refused; the event's detail is `{ entry, state, reason, heard }`, `heard` whether the server
- * answered. */
-export class Outbox extends EventTarget {
-  #entries = new Map();
-  #refused = new Map();
-  #flushing = false;
-  #wait = FIRST_WAIT_MS;
-  #timer = null;
-  #latest = 0;
-  /** Why the last attempt failed, if it did. */
+/** @typedef {import("./origin.js").Stamp} Stamp */
+
+/**
+ * Something said. `slot` is the question that it answers, if it does; `drafted` whether another tab may send the same
+ * draft under the same key; `stored` whether this device keeps it over a reload.
+ *
+ * @typedef {object} Entry
+ * @property {string} id sorts in the order in which things were said
+ * @property {string} path
+ * @property {string | null} slot
+ * @property {Stamp} [given]
+ * @property {boolean} drafted
+ * @property {Record<string, any>} body
+ * @property {boolean} [stored]
+ * @property {boolean} [sending]
+ */
+
+/**
+ * What has become of an entry; `heard` says whether the server answered.
+ *
+ * @typedef {object} Change
+ * @property {Entry} entry
+ * @property {"saving" | "saved" | "waiting" | "refused"} state
+ * @property {string | null} reason
+ * @property {boolean} heard
+ */
+
+/**
+ * @typedef {object} Surroundings
+ * @property {import("../shared/storage.js").Store} store
+ * @property {import("./origin.js").Origins} origins
+ * @property {(path: string, body: unknown) => Promise<void>} send resolves once the server has saved it
+ * @property {() => string} newId
+ * @property {() => number} wall milliseconds since 1970
+ * @property {(run: () => void, ms: number) => () => void} later returns what cancels it
+ */
+
+export class Outbox {
+  /**
+   * Why the last attempt failed, if it did.
+   *
+   * @type {string | null}
+   */
   trouble = null;
 
-  constructor() {
-    super();
-    for (const entry of stored()) {
+  #around;
+  /** @type {Map<string, Entry>} */
+  #entries = new Map();
+  /** @type {Map<string, Entry>} */
+  #refused = new Map();
+  /** @type {Set<(change: Change) => void>} */
+  #listeners = new Set();
+  #flushing = false;
+  #wait = FIRST_WAIT_MS;
+  #cancel = () => {};
+  #latest = 0;
+
+  /** @param {Surroundings} around */
+  constructor(around) {
+    this.#around = around;
+    for (const entry of this.#stored()) {
       this.#entries.set(entry.id, entry);
       this.#latest = Math.max(this.#latest, Number.parseInt(entry.id, 10) || 0);
     }
-    addEventListener("storage", ({ key, newValue }) => key && newValue === null && this.#doneElsewhere(key));
-    addEventListener("online", () => this.nudge());
-    document.addEventListener("visibilitychange", () => document.hidden || this.nudge());
-    addEventListener("beforeunload", (event) => {
-      if (!this.durable && this.#entries.size > 0) event.preventDefault();
-    });
     this.nudge();
+  }
+
+  /**
+   * Calls `listener` whenever an entry is added, saved, refused, or could not be sent. Returns what ends that.
+   *
+   * @param {(change: Change) => void} listener
+   */
+  subscribe(listener) {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
   }
 
   /** Whether this device keeps every unsaved entry over a reload. */
@@ -48,163 +96,242 @@ export class Outbox extends EventTarget {
     return [...this.#entries.values()].sort((a, b) => (a.id < b.id ? -1 : 1));
   }
 
-  /** What the server refused on `session` and this device still keeps. */
+  /**
+   * What the server refused of a session and this device still keeps.
+   *
+   * @param {string} session
+   */
   refused(session) {
     return [...this.#refused.values()].filter(({ body }) => body.session === session);
   }
 
-  /** How much of what was said in `session` this device holds, in all its tabs: not saved yet, or refused. */
+  /**
+   * How much of what was said in a session this device holds, in all its tabs: not saved yet, or refused.
+   *
+   * @param {string} session
+   */
   held(session) {
-    const entries = [...stored(), ...this.#entries.values(), ...this.#refused.values()];
-    return new Set(entries.filter(({ body }) => body.session === session).map(({ id }) => id)).size;
-  }
-
-  /** The sessions that entries of this page belong to. */
-  get sessions() {
-    return new Set([...this.#entries.values(), ...this.#refused.values()].map(({ body }) => body.session));
+    const entries = [...this.#stored(), ...this.#entries.values(), ...this.#refused.values()];
+    const ofSession = entries.filter(({ body }) => body.session === session);
+    return new Set(ofSession.map(({ id }) => id)).size;
   }
 
   /**
-   * Takes something to be sent to `path`; `slot` is the question that it answers, if it does. `from` is the `{ key, given }` of
-   * the draft that it was written as, which another tab may send as well.
+   * The sessions that entries of this page belong to.
+   *
+   * @returns {Set<string>}
+   */
+  get sessions() {
+    const entries = [...this.#entries.values(), ...this.#refused.values()];
+    return new Set(entries.map(({ body }) => body.session));
+  }
+
+  /**
+   * Takes something to be sent to `path`.
+   *
+   * @param {string} path
+   * @param {Record<string, unknown>} body
+   * @param {string | null} [slot] the question that it answers, if it does
+   * @param {{ key?: string, given?: Stamp }} [from] the draft that it was written as, which another tab may send as well
    */
   add(path, body, slot = null, from = {}) {
     // A clock that is set back must not put what is said later before what was said.
-    this.#latest = Math.max(Date.now(), this.#latest + 1);
-    const id = `${String(this.#latest).padStart(15, "0")}-${uuid()}`;
-    const { key = uuid(), given = stamp() } = from;
-    const entry = { id, path, slot, given, drafted: from.key !== undefined, body: { key, ...body } };
-    // What the server cannot take is in the surgeon's hands again, who has now given another answer.
-    if (slot) for (const other of [...this.#refused.values()]) if (other.slot === slot) this.forget(other);
+    this.#latest = Math.max(this.#around.wall(), this.#latest + 1);
+    const { key = this.#around.newId(), given = this.#around.origins.stamp() } = from;
+
+    /** @type {Entry} */
+    const entry = {
+      id: `${String(this.#latest).padStart(15, "0")}-${this.#around.newId()}`,
+      path,
+      slot,
+      given,
+      drafted: from.key !== undefined,
+      body: { key, ...body },
+    };
+
+    if (slot) this.#forgetRefused(slot);
     this.#entries.set(entry.id, entry);
-    entry.stored = store(entry);
+    entry.stored = this.#store(entry);
     this.#tell(entry, "saving");
     this.nudge();
     return entry;
   }
 
-  /** The unsaved entries for `slot` and for the parts of it (`slot/part`), oldest first. */
+  /**
+   * What the server refused for `slot` is in the surgeon's hands again, who has now given another answer.
+   *
+   * @param {string} slot
+   */
+  #forgetRefused(slot) {
+    for (const entry of [...this.#refused.values()]) {
+      if (entry.slot === slot) this.forget(entry);
+    }
+  }
+
+  /**
+   * The unsaved entries for `slot` and for its parts (`slot/part`), oldest first.
+   *
+   * @param {string} slot
+   */
   pending(slot) {
     return this.waiting.filter((entry) => entry.slot === slot || entry.slot?.startsWith(`${slot}/`));
   }
 
   /** Tries now rather than at the end of the present wait. */
   nudge() {
-    clearTimeout(this.#timer);
+    this.#cancel();
     this.#wait = FIRST_WAIT_MS;
     this.#flush();
   }
 
-  /** Waits until nothing for `path` waits: true; or until an attempt at such an entry failed, or the server was not heard: false. */
+  /**
+   * Waits until nothing for `path` is unsaved: true. False as soon as an attempt at such an entry failed, or the server
+   * did not answer.
+   *
+   * @param {string} path
+   */
   async settled(path) {
     this.nudge();
     while (this.waiting.some((entry) => entry.path === path)) {
-      const { entry, state, heard } = await new Promise((resolve) => this.addEventListener("change", (event) => resolve(event.detail), { once: true }));
+      const { entry, state, heard } = await this.#nextChange();
       if (state === "waiting" && (entry.path === path || !heard)) return false;
     }
     return true;
   }
 
+  /** @returns {Promise<Change>} */
+  #nextChange() {
+    return new Promise((resolve) => {
+      const end = this.subscribe((change) => {
+        end();
+        resolve(change);
+      });
+    });
+  }
+
   async #flush() {
     if (this.#flushing) return;
     this.#flushing = true;
+
     const tried = new Set();
     const next = () => this.waiting.find((entry) => !tried.has(entry.id));
     for (let entry = next(); entry; entry = next()) {
       tried.add(entry.id);
       if (!(await this.#send(entry))) break;
     }
+
     this.#flushing = false;
     if (this.#entries.size > 0) {
-      this.#timer = setTimeout(() => this.#flush(), this.#wait);
+      this.#cancel = this.#around.later(() => this.#flush(), this.#wait);
       this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
     }
   }
 
-  /** Whether the server answered at all, so that the next entry is worth trying. */
+  /**
+   * Sends one entry. Returns whether the server answered at all, so that the next entry is worth trying.
+   *
+   * @param {Entry} entry
+   * @returns {Promise<boolean>}
+   */
   async #send(entry) {
     entry.sending = true;
     try {
-      await keep(entry.path, { ...entry.body, ...told(entry) });
+      await this.#around.send(entry.path, { ...entry.body, ...this.#origin(entry) });
       this.trouble = null;
       this.forget(entry);
       this.#tell(entry, "saved");
       return true;
     } catch (error) {
       entry.sending = false;
-      if (error instanceof Refused && error.status === 409 && entry.drafted) {
-        // Another tab has sent an earlier text of the same draft under this key: this one is something else.
-        entry.drafted = false;
-        entry.body.key = uuid();
-        entry.stored = store(entry);
-        return this.#send(entry);
-      }
-      if (error instanceof Refused && error.final) {
-        this.#entries.delete(entry.id);
-        this.#refused.set(entry.id, entry);
-        this.#tell(entry, "refused", error.message);
-        return true;
-      }
-      this.trouble = inWords(error, "No connection: trying again by itself.");
-      const heard = error instanceof Refused;
-      this.#tell(entry, "waiting", this.trouble, heard);
-      return heard;
+      return this.#failed(entry, error);
     }
   }
 
-  /** Another tab saved or replaced what both held. */
-  #doneElsewhere(key) {
-    const entry = this.#entries.get(key.slice(PREFIX.length));
-    if (!key.startsWith(PREFIX) || !entry || entry.sending) return;
+  /**
+   * @param {Entry} entry
+   * @param {unknown} error
+   * @returns {Promise<boolean> | boolean}
+   */
+  #failed(entry, error) {
+    if (error instanceof Refused && error.status === 409 && entry.drafted) {
+      // Another tab has sent an earlier text of the same draft under this key: this one is something else.
+      entry.drafted = false;
+      entry.body.key = this.#around.newId();
+      entry.stored = this.#store(entry);
+      return this.#send(entry);
+    }
+
+    if (error instanceof Refused && error.final) {
+      this.#entries.delete(entry.id);
+      this.#refused.set(entry.id, entry);
+      this.#tell(entry, "refused", error.message);
+      return true;
+    }
+
+    this.trouble = inWords(error, "No connection: trying again by itself.");
+    const heard = error instanceof Refused;
+    this.#tell(entry, "waiting", this.trouble, heard);
+    return heard;
+  }
+
+  /**
+   * Another tab saved or replaced what both held.
+   *
+   * @param {string} name the entry's name in storage
+   */
+  doneElsewhere(name) {
+    const entry = this.#entries.get(name.slice(PREFIX.length));
+    if (!name.startsWith(PREFIX) || !entry || entry.sending) return;
     this.#entries.delete(entry.id);
     this.#tell(entry, "saved");
   }
 
-  /** Takes `entry` off this device: it is saved, replaced, or in a person's hands again. */
+  /**
+   * Takes `entry` off this device: it is saved, replaced, or in a person's hands again.
+   *
+   * @param {Entry} entry
+   */
   forget(entry) {
     this.#entries.delete(entry.id);
     this.#refused.delete(entry.id);
-    try {
-      localStorage.removeItem(PREFIX + entry.id);
-    } catch {
-      // storage switched off: there was nothing to remove
-    }
+    this.#around.store.remove(PREFIX + entry.id);
   }
 
+  /**
+   * Where and when `entry` was said. Entries of an older page know only the wall clock, and its answers not even that.
+   *
+   * @param {Entry} entry
+   */
+  #origin({ given, body }) {
+    if (given) return this.#around.origins.tell(given);
+    if (body.client_millis === undefined) return {};
+    return this.#around.origins.tell({ client_millis: body.client_millis });
+  }
+
+  /** @param {Entry} entry */
+  #store(entry) {
+    return this.#around.store.write(PREFIX + entry.id, JSON.stringify(entry));
+  }
+
+  /** @returns {Entry[]} */
+  #stored() {
+    return this.#around.store.names(PREFIX).flatMap((name) => {
+      try {
+        const entry = JSON.parse(this.#around.store.read(name) ?? "");
+        return [{ ...entry, sending: false, stored: true }];
+      } catch {
+        return [];
+      }
+    });
+  }
+
+  /**
+   * @param {Entry} entry
+   * @param {Change["state"]} state
+   * @param {string | null} [reason]
+   * @param {boolean} [heard]
+   */
   #tell(entry, state, reason = null, heard = true) {
-    this.dispatchEvent(new CustomEvent("change", { detail: { entry, state, reason, heard } }));
-  }
-}
-
-/** Where and when `entry` was said. Entries of an older page tell no more than the wall clock, and answers not even that. */
-function told({ given, body }) {
-  if (given) return origin(given);
-  return body.client_millis === undefined ? {} : origin({ client_millis: body.client_millis });
-}
-
-function store(entry) {
-  try {
-    localStorage.setItem(PREFIX + entry.id, JSON.stringify(entry));
-    return true;
-  } catch {
-    return false;
-  }
-}
-
-function stored() {
-  try {
-    return Object.keys(localStorage)
-      .filter((key) => key.startsWith(PREFIX))
-      .flatMap((key) => parsed(localStorage.getItem(key)));
-  } catch {
-    return [];
-  }
-}
-
-function parsed(text) {
-  try {
-    return [{ ...JSON.parse(text), sending: false, stored: true }];
-  } catch {
-    return [];
+    for (const listener of [...this.#listeners]) listener({ entry, state, reason, heard });
   }
 }

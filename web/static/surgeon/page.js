@@ -1,45 +1,82 @@
 // The surgeon's page: follows the session's state as the server sends it, and shows the same whatever is being tried.
 
-import { get, heardAgain, post, Refused, tellTrouble } from "../shared/api.js";
-import { changeNotice } from "./notice.js";
-import { composer } from "./comment_box.js";
-import { byId, clockText, make, setText } from "../shared/dom.js";
-import { Draft, draftsOf, forgetDraft } from "./drafts.js";
-import { holdingTeller } from "./holding.js";
+import { get, post, Refused } from "../shared/api.js";
+import { byId, make, setText } from "../shared/dom.js";
 import { unlessOvertaken } from "../shared/live.js";
-import { Outbox } from "./outbox.js";
-import { onTopOf, questionForm } from "./question_form.js";
-import { twoTaps } from "./confirm.js";
-import { mountViewer } from "../shared/viewer.js";
+import { followOverlayBoxes } from "../shared/overlay_boxes.js";
+import { serverAnswered, tell, tellTrouble } from "../shared/trouble.js";
+import { Viewer } from "../shared/viewer.js";
+import { PATH as ANSWERS, placeOf, sendLeftAnswers, slotOf } from "./answers.js";
+import { commentBox } from "./comment_box.js";
+import { Comments } from "./comments.js";
+import { askForSecondPress } from "./confirm_button.js";
+import { drafts, later, openOutbox, origins } from "./device.js";
+import { Holding } from "./holding.js";
+import { noticeDialog } from "./notice_dialog.js";
+import { card, showPanel } from "./panel.js";
+import { QuestionPanel } from "./question_panel.js";
+import { onTopOf } from "./questions.js";
+import { headline, isEnded, readyWords, savedWords, simulatedWords, steps, timeLeft } from "./words.js";
 
-const ANSWERS = "/api/surgeon/answers";
-const outbox = new Outbox();
-const viewer = mountViewer(byId("view"), { role: "surgeon" });
+const TICK_MS = 250;
+
+/** @typedef {Api.SurgeonView} View */
+
+/** @type {View | null} */
 let state = null;
+/** Whether the server has said what is under way. */
 let known = false;
+/** When the setting's time ends, by the page's clock. @type {number | null} */
 let endsAt = null;
+/** @type {QuestionPanel | null} */
+let questionPanel = null;
+let panelDrawn = "";
 
-const here = () => state && { session: state.session, segment: state.segment, setting: state.setting, frame: viewer.frame ?? null, run: viewer.run ?? null };
-const comments = composer(outbox, here);
-const holding = holdingTeller(outbox, () => comments.unsent());
-const change = changeNotice(byId("comment"), (segment) => act({ action: "acknowledge", segment }));
-const finishUntapped = twoTaps(byId("finish"), byId("finish-heard"), () => act({ action: "finish-segment", segment: state.segment }));
+const outbox = openOutbox();
+const viewer = new Viewer(byId("view"), "surgeon");
+const comments = new Comments(outbox, drafts, here);
+const box = commentBox(comments, outbox);
+const holding = new Holding({
+  outbox,
+  drafts,
+  later,
+  unsent: () => comments.unsent,
+  post: (session, count) =>
+    post("/api/surgeon/holding", { session, device: origins.device(), holding: count }),
+});
+const notice = noticeDialog(byId("comment", HTMLTextAreaElement), (segment) =>
+  act({ action: "acknowledge", segment }),
+);
+const forgetFirstPress = askForSecondPress(byId("finish"), byId("finish-heard"), () => {
+  if (state?.segment) act({ action: "finish-segment", segment: state.segment });
+});
+
+/** What is on screen at this moment; null outside a session. */
+function here() {
+  if (!state) return null;
+  const { session, segment = null, setting } = state;
+  return { session, segment, setting, frame: viewer.frame, run: viewer.run };
+}
 
 /* State in */
 
+/** @param {View | null} next */
 function follow(next) {
   known = true;
   state = next;
-  endsAt = next?.remaining_seconds == null ? null : performance.now() + next.remaining_seconds * 1000;
+  const seconds = next?.remaining_seconds;
+  endsAt = seconds == null ? null : performance.now() + seconds * 1000;
+
   drawBar();
-  comments.follow(state);
+  box.follow(state);
   drawPanel();
   // After the form has gone, which hands over what stood in it.
-  sendLeftAnswers();
-  takeAnswers();
+  sendLeftAnswers(outbox, drafts, state);
+  if (state) questionPanel?.takeAnswers(state);
   holding.follow(state);
-  if (state?.phase === "notice" && !state.paused) change.show(state);
-  else change.hide();
+
+  if (state?.phase === "notice" && !state.paused) notice.show(state);
+  else notice.hide();
 }
 
 const followAnswer = unlessOvertaken(viewer.live, follow);
@@ -52,95 +89,96 @@ async function refresh() {
   }
 }
 
-/** Does `action`; the page then shows what the server's state says, whether this tab or another moved it. */
+/**
+ * Does `action`. The page then shows what the server's state says, whether this tab or another moved it.
+ *
+ * @param {Api.Action} action
+ */
 async function act(action) {
+  if (!state) return;
   try {
     await followAnswer(post("/api/surgeon/actions", { session: state.session, ...action }));
-    setText(byId("trouble"), "");
+    tell(byId("trouble"), "");
   } catch (error) {
     const refused = error instanceof Refused;
-    change.ask(refused ? "Tap to continue" : "No answer yet: tap again");
+    notice.ask(refused ? "Tap to continue" : "No answer yet: tap again");
     if (refused && error.status < 500) await refresh();
-    if (stands(action)) tellTrouble(byId("trouble"), error, "The server does not answer. Try again in a moment.");
+    if (isStillMeant(action)) {
+      tellTrouble(byId("trouble"), error, "The server does not answer. Try again in a moment.");
+    }
   }
 }
 
-/** Whether the page still stands where `action` was meant, so that its refusal is news. */
-function stands(action) {
-  return state !== null && (action.segment === undefined || action.segment === state.segment);
+/**
+ * Whether the page still stands where `action` was meant, so that its refusal is news.
+ *
+ * @param {Api.Action} action
+ */
+function isStillMeant(action) {
+  if (state === null) return false;
+  return !("segment" in action) || action.segment === (state.segment ?? null);
 }
 
 /* Bar */
 
 function drawBar() {
-  const inside = state?.segment != null;
-  setText(byId("setting"), inside ? `Setting ${state.setting} of ${state.settings}` : (state?.title ?? "Live view"));
-  const steps = Array.from({ length: state?.settings ?? 0 }, (_, index) => {
-    const number = index + 1;
-    const over = number < state.setting || (number === state.setting && state.segment === null);
-    return make("li", { className: over ? "done" : number === state.setting ? "now" : "" });
-  });
-  byId("steps").replaceChildren(...steps);
+  setText(byId("setting"), headline(state));
+  byId("steps").replaceChildren(...steps(state).map((className) => make("li", { className })));
   byId("practice").hidden = !state?.practice;
+
+  const finish = byId("finish", HTMLButtonElement);
   const inspecting = state?.phase === "inspecting";
-  byId("finish").hidden = !inspecting;
-  byId("finish").disabled = !inspecting || state.paused;
-  if (byId("finish").disabled) finishUntapped();
-  setText(byId("unrecorded"), state?.unrecorded ? "This step is not recorded yet: the server cannot write to its disk. Tell the operator." : "");
-  setText(byId("prompt"), inspecting && !state.paused ? (state.prompt ?? "") : "");
+  const looking = inspecting && !state?.paused;
+  finish.hidden = !inspecting;
+  finish.disabled = !looking;
+  if (finish.disabled) forgetFirstPress();
+
+  const unrecorded = "This step is not recorded yet: the server cannot write to its disk. Tell the operator.";
+  setText(byId("unrecorded"), state?.unrecorded ? unrecorded : "");
+  setText(byId("prompt"), looking ? (state?.prompt ?? "") : "");
   drawTime();
 }
 
 function drawTime() {
-  const left = byId("remaining");
-  if (state?.phase !== "inspecting" || endsAt === null) return setText(left, "");
-  if (state.paused) return setText(left, "Paused");
-  setText(left, `${clockText((endsAt - performance.now()) / 1000, Math.ceil)} left`);
+  const left = endsAt === null ? null : (endsAt - performance.now()) / 1000;
+  setText(byId("remaining"), timeLeft(state, left));
 }
 
-function followStatus({ camera_simulated: camera, lens_simulated: lens, notice }) {
-  const simulated = [camera && "camera", lens && "lens"].filter(Boolean).join(" and ");
+/** @param {Stream.SurgeonStatus} status */
+function followStatus(status) {
+  const simulated = simulatedWords(status);
   byId("simulated").hidden = simulated === "";
-  setText(byId("simulated"), `Simulated ${simulated}`);
-  setText(byId("device-notice"), notice ?? "");
+  setText(byId("simulated"), simulated);
+  setText(byId("device-notice"), status.notice ?? "");
 }
 
 /* What stands over the picture */
 
-let drawn = "";
-
-const ended = () => state?.phase === "completed" || state?.phase === "aborted";
-
 function drawPanel() {
-  const panel = byId("panel");
-  const key = JSON.stringify(state && [state.session, state.phase, state.paused, state.segment, state.questions, ended() && kept(), state.may_resume && saved()]);
-  if (key === drawn) return;
-  drawn = key;
-  const content = panelContent();
-  panel.hidden = content === null;
-  panel.className = `panel ${content?.className ?? ""}`;
-  panel.replaceChildren(...(content?.nodes ?? []));
-  panel.scrollTop = 0;
-  const heading = panel.querySelector("h2");
-  if (heading && document.activeElement === document.body) heading.focus();
-}
-
-function card(className, heading, text, ...more) {
-  const title = make("h2", { tabIndex: -1 }, heading);
-  return { className, nodes: [make("div", { className: "panel-card", role: "status" }, title, make("p", {}, text), ...more)] };
+  const { session, phase, paused, segment, questions, may_resume: mayResume } = state ?? {};
+  const words = isEnded(state) ? kept() : mayResume ? saved() : "";
+  const key = JSON.stringify([known, session, phase, paused, segment, questions, mayResume, words]);
+  if (key === panelDrawn) return;
+  panelDrawn = key;
+  questionPanel = null;
+  showPanel(panelContent());
 }
 
 function panelContent() {
   if (!known) return null;
-  if (!state) return card("aside", "No trial is under way", "The view is live. A trial begins here by itself when the operator starts one.");
-  if (state.paused && !ended()) return paused();
+  if (!state) {
+    const text = "The view is live. A trial begins here by itself when the operator starts one.";
+    return card("aside", "No trial is under way", text);
+  }
+  if (state.paused && !isEnded(state)) return pausedCard(state);
+
   switch (state.phase) {
     case "ready":
-      return card("aside", state.title, `${state.settings === 1 ? "One setting" : `${state.settings} settings`} to look at, one after another. Waiting for the operator to start.`);
+      return card("aside", state.title, readyWords(state));
     case "questions":
-      return questions(`Setting ${state.setting}: a few questions`);
+      return questions(state, `Setting ${state.setting}: a few questions`);
     case "closing":
-      return questions("To finish");
+      return questions(state, "To finish");
     case "completed":
       return card("centred", "Thank you", `The trial is complete. ${kept()}`);
     case "aborted":
@@ -151,146 +189,80 @@ function panelContent() {
 }
 
 function kept() {
-  return comments.unsent() ? "Your last comment is still in its box: send it, or clear it." : saved();
+  return comments.unsent ? "Your last comment is still in its box: send it, or clear it." : saved();
 }
 
-/** Whether all is saved, said only when it is so. */
 function saved() {
-  const refused = outbox.refused(state.session).length;
-  const said = refused === 1 ? "One thing that you said" : `${refused} things that you said`;
-  const told = refused > 0 ? `${said} could not be saved and ${refused === 1 ? "is" : "are"} kept on this device: tell the operator. ` : "";
-  if (outbox.waiting.length > 0) return `${told}Please leave this page open: some of what you said is still being saved.`;
-  return told.trim() || "Everything you said is saved.";
+  const refused = state ? outbox.refused(state.session).length : 0;
+  return savedWords(refused, outbox.waiting.length);
 }
 
-function paused() {
-  const resume = make("button", { type: "button", className: "primary", onclick: () => act({ action: "resume" }) }, "Go on");
-  const text = state.may_resume ? `The server was restarted. ${saved()} Go on where you were.` : "The operator has paused the session. You can still comment.";
-  return card("centred clear", "Paused", text, state.may_resume && resume);
+/** @param {View} view */
+function pausedCard({ may_resume: mayResume }) {
+  const text = "The operator has paused the session. You can still comment.";
+  if (!mayResume) return card("centred clear", "Paused", text);
+
+  const resume = make("button", { type: "button", className: "primary" }, "Go on");
+  resume.onclick = () => act({ action: "resume" });
+  return card(
+    "centred clear",
+    "Paused",
+    `The server was restarted. ${saved()} Go on where you were.`,
+    resume,
+  );
 }
 
-/* Questions */
-
-const asked = () => ({ session: state.session, segment: state.phase === "questions" ? state.segment : null });
-const slot = ({ id }, { session, segment } = asked()) => `${session}/${segment ?? "closing"}/${id}`;
-
-/** Text answers left half-written, in whatever tab, by questions that are no longer on screen are sent as they stand. */
-function sendLeftAnswers() {
-  const present = /questions|closing/.test(state?.phase) ? slot({ id: "" }) : null;
-  for (const left of draftsOf("answer.")) {
-    const { rest: place, value: text } = left;
-    if (typeof text !== "string" || (present !== null && place.startsWith(present))) continue;
-    const [session, segment, ...question] = place.split("/");
-    const about = { session, segment: segment === "closing" ? null : segment, question: question.join("/") };
-    if (text.trim()) outbox.add(ANSWERS, { ...about, value: text.trim() }, place, left);
-    forgetDraft(left);
-  }
+/**
+ * @param {View} view
+ * @param {string} heading
+ */
+function questions(view, heading) {
+  questionPanel = new QuestionPanel(view, outbox, (segment) => act({ action: "finish-questions", segment }));
+  return questionPanel.content(heading);
 }
 
-function questions(heading) {
-  // What is given belongs here, wherever the session has gone meanwhile.
-  const place = asked();
-  const { segment } = place;
-  const answers = { ...state.answers };
-  for (const question of state.questions) {
-    for (const { body } of outbox.pending(slot(question, place))) answers[question.id] = onTopOf(answers[question.id], body.value);
-  }
-  const boxes = questionForm(state.questions, {
-    answers,
-    settings: state.settings,
-    draft: (question) => new Draft(`answer.${slot(question, place)}`),
-    give(question, value, part = null, from = {}) {
-      const whole = slot(question, place);
-      outbox.add(ANSWERS, { ...place, question: question.id, value }, part === null ? whole : `${whole}/${part}`, from);
-      settle(question);
-    },
-  });
-  const done = make("button", { type: "button", className: "primary", onclick: () => finishQuestions(segment) }, segment === null ? "Finish" : "Continue");
-  const missing = make("p", { id: "missing", className: "message", role: "alert" });
-  const title = make("h2", { tabIndex: -1 }, heading);
-  return { className: "", nodes: [make("div", { className: "questions" }, title, ...boxes, make("div", { className: "done" }, missing, done))] };
-}
-
-async function finishQuestions(segment) {
-  const boxes = [...byId("panel").querySelectorAll(".question")];
-  for (const area of byId("panel").querySelectorAll("textarea")) area.give();
-  const wanting = boxes.filter((box) => unanswered(box));
-  const places = boxes.map((box) => box.want(wanting.includes(box))).filter(Boolean);
-  if (wanting.length > 0) {
-    tellMissing(wanting.length === 1 ? "One question is still open." : `${wanting.length} questions are still open.`);
-    places[0].scrollIntoView({ block: "center" });
-    return places[0].querySelector("input, textarea, button.confirm")?.focus({ preventScroll: true });
-  }
-  tellMissing("Saving…");
-  if (!(await outbox.settled(ANSWERS))) return tellMissing(`${outbox.trouble} Your answers are kept on this device.`, true);
-  if (byId("panel").querySelector(".state.refused")) return tellMissing("An answer was not taken: see above.");
-  await act({ action: "finish-questions", segment });
-  // What stopped it is said by the dock, right beneath.
-  if (byId("missing")) tellMissing("");
-}
-
-/** Says why the questions are not done with; `unheard`: until the server answers again. */
-function tellMissing(text, unheard = false) {
-  byId("missing").toggleAttribute("data-unheard", unheard);
-  setText(byId("missing"), text);
-}
-
-const boxOf = (id) => byId("panel").querySelector(`[data-question="${CSS.escape(id)}"]`);
-
-/** Shows what was answered on another device meanwhile. */
-function takeAnswers() {
-  for (const question of state?.questions ?? []) {
-    const answer = state.answers[question.id];
-    if (answer !== undefined && outbox.pending(slot(question)).length === 0) boxOf(question.id)?.take(answer);
-  }
-}
-
-/** Takes back that `question` is still open. */
-function settle({ id }) {
-  boxOf(id)?.classList.remove("wanting");
-  if (byId("missing") && !byId("panel").querySelector(".wanting")) setText(byId("missing"), "");
-}
-
-function unanswered(box) {
-  const question = state.questions.find(({ id }) => id === box.dataset.question);
-  if (box.begun()) return true;
-  return question && !question.optional && !/saving|saved|waiting/.test(box.querySelector(":scope > .state").className);
-}
-
-outbox.addEventListener("change", ({ detail: { entry, state: reached, reason } }) => {
+outbox.subscribe(({ entry, state: reached, reason }) => {
   if (state) drawPanel();
-  if (entry.path !== ANSWERS) return;
-  const { session, segment, question: id, value } = entry.body;
-  if (!state || session !== state.session || segment !== asked().segment) return;
-  if (reached === "saved") state.answers[id] = onTopOf(state.answers[id], value);
-  const last = outbox.pending(slot({ id })).length === 0;
-  if (reached !== "saved" || last) boxOf(id)?.show(reached, reason);
+  if (entry.path !== ANSWERS || !state) return;
+
+  const { session, segment, question, value } = entry.body;
+  const place = placeOf(state);
+  if (session !== place.session || segment !== place.segment) return;
+  if (reached === "saved") state.answers[question] = onTopOf(state.answers[question], value);
+
+  const isLast = outbox.pending(slotOf(place, question)).length === 0;
+  if (reached !== "saved" || isLast) questionPanel?.show(question, reached, reason);
   // Another device may have given a newer answer, which counts: the server knows.
-  if (reached === "saved" && last) refresh();
+  if (reached === "saved" && isLast) refresh();
 });
 
 /* Wiring */
 
 byId("comment").addEventListener("input", () => {
-  if (!ended()) return;
+  if (!isEnded(state)) return;
   drawPanel();
   holding.tell();
 });
 
-viewer.live.addEventListener("session", (event) => follow(event.detail));
-viewer.live.addEventListener("status", (event) => followStatus(event.detail));
-viewer.live.addEventListener("connection", ({ detail: { open } }) => {
-  if (!open) return;
-  outbox.nudge();
-  holding.tell();
-  heardAgain();
+viewer.live.listen({
+  session: follow,
+  status: followStatus,
+  connection: (open) => {
+    if (!open) return;
+    outbox.nudge();
+    holding.tell();
+    serverAnswered();
+  },
 });
-for (const box of document.querySelectorAll("[data-overlay]")) {
-  box.addEventListener("change", () => viewer.overlay(box.dataset.overlay, box.checked));
-}
+
+followOverlayBoxes((name, on) => {
+  viewer.overlay(/** @type {import("../shared/viewer.js").Overlay} */ (name), on);
+});
+
 document.addEventListener("pointerdown", (event) => {
-  const menu = byId("overlays");
-  if (!menu.contains(event.target)) menu.open = false;
+  const menu = byId("overlays", HTMLDetailsElement);
+  if (!(event.target instanceof Node && menu.contains(event.target))) menu.open = false;
 });
-setInterval(drawTime, 250);
+
+setInterval(drawTime, TICK_MS);
 refresh();

@@ -1,222 +1,258 @@
-// The protocol's questions as a form. Each answer goes to the outbox the moment it is given and shows whether it is
-// saved; what stands in the form is what the server has, unless something newer is on its way.
+// The questions as a form.
 
 import { make, setText } from "../shared/dom.js";
+import { NOT_ANSWERED, ordinal, RankingAnswer, ScaleAnswer, SusAnswer, TextAnswer } from "./questions.js";
 
-const SUS_ITEMS = [
-  "I think that I would like to use this system frequently.",
-  "I found the system unnecessarily complex.",
-  "I thought the system was easy to use.",
-  "I think that I would need the support of a technical person to be able to use this system.",
-  "I found the various functions in this system were well integrated.",
-  "I thought there was too much inconsistency in this system.",
-  "I would imagine that most people would learn to use this system very quickly.",
-  "I found the system very cumbersome to use.",
-  "I felt very confident using the system.",
-  "I needed to learn a lot of things before I could get going with this system.",
-];
-const TYPING_PAUSE_MS = 900;
+/** @typedef {import("./questions.js").AnyAnswer} AnyAnswer */
 
 /**
- * Draws `questions` and returns the form.
+ * One question's element; `draw` shows the answer's state, `wantedPlace` the first place still to be answered.
  *
- * `context.give(question, value, part, from)` sends an answer, or part `part` of one, written as the draft `from`;
- * `context.draft(question)` keeps a text that is being written; `context.answers` maps question ids to answers already given; `context.settings` is how many settings
- * there are. Each question's element has `show(state, reason)`, which tells how far its answer has got; `take(value)`,
- * which shows an answer given on another device; `begun()`, whether something in it waits for a word of the surgeon's; and
- * `want(wanted)`, which marks what is still to be answered, or takes the marks back, and gives the first such place.
+ * @typedef {object} QuestionBox
+ * @property {AnyAnswer} answer
+ * @property {HTMLFieldSetElement} element
+ * @property {() => void} draw
+ * @property {() => boolean} isBusy whether the surgeon is in its field
+ * @property {() => HTMLElement} wantedPlace
  */
-export function questionForm(questions, context) {
-  const draw = { text: textQuestion, likert: likertQuestion, ranking: rankingQuestion, sus: susQuestion };
-  return questions.map((question) => {
-    const state = make("p", { className: "state", role: "status" });
-    const answered = context.answers[question.id];
-    const { nodes, take, open = () => null, begun = () => null, gaps = () => [box] } = draw[question.kind](question, answered, {
-      ...context,
-      give: (value, part, from) => {
-        box.show("saving");
-        context.give(question, value, part, from);
-      },
-      draft: context.draft(question),
-      partly: (text) => showState(state, "partly", text),
-    });
-    const box = make("fieldset", { className: "question", "data-question": question.id }, ...nodes, state);
-    box.show = (reached, reason) => (begun() && reached !== "refused" ? showState(state, "partly", begun()) : showState(state, reached, reason, open()));
-    box.begun = () => begun() !== null;
-    box.want = (wanted) => {
-      const places = wanted ? gaps() : [];
-      for (const marked of [box, ...box.querySelectorAll(".wanting")]) marked.classList.remove("wanting");
-      for (const place of places) place.classList.add("wanting");
-      if (places.includes(box)) showState(state, "partly", begun() ?? "Not answered yet");
-      return places[0];
-    };
-    box.take = (value) => {
-      if (take(value)) box.show("saved");
-    };
-    if (answered !== undefined || begun()) box.show("saved");
-    return box;
-  });
-}
 
-/** What stands once `given` has come on top of `earlier`: a 0 among points leaves what was there, as on the server. */
-export function onTopOf(earlier, given) {
-  return Array.isArray(earlier) && Array.isArray(given) ? given.map((point, index) => point || earlier[index]) : given;
-}
+/**
+ * What is particular to one kind of question.
+ *
+ * @typedef {object} Drawn
+ * @property {HTMLElement[]} nodes
+ * @property {() => void} draw
+ * @property {() => boolean} [isBusy]
+ * @property {() => HTMLElement | undefined} [wantedPart]
+ */
 
-const STATES = { saving: "Saving…", saved: "Saved", waiting: "Kept on this device; will be saved when the connection is back" };
-
-/** Shows how far an answer has got; for a refusal `reason` says why, `open` what is still to be answered. */
-function showState(element, state, reason = "", open = null) {
-  element.className = `state ${open && state !== "refused" ? "partly" : state}`;
-  const text = STATES[state] ?? reason;
-  setText(element, open ? `${open} · ${text}` : text);
-}
-
-function asked(question, tag = "legend") {
-  const optional = question.optional ? make("span", { className: "optional" }, " (optional)") : null;
-  return make(tag, { className: "ask", id: `ask-${question.id}` }, question.text, optional);
-}
-
-function textQuestion(question, answered, context) {
-  const left = context.draft.read();
-  const area = make("textarea", { rows: 3, "aria-labelledby": `ask-${question.id}`, value: left ?? answered ?? "" });
-  // Not asked of the draft, which a full device does not keep.
-  let written = left !== null;
-  let timer = null;
-  const given = () => {
-    clearTimeout(timer);
-    if (!written) return;
-    const text = area.value.trim();
-    const from = context.draft.take();
-    if (text === "") context.partly(answered ? "The earlier answer stays until you write another." : "");
-    else context.give(text, null, from);
-    written = false;
+/**
+ * Draws a question. `changed` is called after the surgeon has changed the answer.
+ *
+ * @param {AnyAnswer} answer
+ * @param {() => void} changed
+ * @returns {QuestionBox}
+ */
+export function questionBox(answer, changed) {
+  const status = make("p", { className: "state", role: "status" });
+  const afterChange = () => {
+    draw();
+    changed();
   };
+  const drawn = drawKind(answer, afterChange);
+  const element = make(
+    "fieldset",
+    { className: "question", "data-question": answer.question.id },
+    ...drawn.nodes,
+    status,
+  );
+
+  function draw() {
+    drawn.draw();
+    element.classList.toggle("wanting", answer.wanted);
+    status.className = `state ${answer.reached}`;
+    setText(status, answer.status);
+  }
+
+  answer.changed = afterChange;
+  draw();
+  return {
+    answer,
+    element,
+    draw,
+    isBusy: drawn.isBusy ?? (() => false),
+    wantedPlace: () => drawn.wantedPart?.() ?? element,
+  };
+}
+
+/**
+ * @param {AnyAnswer} answer
+ * @param {() => void} changed
+ * @returns {Drawn}
+ */
+function drawKind(answer, changed) {
+  if (answer instanceof TextAnswer) return drawText(answer, changed);
+  if (answer instanceof ScaleAnswer) return drawScaleQuestion(answer, changed);
+  if (answer instanceof SusAnswer) return drawSus(answer, changed);
+  return drawRanking(answer, changed);
+}
+
+/** @param {Api.Question} question */
+function heading(question) {
+  const optional = question.optional && make("span", { className: "optional" }, " (optional)");
+  return make("legend", { className: "ask", id: `ask-${question.id}` }, question.text, optional);
+}
+
+/**
+ * @param {TextAnswer} answer
+ * @param {() => void} changed
+ * @returns {Drawn}
+ */
+function drawText(answer, changed) {
+  const area = make("textarea", { rows: 3, "aria-labelledby": `ask-${answer.question.id}` });
   area.addEventListener("input", () => {
-    written = true;
-    context.draft.write(area.value);
-    context.partly("Writing…");
-    clearTimeout(timer);
-    timer = setTimeout(given, TYPING_PAUSE_MS);
+    answer.write(area.value);
+    changed();
   });
-  area.addEventListener("change", given);
-  area.give = given;
-  if (written) timer = setTimeout(given, TYPING_PAUSE_MS);
-  const take = (value) => {
-    const free = !written && document.activeElement !== area && area.value.trim() !== value;
-    if (free) area.value = value;
-    return free;
+  area.addEventListener("change", () => {
+    answer.giveNow();
+    changed();
+  });
+
+  return {
+    nodes: [heading(answer.question), area],
+    draw: () => {
+      if (area.value !== answer.text) area.value = answer.text;
+    },
+    isBusy: () => document.activeElement === area,
   };
-  return { nodes: [asked(question), area], take };
 }
 
-function likertQuestion(question, answered, context) {
-  const points = scale(question.id, question, answered, context.give);
-  return { nodes: [asked(question), points], take: (value) => check(points, value) };
+/**
+ * @param {ScaleAnswer} answer
+ * @param {() => void} changed
+ * @returns {Drawn}
+ */
+function drawScaleQuestion(answer, changed) {
+  const { question } = answer;
+  if (question.kind !== "likert") throw new Error(`question ${question.id} has no scale`);
+  const scale = drawScale(question.id, question, (point) => {
+    answer.choose(point);
+    changed();
+  });
+  return { nodes: [heading(question), scale.element], draw: () => scale.check(answer.point) };
 }
 
-/** Checks the button of `value`; whether it was another before. */
-function check(points, value) {
-  const button = points.querySelector(`input[value="${value}"]`);
-  const news = button !== null && !button.checked;
-  if (news) button.checked = true;
-  return news;
-}
-
-/** Radio buttons 1..=points with what the ends mean. */
-function scale(name, { points, low, high }, chosen, give) {
+/**
+ * Radio buttons from 1 to `points`, with what the ends mean.
+ *
+ * @param {string} name
+ * @param {{ points: number, low: string, high: string }} ends
+ * @param {(point: number) => void} choose
+ */
+function drawScale(name, { points, low, high }, choose) {
   // Room for the mark is kept, so that nothing moves when it comes or goes.
-  const gap = make("span", { className: "gap" }, "Not answered yet");
-  const ends = make("div", { className: "ends" }, make("span", { "aria-hidden": "true" }, low), gap, make("span", { "aria-hidden": "true" }, high));
-  const buttons = Array.from({ length: points }, (_, index) => {
-    const value = index + 1;
-    const meaning = value === 1 ? low : value === points ? high : "";
-    const input = make("input", { type: "radio", name, value, checked: value === chosen, "aria-label": `${value} of ${points}${meaning ? `, ${meaning}` : ""}` });
-    input.addEventListener("change", () => give(value));
-    return make("label", {}, input, make("span", { "aria-hidden": "true" }, String(value)));
+  const ends = make(
+    "div",
+    { className: "ends" },
+    make("span", { "aria-hidden": "true" }, low),
+    make("span", { className: "gap" }, NOT_ANSWERED),
+    make("span", { "aria-hidden": "true" }, high),
+  );
+
+  const inputs = Array.from({ length: points }, (_, index) => {
+    const point = index + 1;
+    const meaning = point === 1 ? `, ${low}` : point === points ? `, ${high}` : "";
+    const label = `${point} of ${points}${meaning}`;
+    const input = make("input", { type: "radio", name, value: String(point), "aria-label": label });
+    input.addEventListener("change", () => choose(point));
+    return input;
   });
-  return make("div", { className: "likert" }, make("div", { className: "points" }, ...buttons), ends);
+  const labels = inputs.map((input) =>
+    make("label", {}, input, make("span", { "aria-hidden": "true" }, input.value)),
+  );
+
+  return {
+    element: make("div", { className: "likert" }, make("div", { className: "points" }, ...labels), ends),
+    /** @param {number | null} point */
+    check(point) {
+      for (const [index, input] of inputs.entries()) {
+        const chosen = index + 1 === point;
+        if (input.checked !== chosen) input.checked = chosen;
+      }
+    },
+  };
 }
 
-function susQuestion(question, answered, context) {
-  const points = [...(answered ?? Array(SUS_ITEMS.length).fill(0))];
-  const open = () => {
-    const given = points.filter((point) => point > 0).length;
-    return given < points.length ? `${given} of ${points.length} answered` : null;
+/**
+ * @param {SusAnswer} answer
+ * @param {() => void} changed
+ * @returns {Drawn}
+ */
+function drawSus(answer, changed) {
+  const ends = { points: 5, low: "Strongly disagree", high: "Strongly agree" };
+  const scales = answer.items.map((_, item) =>
+    drawScale(`${answer.question.id}-${item}`, ends, (point) => {
+      answer.choose(item, point);
+      changed();
+    }),
+  );
+  const items = scales.map(({ element }, item) =>
+    make("fieldset", {}, make("legend", {}, `${item + 1}. ${answer.items[item]}`), element),
+  );
+
+  return {
+    nodes: [heading(answer.question), make("div", { className: "sus" }, ...items)],
+    draw: () => {
+      for (const [item, element] of items.entries()) {
+        scales[item]?.check(answer.points[item] ?? null);
+        element.classList.toggle("wanting", answer.wantedParts[item] ?? false);
+      }
+    },
+    wantedPart: () => items.find((_, item) => answer.wantedParts[item]),
   };
-  const scales = SUS_ITEMS.map((_, index) => {
-    const ends = { points: 5, low: "Strongly disagree", high: "Strongly agree" };
-    // Each item goes by itself, so that it takes back nothing that another device has given.
-    const choose = (value) => {
-      points[index] = value;
-      items[index].classList.remove("wanting");
-      context.give(points.map((_, place) => (place === index ? value : 0)), index);
-    };
-    return scale(`${question.id}-${index}`, ends, points[index], choose);
-  });
-  const take = (value) => {
-    points.splice(0, points.length, ...value);
-    items.forEach((item, index) => points[index] > 0 && item.classList.remove("wanting"));
-    return scales.map((each, index) => check(each, value[index])).some(Boolean);
-  };
-  const items = SUS_ITEMS.map((text, index) => make("fieldset", {}, make("legend", {}, `${index + 1}. ${text}`), scales[index]));
-  const gaps = () => items.filter((_, index) => points[index] === 0);
-  return { nodes: [asked(question), make("div", { className: "sus" }, ...items)], take, open, gaps };
 }
 
-function rankingQuestion(question, answered, context) {
-  // An order counts once it is confirmed as a whole: one tap on an arrow says nothing of the other settings.
-  const arranged = context.draft.read();
-  const order = arranged ?? (answered ? [...answered] : Array.from({ length: context.settings }, (_, index) => index + 1));
+/**
+ * @param {RankingAnswer} answer
+ * @param {() => void} changed
+ * @returns {Drawn}
+ */
+function drawRanking(answer, changed) {
   const list = make("ol", { className: "ranking" });
   const heard = make("p", { className: "visually-hidden", "aria-live": "polite" });
-  const confirm = make("button", { type: "button", className: "confirm", hidden: answered !== undefined && arranged === null }, "This order is right");
-  const begun = () => (!confirm.hidden && context.draft.read() !== null ? "Kept on this device until you tap “This order is right”" : null);
+  const confirm = make("button", { type: "button", className: "confirm" }, "This order is right");
   confirm.onclick = () => {
-    confirm.hidden = true;
-    context.draft.write(null);
-    context.give([...order]);
+    answer.confirm();
+    changed();
   };
-  const moved = () => {
-    if (confirm.hidden) return context.give([...order]);
-    context.draft.write(order);
-    context.partly(begun());
-  };
-  const move = (from, to) => {
-    const [setting] = order.splice(from, 1);
-    order.splice(to, 0, setting);
-    draw();
-    const [up, down] = list.children[to].querySelectorAll("button");
-    (to < from ? (up.disabled ? down : up) : down.disabled ? up : down).focus();
-    setText(heard, `Setting ${setting} is now in place ${to + 1} of ${order.length}`);
-    moved();
-  };
-  const mover = (label, sign, from, to) => {
-    const button = make("button", { type: "button", "aria-label": label, disabled: to < 0 || to >= order.length }, sign);
+  let drawnOrder = "";
+
+  /**
+   * @param {number} from
+   * @param {number} to
+   */
+  function move(from, to) {
+    const setting = answer.move(from, to);
+    changed();
+    const [up, down] = list.children[to]?.querySelectorAll("button") ?? [];
+    const wanted = to < from ? up : down;
+    (wanted?.disabled ? (wanted === up ? down : up) : wanted)?.focus();
+    setText(heard, `Setting ${setting} is now in place ${to + 1} of ${answer.order.length}`);
+  }
+
+  /**
+   * @param {string} label
+   * @param {string} sign
+   * @param {number} from
+   * @param {number} to
+   */
+  function mover(label, sign, from, to) {
+    const disabled = to < 0 || to >= answer.order.length;
+    const button = make("button", { type: "button", "aria-label": label, disabled }, sign);
     button.onclick = () => move(from, to);
     return button;
-  };
-  const draw = () =>
-    list.replaceChildren(
-      ...order.map((setting, index) =>
-        make("li", {}, make("span", { className: "place" }, `${place(index + 1)}${index === 0 ? ", best" : ""}`), make("span", {}, `Setting ${setting}`),
-          mover(`Move setting ${setting} up`, "↑", index, index - 1), mover(`Move setting ${setting} down`, "↓", index, index + 1)),
-      ),
-    );
-  draw();
-  const take = (value) => {
-    if (begun()) return false;
-    const news = !confirm.hidden || value.some((setting, index) => setting !== order[index]);
-    if (!news) return false;
-    confirm.hidden = true;
-    order.splice(0, order.length, ...value);
-    draw();
-    return true;
-  };
-  return { nodes: [asked(question), list, heard, confirm], take, begun };
-}
+  }
 
-function place(number) {
-  const ending = ["th", "st", "nd", "rd"][number % 10] ?? "th";
-  return `${number}${number >= 11 && number <= 13 ? "th" : ending}`;
+  function draw() {
+    confirm.hidden = answer.confirmed;
+    const order = JSON.stringify(answer.order);
+    if (order === drawnOrder) return;
+    drawnOrder = order;
+
+    const lines = answer.order.map((setting, index) => {
+      const place = `${ordinal(index + 1)}${index === 0 ? ", best" : ""}`;
+      return make(
+        "li",
+        {},
+        make("span", { className: "place" }, place),
+        make("span", {}, `Setting ${setting}`),
+        mover(`Move setting ${setting} up`, "↑", index, index - 1),
+        mover(`Move setting ${setting} down`, "↓", index, index + 1),
+      );
+    });
+    list.replaceChildren(...lines);
+  }
+
+  return { nodes: [heading(answer.question), list, heard, confirm], draw };
 }

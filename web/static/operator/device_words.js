@@ -1,0 +1,93 @@
+// The devices' health in words: a lamp each, and every warning as a sentence that says what to do.
+
+/** @typedef {Stream.OperatorStatus} Status */
+/** @typedef {{ name: string, figure: string, level: "" | "warn" | "bad", title: string }} Lamp */
+/** @typedef {{ text: string, level: "warn" | "bad" }} Warning */
+
+/** @param {number} micros */
+function milliseconds(micros) {
+  return (micros / 1000).toFixed(2);
+}
+
+/**
+ * A lamp for camera, lens and loop.
+ *
+ * @param {Status} status
+ * @returns {Lamp[]}
+ */
+export function lamps(status) {
+  const { camera, lens } = status;
+  const lost = camera.lost > 0 ? ` · ${camera.lost} lost` : "";
+  const isHeld = status.held !== null && status.held !== "paused";
+
+  return [
+    {
+      name: camera.name,
+      figure: `${camera.fps.toFixed(1)} fps${lost}`,
+      level: level(camera.working, camera.simulated),
+      title: camera.message,
+    },
+    {
+      name: lens.name,
+      figure: lens.working ? "" : "not answering",
+      level: level(lens.working, lens.simulated || lens.caution),
+      title: lens.message,
+    },
+    {
+      name: "focus loop",
+      figure: `${status.steps_per_second.toFixed(0)} steps/s · ${latencyWords(status)}`,
+      level: isHeld ? "bad" : "",
+      title: status.message ?? "",
+    },
+  ];
+}
+
+/**
+ * @param {boolean} working
+ * @param {boolean} warn
+ */
+function level(working, warn) {
+  if (!working) return "bad";
+  return warn ? "warn" : "";
+}
+
+/** @param {Status} status */
+function latencyWords({ latency_p50_micros: median, latency_p99_micros: p99 }) {
+  if (median === null || p99 === null) return "timing hidden";
+  return `${milliseconds(median)} ms median, ${milliseconds(p99)} ms p99`;
+}
+
+/**
+ * One warning for each trouble: a failed camera or lens is also why the focus is held.
+ *
+ * @param {Status} status
+ * @returns {Warning[]}
+ */
+export function warnings(status) {
+  const { camera, lens, held } = status;
+  const cameraHolds = held === "camera-failed";
+  const lensHolds = held === "lens-failed" && !lens.working;
+  /** @type {Warning[]} */
+  const all = [];
+
+  if (!camera.working) {
+    all.push({ text: `Camera: ${cameraHolds ? status.message : camera.message}`, level: "bad" });
+  }
+  if (!lens.working) all.push({ text: `Lens: ${lens.message}`, level: "bad" });
+  else if (lens.caution) all.push({ text: `Lens: ${lens.message}`, level: "warn" });
+
+  if (held !== null && held !== "paused" && !cameraHolds && !lensHolds) {
+    const message = status.message ?? "the lens is being held where it is.";
+    all.push({ text: `Focus loop: ${message}`, level: "bad" });
+  }
+
+  const simulated = [camera.simulated && "camera", lens.simulated && "lens"].filter(Boolean);
+  if (simulated.length > 0) {
+    all.push({ text: `Simulated ${simulated.join(" and ")}: this is not a real instrument.`, level: "warn" });
+  }
+  if (status.telemetry_dropped > 0) {
+    const dropped = `${status.telemetry_dropped} telemetry records were dropped: the disk cannot keep up.`;
+    all.push({ text: `${dropped} Comments and answers are not affected.`, level: "warn" });
+  }
+  return all;
+}

@@ -1,0 +1,29 @@
+// One order at a time, so that the last one given is the last to arrive. Orders overtaken meanwhile are left out.
+
+/** @template Order */
+export class Orders {
+  /** Whether an order is on its way. */
+  busy = false;
+  #send;
+  /** @type {{ order: Order } | null} */
+  #next = null;
+
+  /** @param {(order: Order) => Promise<void>} send must not reject */
+  constructor(send) {
+    this.#send = send;
+  }
+
+  /** @param {Order} order */
+  async give(order) {
+    this.#next = { order };
+    if (this.busy) return;
+
+    this.busy = true;
+    while (this.#next) {
+      const { order: next } = this.#next;
+      this.#next = null;
+      await this.#send(next);
+    }
+    this.busy = false;
+  }
+}

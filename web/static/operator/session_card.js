@@ -1,0 +1,191 @@
+// The session under way: where it stands, what the operator can do with it, and what was said and done in it.
+
+import { post, Refused } from "../shared/api.js";
+import { askReason, askWhetherMeant } from "../shared/dialogs.js";
+import { byId, make, redraw, setText } from "../shared/dom.js";
+import { tell, tellTrouble } from "../shared/trouble.js";
+import { commentWords, deeds, phaseWords, steps, timeLeft, unrecordedWords } from "./session_words.js";
+
+/** @typedef {Api.OperatorView} View */
+/** @typedef {import("./session_words.js").Deed} Deed */
+
+export class SessionCard {
+  #followAnswer;
+  /** @type {View | null} */
+  #session = null;
+  /** When the setting's time ends, by the page's clock. @type {number | null} */
+  #endsAt = null;
+
+  /** @param {(answer: Promise<View | null>) => Promise<void>} followAnswer */
+  constructor(followAnswer) {
+    this.#followAnswer = followAnswer;
+  }
+
+  /** @param {View | null} session */
+  follow(session) {
+    this.#session = session;
+    const seconds = session?.remaining_seconds;
+    this.#endsAt = seconds == null ? null : performance.now() + seconds * 1000;
+
+    byId("new-session").hidden = session !== null;
+    byId("running").hidden = session === null;
+    byId("follow").hidden = session === null;
+    this.#drawBadges();
+    if (session) this.#draw(session);
+  }
+
+  /** @param {View} session */
+  #draw(session) {
+    setText(byId("phase"), phaseWords(session));
+    byId("unrecorded").hidden = !session.unrecorded;
+    setText(byId("unrecorded"), unrecordedWords(session));
+    byId("steps").replaceChildren(...steps(session).map((className) => make("li", { className })));
+    this.#drawDeeds(session);
+    drawFeed(session);
+    this.drawTime();
+  }
+
+  #drawBadges() {
+    const session = this.#session;
+    const badge = (/** @type {string} */ text, level = "") =>
+      make("span", { className: `badge ${level}` }, text);
+    const badges = session
+      ? [
+          badge(session.participant),
+          ...(session.practice ? [badge("Practice", "warn")] : []),
+          ...(session.paused ? [badge("Paused", "warn")] : []),
+        ]
+      : [];
+    redraw(byId("session-badges"), badges);
+  }
+
+  drawTime() {
+    if (!this.#session) return;
+    const left = this.#endsAt === null ? null : (this.#endsAt - performance.now()) / 1000;
+    setText(byId("remaining"), timeLeft(this.#session, left));
+  }
+
+  /** @param {View} session */
+  #drawDeeds(session) {
+    const buttons = deeds(session).map(({ deed, label, className }) =>
+      make("button", { type: "button", className, onclick: () => this.#do(deed) }, label),
+    );
+    redraw(byId("session-actions"), buttons);
+  }
+
+  /** @param {Deed} deed */
+  #do(deed) {
+    if (!this.#session) return;
+    switch (deed) {
+      case "start":
+        return this.#act({ action: "start" });
+      case "resume":
+        return this.#act({ action: "resume" });
+      case "end-setting":
+        return this.#askEndSetting(this.#session);
+      case "pause":
+        return this.#askPause(this.#session);
+      case "abort":
+        return this.#askAbort(this.#session);
+      case "dismiss":
+        return this.#dismiss(this.#session);
+    }
+  }
+
+  /** @param {View} view */
+  #askEndSetting({ session, segment, setting }) {
+    if (!segment) return;
+    askWhetherMeant({
+      heading: `End setting ${setting} now`,
+      consequence:
+        "The surgeon’s time with this setting ends for good; the questions about it follow. Comments on it are still kept.",
+      go: `End setting ${setting}`,
+      done: () => this.#send(session, { action: "finish-segment", segment }),
+    });
+  }
+
+  /** @param {View} view */
+  #askPause({ session }) {
+    askReason({
+      heading: "Pause the session",
+      consequence:
+        "The clock stops and the lens holds still. The surgeon sees that the session is paused and can still comment.",
+      go: "Pause",
+      done: (reason) => this.#send(session, { action: "pause", reason }),
+    });
+  }
+
+  /** @param {View} view */
+  #askAbort({ session }) {
+    askReason({
+      heading: "Abort the session",
+      consequence:
+        "The session ends for good and cannot be taken up again. Everything said and answered so far is kept.",
+      go: "Abort session",
+      danger: true,
+      done: (reason) => this.#send(session, { action: "abort", reason }),
+    });
+  }
+
+  /** @param {View} view */
+  async #dismiss({ session }) {
+    try {
+      await this.#followAnswer(post("/api/operator/dismissals", { session }));
+    } catch (error) {
+      tellTrouble(byId("session-trouble"), error);
+    }
+  }
+
+  /**
+   * Does `action` on the session that was shown when it was asked for: another operator may have closed that one.
+   *
+   * @param {string} session
+   * @param {Api.Action} action
+   */
+  async #send(session, action) {
+    if (this.#session?.session !== session) {
+      throw new Refused(409, "This session was closed meanwhile: nothing was done.", true);
+    }
+    await this.#followAnswer(post("/api/operator/actions", { session, ...action }));
+  }
+
+  /** @param {Api.Action} action */
+  async #act(action) {
+    if (!this.#session) return;
+    try {
+      await this.#send(this.#session.session, action);
+      tell(byId("session-trouble"), "");
+    } catch (error) {
+      tellTrouble(byId("session-trouble"), error);
+    }
+  }
+}
+
+/**
+ * Comments and events, newest first.
+ *
+ * @param {View} session
+ */
+function drawFeed(session) {
+  setText(byId("comment-count"), String(session.comments));
+  const comments = session.latest_comments.map((comment) => {
+    const where = comment.setting
+      ? make("span", { className: "who" }, `setting ${comment.setting} · `)
+      : null;
+    return make("li", {}, timeOf(comment.at), make("span", {}, where, commentWords(comment)));
+  });
+  const none = make("li", { className: "empty" }, "None yet.");
+  redraw(byId("comments"), comments.length > 0 ? comments : [none]);
+
+  const events = session.log.map((line) => {
+    const by = make("span", { className: "who" }, ` · ${line.by}`);
+    return make("li", {}, timeOf(line.at), make("span", {}, line.text, by));
+  });
+  redraw(byId("log"), events);
+}
+
+/** @param {string} at */
+function timeOf(at) {
+  const text = new Date(at).toLocaleTimeString([], { hour12: false });
+  return make("time", { dateTime: at, title: at }, text);
+}

@@ -1,0 +1,105 @@
+// The session as the operator reads it: its phase, its steps, what can be done with it.
+
+import { clockText } from "../shared/text.js";
+
+/** @typedef {Api.OperatorView} View */
+/** @typedef {"start" | "resume" | "end-setting" | "pause" | "dismiss" | "abort"} Deed */
+
+/** @param {View} view */
+export function isOver({ phase }) {
+  return phase === "completed" || phase === "aborted";
+}
+
+/** @param {View} view */
+export function phaseWords({ phase, setting, settings }) {
+  const which = `Setting ${setting} of ${settings}`;
+  switch (phase) {
+    case "ready":
+      return "Ready to start";
+    case "notice":
+      return `${which}: waiting for the surgeon’s tap`;
+    case "inspecting":
+      return `${which}: inspecting`;
+    case "questions":
+      return `${which}: questions`;
+    case "closing":
+      return "Closing questions";
+    case "completed":
+      return "Completed";
+    case "aborted":
+      return "Aborted";
+  }
+}
+
+/**
+ * What has become of each setting, in order.
+ *
+ * @param {View} view
+ * @returns {("done" | "now" | "")[]}
+ */
+export function steps({ phase, setting, settings }) {
+  return Array.from({ length: settings }, (_, index) => {
+    const number = index + 1;
+    if (number < setting || phase === "completed" || phase === "closing") return "done";
+    return number === setting ? "now" : "";
+  });
+}
+
+/**
+ * @param {View} view
+ * @param {number | null} seconds left of the setting's time, where it has a limit
+ */
+export function timeLeft({ phase, paused }, seconds) {
+  if (phase !== "inspecting" || seconds === null) return "";
+  return paused ? "clock stopped" : `${clockText(seconds, Math.ceil)} left`;
+}
+
+/**
+ * The buttons, in order.
+ *
+ * @param {View} view
+ * @returns {{ deed: Deed, label: string, className: "" | "primary" | "danger" }[]}
+ */
+export function deeds(view) {
+  const { phase, paused, setting } = view;
+  /** @type {ReturnType<typeof deeds>} */
+  const all = [];
+
+  if (phase === "ready") all.push({ deed: "start", label: "Start", className: "primary" });
+  if (paused) all.push({ deed: "resume", label: "Resume", className: "primary" });
+  else if (phase === "inspecting") {
+    all.push({ deed: "end-setting", label: `End setting ${setting} now…`, className: "" });
+  }
+
+  if (!paused && phase !== "ready" && !isOver(view)) {
+    all.push({ deed: "pause", label: "Pause…", className: "" });
+  }
+  if (isOver(view)) all.push({ deed: "dismiss", label: "Close and prepare the next", className: "primary" });
+  else all.push({ deed: "abort", label: "Abort…", className: "danger" });
+  return all;
+}
+
+/**
+ * Says that the lens was stopped before that could be written down, and what will happen.
+ *
+ * @param {View} view
+ */
+export function unrecordedWords({ unrecorded, unrecorded_because: because }) {
+  if (!unrecorded) return "";
+  const why = because ?? "the disk has not answered";
+  const then =
+    "The server goes on trying. If it ends before it can, the session is paused when it starts again.";
+  return `The lens is held, but this is not recorded yet: ${why}. ${then}`;
+}
+
+/** @param {Api.CommentLine} comment */
+export function commentWords(comment) {
+  if (comment.kind === "mark") return "Marked this moment";
+  return comment.kind === "quick" ? `${comment.text} (quick)` : comment.text;
+}
+
+/** @param {Api.Choices["protocols"][number]} protocol */
+export function protocolWords({ researcher_title: title, settings, segment_seconds: seconds, practice }) {
+  const length = `${title}: ${settings} settings of at most ${clockText(seconds)}`;
+  return practice ? `${length}; practice, kept apart from real data.` : `${length}.`;
+}

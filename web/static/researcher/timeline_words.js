@@ -1,0 +1,59 @@
+// The timeline in words.
+
+/** @typedef {Api.Timeline} Timeline */
+
+/**
+ * What the drawing shows, for a screen reader.
+ *
+ * @param {Timeline} timeline
+ * @param {boolean} withPath whether the focal path is drawn
+ */
+export function description({ settings, pauses, comments, set_aside: setAside }, withPath) {
+  const held = pauses.length > 0 ? ` ${pauses.length} ${pauses.length > 1 ? "pauses" : "pause"},` : "";
+  const answers = setAside.length > 1 ? "answers that do" : "answer that does";
+  const apart = setAside.length > 0 ? ` ${setAside.length} ${answers} not count,` : "";
+
+  const what = withPath ? "Focal power over time" : "Time line";
+  const said = `${comments.length} comments, which follow as a list.`;
+  return `${what}: ${settings.length} settings,${held}${apart} ${said}`;
+}
+
+/** @param {Api.TimelineComment} comment */
+export function commentWords(comment) {
+  return comment.kind === "mark" ? "Marked this moment" : comment.text;
+}
+
+/**
+ * What an answer that does not count says, and why it does not.
+ *
+ * @param {Pick<Api.SetAside, "value" | "counted" | "late">} answer
+ */
+export function setAsideWords({ value, counted, late }) {
+  const why = late ? "arrived too late" : "another device’s later answer differs";
+  const instead = counted == null ? "" : `; ${answerWords(counted)} counts`;
+  return `${answerWords(value)} (${why}${instead})`;
+}
+
+/** @param {Api.AnswerValue} value a 0 among points is one that was not given */
+function answerWords(value) {
+  const parts = Array.isArray(value) ? value : [value];
+  return parts.map((part) => (part === 0 ? "–" : part)).join(", ");
+}
+
+/**
+ * What a surgeon's tablet may still hold; null where nothing may be outstanding.
+ *
+ * @param {Api.Outstanding | null | undefined} outstanding
+ * @param {(moment: string) => string} timeOf writes a moment as a time of day
+ */
+export function outstandingWords(outstanding, timeOf) {
+  if (!outstanding) return null;
+  const { counts_until: until, devices } = outstanding;
+  const said = [];
+  if (until) said.push(`What a tablet still holds counts until ${timeOf(until)}.`);
+  if (devices > 0) {
+    const tablets = devices === 1 ? "One tablet has" : `${devices} tablets have`;
+    said.push(`${tablets} not said since the end that nothing is left on it.`);
+  }
+  return said.join(" ");
+}

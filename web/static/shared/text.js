@@ -1,0 +1,23 @@
+// How times and counts are written.
+
+/**
+ * Seconds as `1:05`. Time gone by counts whole seconds; for time that is left, pass `Math.ceil`.
+ *
+ * @param {number} seconds
+ * @param {(seconds: number) => number} [round]
+ */
+export function clockText(seconds, round = Math.floor) {
+  const whole = Math.max(0, round(seconds));
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
+}
+
+/**
+ * `1 comment`, `2 comments`.
+ *
+ * @param {number} count
+ * @param {string} one
+ * @param {string} [many]
+ */
+export function counted(count, one, many = `${one}s`) {
+  return `${count} ${count === 1 ? one : many}`;
+}

@@ -1,0 +1,269 @@
+// The comment that is being written, and those that were said. A comment belongs to the setting under which it was
+// begun, even when the setting changes while it is being written. One begun in another tab is offered, not shown.
+
+import { counted } from "../shared/text.js";
+
+export const PATH = "/api/surgeon/comments";
+
+/** As much of a draft elsewhere as its button shows. */
+const OFFERED_LETTERS = 16;
+
+/**
+ * Where something is said: what was on screen at that moment.
+ *
+ * @typedef {object} Place
+ * @property {string} session
+ * @property {string | null} segment
+ * @property {number} setting
+ * @property {number | null} frame
+ * @property {number | null} run
+ */
+
+/** @typedef {Omit<Place, "session">} Begun where a comment was begun */
+/** @typedef {{ kind: "text" | "quick", text: string } | { kind: "mark" }} Said */
+
+/**
+ * A comment as it is posted.
+ *
+ * @param {Said} what
+ * @param {Partial<Place>} place
+ */
+function comment(what, { session, segment = null, frame = null, run = null }) {
+  return { session, segment, frame, run, ...what };
+}
+
+/** @param {import("./drafts.js").Found} draft */
+function textOf({ value }) {
+  return typeof value.text === "string" ? value.text.trim() : "";
+}
+
+export class Comments {
+  /** What stands in the box. */
+  text = "";
+
+  /** Why the last comment was not saved. */
+  trouble = "";
+
+  #outbox;
+  #drafts;
+  #here;
+  /** The number of each setting that was on screen. @type {Map<string, number>} */
+  #numbers = new Map();
+  /** @type {import("./drafts.js").Draft | null} */
+  #draft = null;
+  /** @type {Begun | null} */
+  #begun = null;
+  #saved = 0;
+  /** @type {string | null | undefined} */
+  #session;
+  #closed = true;
+
+  /**
+   * @param {import("./outbox.js").Outbox} outbox
+   * @param {import("./drafts.js").Drafts} drafts
+   * @param {() => Place | null} here null outside a session
+   */
+  constructor(outbox, drafts, here) {
+    this.#outbox = outbox;
+    this.#drafts = drafts;
+    this.#here = here;
+  }
+
+  /** @param {Api.SurgeonView | null} state */
+  follow(state) {
+    const session = state?.session ?? null;
+    if (session !== this.#session) this.#begin(session);
+    if (state?.segment != null) this.#numbers.set(state.segment, state.setting);
+    this.#closed = !state || state.phase === "completed" || state.phase === "aborted";
+    this.#saved = state?.comments ?? 0;
+  }
+
+  /** @param {string | null} session */
+  #begin(session) {
+    this.#sendBox();
+    this.#session = session;
+    this.#sendLeft(session);
+
+    this.#draft = session === null ? null : this.#drafts.open(`comment.${session}`);
+    const left = this.#draft?.read();
+    this.#begun = left?.begun ?? null;
+    this.write(left?.text ?? "");
+    this.trouble = "";
+  }
+
+  /** What stands in the box is sent as it stands: it is about the session that goes. */
+  #sendBox() {
+    const text = this.text.trim();
+    // A tab that took it over sends it.
+    if (!this.#session || text === "" || !this.#draft || this.#draft.claimed) return;
+    const about = { session: this.#session, ...this.#begun };
+    this.#outbox.add(PATH, comment({ kind: "text", text }, about), null, this.#draft.take());
+  }
+
+  /**
+   * Half-written comments on sessions that were put away are sent as they stand: their box is gone.
+   *
+   * @param {string | null} session
+   */
+  #sendLeft(session) {
+    for (const left of this.#drafts.of("comment.")) {
+      if (left.rest === session) continue;
+      const text = textOf(left);
+      const about = { session: left.rest, ...left.value.begun };
+      if (text) this.#outbox.add(PATH, comment({ kind: "text", text }, about), null, left);
+      this.#drafts.forget(left);
+    }
+  }
+
+  /**
+   * What other tabs do with drafts. One may have sent or taken over the draft in `taken`.
+   *
+   * @param {string | null} [taken]
+   */
+  followOtherTabs(taken = null) {
+    if (this.#draft && (this.#draft.isIn(taken) || this.#draft.claimed)) this.write("");
+  }
+
+  /** Whether nothing can be written: outside a session, with an empty box. */
+  get disabled() {
+    return this.#closed && this.text === "";
+  }
+
+  /** Whether the box holds a text. */
+  get unsent() {
+    return this.text.trim() !== "";
+  }
+
+  /** What was begun in another tab, while nothing is being written here: its text, whole and shortened. */
+  get offer() {
+    if (this.disabled || this.text !== "") return null;
+    const other = this.#begunElsewhere();
+    if (!other) return null;
+
+    const whole = textOf(other);
+    const letters = [...whole];
+    const isLong = letters.length > OFFERED_LETTERS;
+    return { whole, start: isLong ? `${letters.slice(0, OFFERED_LETTERS).join("")}…` : whole };
+  }
+
+  #begunElsewhere() {
+    return this.#draft?.elsewhere().find((draft) => textOf(draft) !== "");
+  }
+
+  /** Takes over what was begun in another tab; whether there was anything. */
+  takeOver() {
+    const other = this.#begunElsewhere();
+    if (!other || !this.#draft) return false;
+    this.#draft.claim(other);
+    this.#begun = other.value.begun ?? null;
+    this.write(other.value.text);
+    return true;
+  }
+
+  /**
+   * The box now holds `text`.
+   *
+   * @param {string} text
+   */
+  write(text) {
+    this.text = text;
+    const here = this.#here();
+    if (text === "") this.#begun = null;
+    else if (!this.#begun && here) this.#begun = begunAt(here);
+    this.#draft?.write(text === "" ? null : { text, begun: this.#begun });
+  }
+
+  /** Sends what stands in the box; whether there was anything to send. */
+  submit() {
+    const here = this.#here();
+    const text = this.text.trim();
+    if (!here || text === "") return false;
+
+    // It was said now, whenever it was begun.
+    const { key } = this.#draft?.take() ?? {};
+    this.#outbox.add(PATH, comment({ kind: "text", text }, { ...here, ...this.#begun }), null, { key });
+    this.write("");
+    this.trouble = "";
+    return true;
+  }
+
+  /**
+   * Sends a quick comment or a mark; whether there is a session to say it in.
+   *
+   * @param {Said} what
+   */
+  say(what) {
+    const here = this.#here();
+    if (!here) return false;
+    this.#outbox.add(PATH, comment(what, here));
+    return true;
+  }
+
+  /**
+   * The outbox has news of an entry.
+   *
+   * @param {import("./outbox.js").Change} change
+   */
+  hear({ entry, state, reason }) {
+    if (entry.path === PATH && state === "refused") this.#refused(entry, reason ?? "");
+  }
+
+  /**
+   * @param {import("./outbox.js").Entry} entry
+   * @param {string} reason
+   */
+  #refused(entry, reason) {
+    const { body } = entry;
+    if (body.session !== this.#session) return;
+
+    if (body.kind === "text") {
+      this.#outbox.forget(entry);
+      const setting = this.#numbers.get(body.segment) ?? 0;
+      this.#begun ??= { segment: body.segment, setting, frame: body.frame, run: body.run };
+      this.write(this.text === "" ? body.text : `${body.text}\n${this.text}`);
+    }
+    this.trouble = `${refusedWords(body)}: ${reason}`;
+  }
+
+  /** The number of the setting that the box's comment is about, where that is not the one on screen. */
+  get aboutOtherSetting() {
+    const begun = this.#begun;
+    const isOther = begun !== null && begun.setting > 0 && begun.segment !== this.#here()?.segment;
+    return isOther && this.text !== "" ? begun.setting : null;
+  }
+
+  /**
+   * How far what was said has got.
+   *
+   * @returns {{ kind: "saved" | "saving" | "unsaved", text: string }}
+   */
+  get status() {
+    const waiting = this.#outbox.waiting.filter((entry) => entry.path === PATH).length;
+    if (waiting === 0) {
+      return { kind: "saved", text: this.#saved === 0 ? "" : `${counted(this.#saved, "comment")} saved` };
+    }
+
+    const { trouble, durable } = this.#outbox;
+    if (trouble === null) return { kind: "saving", text: "Saving…" };
+    const kept = durable ? "device" : "page: do not close it";
+    return {
+      kind: "unsaved",
+      text: `${counted(waiting, "comment")} not saved yet, kept on this ${kept}. ${trouble}`,
+    };
+  }
+}
+
+/**
+ * @param {Place} place
+ * @returns {Begun}
+ */
+function begunAt({ segment, setting, frame, run }) {
+  return { segment, setting, frame, run };
+}
+
+/** @param {Record<string, any>} body */
+function refusedWords({ kind, text }) {
+  if (kind === "text") return "The comment was not saved, it is back in the box";
+  if (kind === "mark") return "The mark was not saved";
+  return `“${text}” was not saved`;
+}

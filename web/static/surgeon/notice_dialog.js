@@ -1,0 +1,81 @@
+// The full-screen notice at each change of setting.
+
+import { byId, setText } from "../shared/dom.js";
+import { NoticeGuard } from "./notice.js";
+
+const TAP = "Tap to continue";
+
+/**
+ * `accept(segment)` is called when the surgeon taps the notice of `segment`. A surgeon who is writing in `box` when the
+ * notice appears goes on writing there.
+ *
+ * @param {HTMLTextAreaElement} box
+ * @param {(segment: string) => void} accept
+ */
+export function noticeDialog(box, accept) {
+  const dialog = byId("change", HTMLDialogElement);
+  const button = byId("change-tap");
+  const guard = new NoticeGuard();
+  /** @type {string | null} */
+  let segment = null;
+  /** @type {Element | null} */
+  let focusBefore = null;
+
+  document.addEventListener("keydown", onKey, true);
+  dialog.addEventListener("cancel", (event) => event.preventDefault());
+  // A browser may close a dialog against that (Escape, a tablet's back gesture): then it comes back.
+  dialog.addEventListener("close", () => segment !== null && dialog.showModal());
+
+  /** @param {KeyboardEvent} event */
+  function onKey(event) {
+    const writing = focusBefore === box && box.value !== "";
+    const told = guard.key(event, performance.now(), { open: dialog.open, writing });
+    if (told === "pass") return;
+
+    event.preventDefault();
+    if (told !== "write") return;
+    box.setRangeText(event.key, box.selectionStart, box.selectionEnd, "end");
+    box.dispatchEvent(new Event("input"));
+  }
+
+  button.onclick = ({ detail }) => {
+    if (segment === null || !guard.click(performance.now(), detail === 0)) return;
+    ask("One moment…");
+    accept(segment);
+  };
+
+  /** @param {Api.SurgeonView} state */
+  function show(state) {
+    if (!state.segment || (dialog.open && segment === state.segment)) return;
+    segment = state.segment;
+    guard.shown(performance.now());
+
+    const change = state.setting === 1 ? "This is the first setting." : "The setting has changed.";
+    setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
+    setText(
+      byId("change-what"),
+      `${change} Look around as you would in surgery, and write down what you notice.`,
+    );
+    byId("change-practice").hidden = !state.practice;
+    ask(TAP);
+
+    if (dialog.open) return;
+    focusBefore = document.activeElement;
+    dialog.showModal();
+    button.focus();
+  }
+
+  function hide() {
+    if (!dialog.open) return;
+    segment = null;
+    dialog.close();
+    if (focusBefore instanceof HTMLElement && focusBefore.isConnected) focusBefore.focus();
+  }
+
+  /** @param {string} text */
+  function ask(text) {
+    setText(byId("change-go"), text);
+  }
+
+  return { show, hide, ask };
+}

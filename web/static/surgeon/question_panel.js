@@ -1,0 +1,144 @@
+// The questions on screen: draws them, sends what is answered, and says what is still open.
+
+import { make } from "../shared/dom.js";
+import { tell, tellUntilAnswered } from "../shared/trouble.js";
+import { PATH, placeOf, slotOf } from "./answers.js";
+import { drafts, later } from "./device.js";
+import { questionBox } from "./question_form.js";
+import { answerTo, onTopOf, Questionnaire } from "./questions.js";
+
+/** @typedef {Api.SurgeonView} View */
+/** @typedef {import("./question_form.js").QuestionBox} QuestionBox */
+
+export class QuestionPanel {
+  #outbox;
+  #finish;
+  #place;
+  #questionnaire;
+  /** @type {QuestionBox[]} */
+  #boxes;
+  #missing = make("p", { id: "missing", className: "message", role: "alert" });
+
+  /**
+   * @param {View} state
+   * @param {import("./outbox.js").Outbox} outbox
+   * @param {(segment: string | null) => Promise<void>} finish tells the server that the questions are done
+   */
+  constructor(state, outbox, finish) {
+    this.#outbox = outbox;
+    this.#finish = finish;
+    // What is given belongs here, wherever the session has gone meanwhile.
+    this.#place = placeOf(state);
+
+    const answers = state.questions.map((question) => this.#answer(question, state));
+    this.#questionnaire = new Questionnaire(answers);
+    this.#boxes = answers.map((answer) => questionBox(answer, () => this.#settled()));
+  }
+
+  /**
+   * @param {Api.Question} question
+   * @param {View} state
+   */
+  #answer(question, state) {
+    const slot = slotOf(this.#place, question.id);
+    let answered = state.answers[question.id];
+    for (const { body } of this.#outbox.pending(slot)) answered = onTopOf(answered, body.value);
+
+    return answerTo(question, answered, {
+      settings: state.settings,
+      later,
+      draft: () => drafts.open(`answer.${slot}`),
+      give: (_, value, part, from) => {
+        const body = { ...this.#place, question: question.id, value };
+        this.#outbox.add(PATH, body, part === null ? slot : `${slot}/${part}`, from);
+      },
+    });
+  }
+
+  /**
+   * @param {string} heading
+   * @returns {import("./panel.js").Content}
+   */
+  content(heading) {
+    const label = this.#place.segment === null ? "Finish" : "Continue";
+    const done = make("button", { type: "button", className: "primary", onclick: () => this.#done() }, label);
+    const form = make(
+      "div",
+      { className: "questions" },
+      make("h2", { tabIndex: -1 }, heading),
+      ...this.#boxes.map(({ element }) => element),
+      make("div", { className: "done" }, this.#missing, done),
+    );
+    return { className: "", nodes: [form] };
+  }
+
+  async #done() {
+    const unanswered = this.#questionnaire.check();
+    this.#draw();
+    if (unanswered.length > 0) {
+      this.#showUnanswered(unanswered);
+      return;
+    }
+
+    tell(this.#missing, "Saving…");
+    if (!(await this.#outbox.settled(PATH))) {
+      tellUntilAnswered(this.#missing, `${this.#outbox.trouble} Your answers are kept on this device.`);
+      return;
+    }
+    if (this.#questionnaire.refused) {
+      tell(this.#missing, "An answer was not taken: see above.");
+      return;
+    }
+
+    // What stops it is said by the dock, right beneath.
+    await this.#finish(this.#place.segment);
+    tell(this.#missing, "");
+  }
+
+  /** @param {import("./questions.js").AnyAnswer[]} unanswered */
+  #showUnanswered(unanswered) {
+    const count = unanswered.length;
+    tell(this.#missing, count === 1 ? "One question is still open." : `${count} questions are still open.`);
+
+    const first = this.#boxes.find(({ answer }) => answer === unanswered[0])?.wantedPlace();
+    first?.scrollIntoView({ block: "center" });
+    /** @type {HTMLElement | null | undefined} */
+    const field = first?.querySelector("input, textarea, button.confirm");
+    field?.focus({ preventScroll: true });
+  }
+
+  /** The surgeon has changed an answer: it is no longer said to be open. */
+  #settled() {
+    if (!this.#questionnaire.marked) tell(this.#missing, "");
+  }
+
+  /**
+   * Shows what was answered on another device meanwhile.
+   *
+   * @param {View} state
+   */
+  takeAnswers(state) {
+    for (const { answer, isBusy } of this.#boxes) {
+      const value = state.answers[answer.question.id];
+      const isPending = this.#outbox.pending(slotOf(this.#place, answer.question.id)).length > 0;
+      if (value !== undefined && !isPending) answer.take(value, isBusy());
+    }
+    this.#draw();
+  }
+
+  /**
+   * Shows how far the answer to `question` has got.
+   *
+   * @param {string} question
+   * @param {import("./outbox.js").Change["state"]} reached
+   * @param {string | null} reason
+   */
+  show(question, reached, reason) {
+    this.#questionnaire.find(question)?.show(reached, reason ?? "");
+    this.#draw();
+  }
+
+  #draw() {
+    for (const box of this.#boxes) box.draw();
+  }
+}

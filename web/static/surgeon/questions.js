@@ -1,0 +1,470 @@
+// The protocol's questions, and how far the answer to each has got. Each answer goes to the outbox the moment it is given.
+// What stands on the page is what the server has, unless something newer is on its way.
+
+/** @typedef {"saving" | "saved" | "waiting" | "refused" | "partly" | ""} Reached */
+/** @typedef {import("./drafts.js").Draft} Draft */
+
+/**
+ * What answers do with the rest of the page.
+ *
+ * @typedef {object} Context
+ * @property {(question: Api.Question, value: Api.AnswerValue, part: number | null, from: ReturnType<Draft["take"]>) => void} give
+ *   sends an answer, or part `part` of one, which was written as the draft `from`
+ * @property {(question: Api.Question) => Draft} draft
+ * @property {(run: () => void, ms: number) => () => void} later
+ * @property {number} settings how many settings there are
+ */
+
+const SUS_ITEMS = [
+  "I think that I would like to use this system frequently.",
+  "I found the system unnecessarily complex.",
+  "I thought the system was easy to use.",
+  "I think that I would need the support of a technical person to be able to use this system.",
+  "I found the various functions in this system were well integrated.",
+  "I thought there was too much inconsistency in this system.",
+  "I would imagine that most people would learn to use this system very quickly.",
+  "I found the system very cumbersome to use.",
+  "I felt very confident using the system.",
+  "I needed to learn a lot of things before I could get going with this system.",
+];
+
+const TYPING_PAUSE_MS = 900;
+export const NOT_ANSWERED = "Not answered yet";
+
+/** @type {Partial<Record<Reached, string>>} */
+const REACHED_WORDS = {
+  saving: "Saving…",
+  saved: "Saved",
+  waiting: "Kept on this device; will be saved when the connection is back",
+};
+
+/**
+ * What stands once `given` has come on top of `earlier`. A 0 among points leaves what was there, as on the server.
+ *
+ * @param {Api.AnswerValue | undefined} earlier
+ * @param {Api.AnswerValue} given
+ * @returns {Api.AnswerValue}
+ */
+export function onTopOf(earlier, given) {
+  if (!Array.isArray(earlier) || !Array.isArray(given)) return given;
+  return given.map((point, index) => point || (earlier[index] ?? 0));
+}
+
+/**
+ * `1st`, `2nd`, `3rd`, `4th`, `11th`.
+ *
+ * @param {number} number
+ */
+export function ordinal(number) {
+  const isTeen = number % 100 >= 11 && number % 100 <= 13;
+  const ending = ["th", "st", "nd", "rd"][number % 10] ?? "th";
+  return `${number}${isTeen ? "th" : ending}`;
+}
+
+/** One question, and how far its answer has got. */
+class Answer {
+  question;
+  /** How far the answer has got. @type {Reached} */
+  reached = "";
+  /** The same in words. */
+  status = "";
+  /** Whether the surgeon was told that this is still to be answered. */
+  wanted = false;
+  context;
+  /** Called after each change that the view did not cause. */
+  changed = () => {};
+
+  /**
+   * @param {Api.Question} question
+   * @param {Context} context
+   */
+  constructor(question, context) {
+    this.question = question;
+    this.context = context;
+  }
+
+  /** What the surgeon has begun and must still confirm, in words; null where nothing is. @returns {string | null} */
+  get begun() {
+    return null;
+  }
+
+  /** What is still to be answered of it, in words; null where nothing is. @returns {string | null} */
+  get open() {
+    return null;
+  }
+
+  /** Whether a part of it is still to be answered, where it has parts: by place. @returns {boolean[]} */
+  get wantedParts() {
+    return [];
+  }
+
+  /** Whether the surgeon must still do something here. */
+  get unanswered() {
+    if (this.begun !== null) return true;
+    return !this.question.optional && !["saving", "saved", "waiting"].includes(this.reached);
+  }
+
+  /** Whether this question, or a part of it, is marked as still to be answered. */
+  get marked() {
+    return this.wanted || this.wantedParts.includes(true);
+  }
+
+  /**
+   * Shows how far an answer has got.
+   *
+   * @param {Reached} reached
+   * @param {string} [reason] why it was refused
+   */
+  show(reached, reason = "") {
+    if (this.begun !== null && reached !== "refused") {
+      this.note(this.begun);
+      return;
+    }
+    const text = REACHED_WORDS[reached] ?? reason;
+    this.reached = this.open !== null && reached !== "refused" ? "partly" : reached;
+    this.status = this.open === null ? text : `${this.open} · ${text}`;
+  }
+
+  /**
+   * Shows `text` beside an answer that has not been given yet.
+   *
+   * @param {string} text
+   */
+  note(text) {
+    this.reached = "partly";
+    this.status = text;
+  }
+
+  /** Marks what is still to be answered. */
+  want() {
+    this.wanted = true;
+    this.note(this.begun ?? NOT_ANSWERED);
+  }
+
+  /** Takes the marks back. */
+  unwant() {
+    this.wanted = false;
+  }
+
+  /** Gives at once what would be given after a pause. */
+  giveNow() {}
+
+  /**
+   * @param {Api.AnswerValue} value
+   * @param {number | null} [part]
+   * @param {ReturnType<Draft["take"]>} [from]
+   */
+  give(value, part = null, from = {}) {
+    this.show("saving");
+    this.wanted = false;
+    this.context.give(this.question, value, part, from);
+  }
+
+  /**
+   * Shows an answer that was given on another device; `busy` is whether the surgeon is at this one.
+   *
+   * @param {Api.AnswerValue} value
+   * @param {boolean} [busy]
+   */
+  take(value, busy = false) {
+    if (this.accept(value, busy)) this.show("saved");
+  }
+
+  /**
+   * Takes `value` over; whether that changes anything.
+   *
+   * @param {Api.AnswerValue} _value
+   * @param {boolean} _busy
+   */
+  accept(_value, _busy) {
+    return false;
+  }
+}
+
+/** An answer in words. It is given when the surgeon pauses, or leaves the field. */
+export class TextAnswer extends Answer {
+  text;
+  #draft;
+  #answered;
+  /** Not asked of the draft, which a full device does not keep. */
+  #written;
+  #cancel = () => {};
+
+  /**
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue | undefined} answered
+   * @param {Context} context
+   */
+  constructor(question, answered, context) {
+    super(question, context);
+    this.#draft = context.draft(question);
+    const left = this.#draft.read();
+    this.#answered = answered !== undefined;
+    this.#written = left !== null;
+    this.text = String(left ?? answered ?? "");
+    if (this.#answered) this.show("saved");
+    if (this.#written) this.#giveLater();
+  }
+
+  /** @param {string} text */
+  write(text) {
+    this.text = text;
+    this.#written = true;
+    this.#draft.write(text);
+    this.note("Writing…");
+    this.#giveLater();
+  }
+
+  #giveLater() {
+    this.#cancel();
+    this.#cancel = this.context.later(() => {
+      this.giveNow();
+      this.changed();
+    }, TYPING_PAUSE_MS);
+  }
+
+  /** @override */
+  giveNow() {
+    this.#cancel();
+    if (!this.#written) return;
+    const from = this.#draft.take();
+    this.#written = false;
+
+    const text = this.text.trim();
+    if (text !== "") this.give(text, null, from);
+    else this.note(this.#answered ? "The earlier answer stays until you write another." : "");
+  }
+
+  /**
+   * @override
+   * @param {Api.AnswerValue} value
+   * @param {boolean} busy
+   */
+  accept(value, busy) {
+    if (this.#written || busy || this.text.trim() === value) return false;
+    this.text = String(value);
+    return true;
+  }
+}
+
+/** A point on a scale. */
+export class ScaleAnswer extends Answer {
+  /** @type {number | null} */
+  point;
+
+  /**
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue | undefined} answered
+   * @param {Context} context
+   */
+  constructor(question, answered, context) {
+    super(question, context);
+    this.point = typeof answered === "number" ? answered : null;
+    if (answered !== undefined) this.show("saved");
+  }
+
+  /** @param {number} point */
+  choose(point) {
+    this.point = point;
+    this.give(point);
+  }
+
+  /**
+   * @override
+   * @param {Api.AnswerValue} value
+   */
+  accept(value) {
+    if (typeof value !== "number" || value === this.point) return false;
+    this.point = value;
+    return true;
+  }
+}
+
+/** The ten items of the System Usability Scale; 0 where none is given. */
+export class SusAnswer extends Answer {
+  items = SUS_ITEMS;
+  points;
+  #wantedItems = SUS_ITEMS.map(() => false);
+
+  /**
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue | undefined} answered
+   * @param {Context} context
+   */
+  constructor(question, answered, context) {
+    super(question, context);
+    this.points = Array.isArray(answered) ? [...answered] : SUS_ITEMS.map(() => 0);
+    if (answered !== undefined) this.show("saved");
+  }
+
+  /** @override @returns {string | null} */
+  get open() {
+    const given = this.points.filter((point) => point > 0).length;
+    return given < this.points.length ? `${given} of ${this.points.length} answered` : null;
+  }
+
+  /** @override */
+  get wantedParts() {
+    return this.#wantedItems;
+  }
+
+  /** @override */
+  want() {
+    this.#wantedItems = this.points.map((point) => point === 0);
+  }
+
+  /** @override */
+  unwant() {
+    super.unwant();
+    this.#wantedItems = SUS_ITEMS.map(() => false);
+  }
+
+  /**
+   * Each item goes by itself, so that it takes back nothing that another device has given.
+   *
+   * @param {number} item
+   * @param {number} point
+   */
+  choose(item, point) {
+    this.points[item] = point;
+    this.#wantedItems[item] = false;
+    const alone = this.points.map((_, place) => (place === item ? point : 0));
+    this.give(alone, item);
+  }
+
+  /**
+   * @override
+   * @param {Api.AnswerValue} value
+   */
+  accept(value) {
+    if (!Array.isArray(value)) return false;
+    const isNews = value.some((point, item) => point > 0 && point !== this.points[item]);
+    this.points = [...value];
+    this.#wantedItems = this.#wantedItems.map((wanted, item) => wanted && value[item] === 0);
+    return isNews;
+  }
+}
+
+/** An order of the settings. It counts once it is confirmed: one tap on an arrow says nothing about the other settings. */
+export class RankingAnswer extends Answer {
+  order;
+  confirmed;
+  #draft;
+
+  /**
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue | undefined} answered
+   * @param {Context} context
+   */
+  constructor(question, answered, context) {
+    super(question, context);
+    this.#draft = context.draft(question);
+    /** @type {number[] | null} */
+    const arranged = this.#draft.read();
+    const given = Array.isArray(answered) ? answered : null;
+    this.order = [
+      ...(arranged ?? given ?? Array.from({ length: context.settings }, (_, index) => index + 1)),
+    ];
+    this.confirmed = given !== null && arranged === null;
+    if (answered !== undefined || this.begun !== null) this.show("saved");
+  }
+
+  /** @override @returns {string | null} */
+  get begun() {
+    const isArranged = !this.confirmed && this.#draft.read() !== null;
+    return isArranged ? "Kept on this device until you tap “This order is right”" : null;
+  }
+
+  confirm() {
+    this.confirmed = true;
+    this.#draft.write(null);
+    this.give([...this.order]);
+  }
+
+  /**
+   * Moves the setting in place `from` to place `to`; returns its number.
+   *
+   * @param {number} from
+   * @param {number} to
+   */
+  move(from, to) {
+    const [setting = 0] = this.order.splice(from, 1);
+    this.order.splice(to, 0, setting);
+
+    if (this.confirmed) {
+      this.give([...this.order]);
+    } else {
+      this.#draft.write(this.order);
+      this.note(this.begun ?? "");
+    }
+    return setting;
+  }
+
+  /**
+   * @override
+   * @param {Api.AnswerValue} value
+   */
+  accept(value) {
+    if (this.begun !== null || !Array.isArray(value)) return false;
+    const isNews = !this.confirmed || value.some((setting, index) => setting !== this.order[index]);
+    if (!isNews) return false;
+    this.confirmed = true;
+    this.order = [...value];
+    return true;
+  }
+}
+
+/** @typedef {TextAnswer | ScaleAnswer | SusAnswer | RankingAnswer} AnyAnswer */
+
+/**
+ * @param {Api.Question} question
+ * @param {Api.AnswerValue | undefined} answered what the server has, or what is on its way there
+ * @param {Context} context
+ * @returns {AnyAnswer}
+ */
+export function answerTo(question, answered, context) {
+  switch (question.kind) {
+    case "text":
+      return new TextAnswer(question, answered, context);
+    case "likert":
+      return new ScaleAnswer(question, answered, context);
+    case "sus":
+      return new SusAnswer(question, answered, context);
+    case "ranking":
+      return new RankingAnswer(question, answered, context);
+  }
+}
+
+/** The questions on screen, after a setting or at the end. */
+export class Questionnaire {
+  answers;
+
+  /** @param {AnyAnswer[]} answers */
+  constructor(answers) {
+    this.answers = answers;
+  }
+
+  /** @param {string} question */
+  find(question) {
+    return this.answers.find((answer) => answer.question.id === question);
+  }
+
+  /** Marks what is still to be answered, and returns it. */
+  check() {
+    for (const answer of this.answers) answer.giveNow();
+    const unanswered = this.answers.filter((answer) => answer.unanswered);
+    for (const answer of this.answers) answer.unwant();
+    for (const answer of unanswered) answer.want();
+    return unanswered;
+  }
+
+  /** Whether anything is marked as still to be answered. */
+  get marked() {
+    return this.answers.some((answer) => answer.marked);
+  }
+
+  /** Whether an answer was refused. */
+  get refused() {
+    return this.answers.some(({ reached }) => reached === "refused");
+  }
+}

@@ -1,0 +1,69 @@
+// What the surgeon reads about the session.
+
+import { clockText } from "../shared/text.js";
+
+/** @typedef {Api.SurgeonView} View */
+
+/** @param {View | null} state */
+export function isEnded(state) {
+  return state?.phase === "completed" || state?.phase === "aborted";
+}
+
+/** @param {View | null} state */
+export function headline(state) {
+  if (state?.segment != null) return `Setting ${state.setting} of ${state.settings}`;
+  return state?.title ?? "Live view";
+}
+
+/**
+ * What has become of each setting, in order.
+ *
+ * @param {View | null} state
+ * @returns {("done" | "now" | "")[]}
+ */
+export function steps(state) {
+  if (!state) return [];
+  return Array.from({ length: state.settings }, (_, index) => {
+    const number = index + 1;
+    const isOver = number < state.setting || (number === state.setting && state.segment == null);
+    if (isOver) return "done";
+    return number === state.setting ? "now" : "";
+  });
+}
+
+/**
+ * @param {View | null} state
+ * @param {number | null} seconds left of the setting's time, where it has a limit
+ */
+export function timeLeft(state, seconds) {
+  if (state?.phase !== "inspecting" || seconds === null) return "";
+  return state.paused ? "Paused" : `${clockText(seconds, Math.ceil)} left`;
+}
+
+/** @param {Stream.SurgeonStatus} status */
+export function simulatedWords({ camera_simulated: camera, lens_simulated: lens }) {
+  const simulated = [camera && "camera", lens && "lens"].filter(Boolean).join(" and ");
+  return simulated === "" ? "" : `Simulated ${simulated}`;
+}
+
+/** @param {View} state */
+export function readyWords({ settings }) {
+  const many = settings === 1 ? "One setting" : `${settings} settings`;
+  return `${many} to look at, one after another. Waiting for the operator to start.`;
+}
+
+/**
+ * Whether everything is saved, said only when it is so.
+ *
+ * @param {number} refused how much the server refused and this device keeps
+ * @param {number} waiting how much is not saved yet
+ */
+export function savedWords(refused, waiting) {
+  const said = refused === 1 ? "One thing that you said" : `${refused} things that you said`;
+  const are = refused === 1 ? "is" : "are";
+  const kept =
+    refused > 0 ? `${said} could not be saved and ${are} kept on this device: tell the operator. ` : "";
+
+  if (waiting > 0) return `${kept}Please leave this page open: some of what you said is still being saved.`;
+  return kept.trim() || "Everything you said is saved.";
+}

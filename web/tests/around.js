@@ -1,0 +1,89 @@
+// What the tests give the pages' logic in place of a browser.
+
+/**
+ * A browser's storage; `full` makes every write fail.
+ *
+ * @returns {import("../static/shared/storage.js").Store & { full: boolean, kept: Map<string, string> }}
+ */
+export function fakeStore() {
+  const kept = new Map();
+  return {
+    full: false,
+    kept,
+    read: (name) => kept.get(name) ?? null,
+    write(name, text) {
+      if (this.full) return false;
+      kept.set(name, text);
+      return true;
+    },
+    remove: (name) => kept.delete(name),
+    names: (prefix) => [...kept.keys()].filter((name) => name.startsWith(prefix)),
+  };
+}
+
+/** Both clocks of a page, and its timers. Nothing moves unless a test says so. */
+export class FakeTime {
+  pageMillis = 1_000;
+  wallMillis = 1_700_000_000_000;
+  /** @type {{ at: number, run: () => void }[]} */
+  #timers = [];
+
+  page = () => this.pageMillis;
+  wall = () => this.wallMillis;
+
+  later = (/** @type {() => void} */ run, /** @type {number} */ ms) => {
+    const timer = { at: this.pageMillis + ms, run };
+    this.#timers.push(timer);
+    return () => {
+      this.#timers = this.#timers.filter((other) => other !== timer);
+    };
+  };
+
+  /** In how many milliseconds the next timer runs out; null where none is set. */
+  get nextIn() {
+    const times = this.#timers.map(({ at }) => at - this.pageMillis);
+    return times.length === 0 ? null : Math.min(...times);
+  }
+
+  /**
+   * Time goes by, and timers run out.
+   *
+   * @param {number} ms
+   */
+  async pass(ms) {
+    this.pageMillis += ms;
+    this.wallMillis += ms;
+    const due = this.#timers.filter(({ at }) => at <= this.pageMillis);
+    this.#timers = this.#timers.filter(({ at }) => at > this.pageMillis);
+    for (const { run } of due) run();
+    await settle();
+  }
+}
+
+/** Lets everything happen that waits for nothing but its turn. */
+export function settle() {
+  return new Promise((resolve) => setImmediate(resolve));
+}
+
+/** Identifiers that differ: `id-1`, `id-2`. */
+export function countedIds() {
+  let count = 0;
+  return () => {
+    count += 1;
+    return `id-${count}`;
+  };
+}
+
+/** A server whose answers a test gives by hand, or that takes everything. */
+export class FakeServer {
+  /** @type {{ path: string, body: any }[]} */
+  got = [];
+  /** What it throws, in turn; null takes what was sent. @type {(Error | null)[]} */
+  answers = [];
+
+  send = async (/** @type {string} */ path, /** @type {any} */ body) => {
+    this.got.push({ path, body: structuredClone(body) });
+    const answer = this.answers.shift();
+    if (answer) throw answer;
+  };
+}

@@ -1,0 +1,276 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Refused } from "../static/shared/api.js";
+import { Origins } from "../static/surgeon/origin.js";
+import { Outbox } from "../static/surgeon/outbox.js";
+import { countedIds, FakeServer, FakeTime, fakeStore, settle } from "./around.js";
+
+const fullDisk = () => new Refused(507, "the disk is full", true);
+const noNetwork = () => new TypeError("Failed to fetch");
+
+/** A page on `store`: an outbox, its server and its time. */
+function openPage(store = fakeStore(), time = new FakeTime(), newId = countedIds()) {
+  const server = new FakeServer();
+  const origins = new Origins(store, time, newId);
+  const open = () =>
+    new Outbox({ store, origins, send: server.send, newId, wall: time.wall, later: time.later });
+  return { store, time, server, origins, newId, open };
+}
+
+/** @param {FakeServer} server */
+const texts = (server) => server.got.map(({ body }) => body.text);
+
+/** @param {ReturnType<typeof fakeStore>} store */
+const keptEntries = (store) => store.names("parfocal.outbox.").length;
+
+test("what the server has saved is taken off the device", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  outbox.add("/comments", { session: "s", text: "a" });
+  assert.equal(keptEntries(page.store), 1, "it is on the device before it is sent");
+
+  await settle();
+  assert.deepEqual(texts(page.server), ["a"]);
+  assert.equal(keptEntries(page.store), 0);
+  assert.deepEqual(outbox.waiting, []);
+});
+
+test("without a network the waits double up to eight seconds, and a nudge tries at once", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = Array.from({ length: 8 }, noNetwork);
+  outbox.add("/comments", { session: "s", text: "a" });
+  await settle();
+
+  const waits = [];
+  for (let attempt = 1; attempt <= 6; attempt++) {
+    const wait = page.time.nextIn ?? 0;
+    waits.push(wait);
+    await page.time.pass(wait);
+  }
+  assert.deepEqual(waits, [500, 1000, 2000, 4000, 8000, 8000]);
+  assert.equal(outbox.trouble, "No connection: trying again by itself.");
+
+  outbox.nudge();
+  await settle();
+  assert.equal(page.server.got.length, 8);
+  assert.equal(page.time.nextIn, 500, "and waits as after a first attempt");
+
+  await page.time.pass(500);
+  assert.equal(outbox.trouble, null);
+  assert.equal(new Set(page.server.got.map(({ body }) => body.key)).size, 1, "always under the same key");
+});
+
+test("a reload sends what was left, in the order in which it was said", async () => {
+  const page = openPage();
+  const first = page.open();
+  page.server.answers = [noNetwork(), noNetwork(), noNetwork()];
+  first.add("/comments", { session: "s", text: "one" });
+  page.time.wallMillis -= 60_000;
+  first.add("/comments", { session: "s", text: "two" });
+  await settle();
+  assert.equal(keptEntries(page.store), 2);
+
+  const later = openPage(page.store, page.time, page.newId);
+  later.open();
+  await settle();
+  assert.deepEqual(texts(later.server), ["one", "two"], "also with a clock that was set back between them");
+  assert.equal(keptEntries(page.store), 0);
+});
+
+test("what one entry meets does not stop the others, unless nobody answers", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [noNetwork(), noNetwork()];
+  outbox.add("/comments", { session: "s", text: "one" });
+  outbox.add("/comments", { session: "s", text: "two" });
+  await settle();
+  assert.ok(!texts(page.server).includes("two"), "without a network the second is not worth trying");
+
+  page.server.got = [];
+  page.server.answers = [fullDisk(), null];
+  outbox.nudge();
+  await settle();
+  assert.deepEqual(texts(page.server), ["one", "two"]);
+  assert.deepEqual(
+    outbox.waiting.map(({ body }) => body.text),
+    ["one"],
+  );
+});
+
+test("what the server refuses stays on the device, is counted, and is tried by the next page", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [new Refused(404, "no such session", true)];
+  outbox.add("/comments", { session: "s", text: "a" });
+  await settle();
+  assert.equal(outbox.refused("s").length, 1);
+  assert.equal(outbox.refused("t").length, 0);
+  assert.equal(outbox.held("s"), 1, "once, though it is in memory and in storage");
+  assert.deepEqual([...outbox.sessions], ["s"]);
+  assert.equal(page.time.nextIn, null, "the same page does not try again");
+
+  const later = openPage(page.store, page.time, page.newId);
+  later.open();
+  await settle();
+  assert.deepEqual(texts(later.server), ["a"]);
+  assert.equal(keptEntries(page.store), 0);
+});
+
+test("a proxy's refusal is not the server's, and is tried again", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [new Refused(404, "Not found", false)];
+  outbox.add("/comments", { session: "s", text: "a" });
+  await settle();
+  assert.equal(outbox.refused("s").length, 0);
+
+  await page.time.pass(500);
+  assert.deepEqual(texts(page.server), ["a", "a"]);
+  assert.deepEqual(outbox.waiting, []);
+});
+
+test("a new answer to a question replaces the one that was refused", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [new Refused(422, "not on the scale", true)];
+  outbox.add("/answers", { session: "s", value: 9 }, "s/1/sharpness");
+  await settle();
+  assert.equal(outbox.refused("s").length, 1);
+
+  outbox.add("/answers", { session: "s", value: 5 }, "s/1/sharpness");
+  await settle();
+  assert.equal(outbox.refused("s").length, 0);
+  assert.equal(keptEntries(page.store), 0);
+});
+
+test("entries for a question are found with those for its parts, and not with its namesakes'", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = Array.from({ length: 4 }, noNetwork);
+  outbox.add("/answers", { value: [1, 0] }, "s/1/sus/0");
+  outbox.add("/answers", { value: 2 }, "s/1/sus");
+  outbox.add("/answers", { value: 3 }, "s/1/sus2");
+  await settle();
+  assert.deepEqual(
+    outbox.pending("s/1/sus").map(({ slot }) => slot),
+    ["s/1/sus/0", "s/1/sus"],
+  );
+});
+
+test("a draft that another tab has sent under the same key goes again under a new one", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [new Refused(409, "another text has this key", true)];
+  outbox.add("/comments", { session: "s", text: "longer" }, null, { key: "draft-key" });
+  await settle();
+  const [first, second] = page.server.got.map(({ body }) => body.key);
+  assert.equal(first, "draft-key");
+  assert.notEqual(second, "draft-key");
+  assert.deepEqual(outbox.waiting, []);
+});
+
+test("whoever waits for answers is told at once when one fails or nobody answers", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [noNetwork()];
+  outbox.add("/comments", { session: "s", text: "c" });
+  outbox.add("/answers", { session: "s", value: 4 }, "q");
+  assert.equal(await outbox.settled("/answers"), false);
+
+  assert.equal(await outbox.settled("/answers"), true);
+  assert.deepEqual(outbox.waiting, []);
+});
+
+test("a failing comment alone does not keep answers from being settled", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [fullDisk(), null];
+  outbox.add("/comments", { session: "s", text: "c" });
+  outbox.add("/answers", { session: "s", value: 4 }, "q");
+  assert.equal(await outbox.settled("/answers"), true);
+});
+
+test("a device that stores nothing is said not to be durable, and still sends", async () => {
+  const page = openPage();
+  page.store.full = true;
+  const outbox = page.open();
+  page.server.answers = [noNetwork()];
+  outbox.add("/comments", { session: "s", text: "a" });
+  assert.equal(outbox.durable, false);
+  await settle();
+  await page.time.pass(500);
+  assert.deepEqual(texts(page.server), ["a", "a"]);
+  assert.equal(outbox.durable, true, "nothing is left that could be lost");
+});
+
+test("an entry that another tab has sent is no longer waiting here", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [noNetwork()];
+  const { id } = outbox.add("/comments", { session: "s", text: "a" });
+  await settle();
+
+  /** @type {string[]} */
+  const heard = [];
+  outbox.subscribe(({ state }) => heard.push(state));
+  outbox.doneElsewhere("parfocal.draft.comment");
+  assert.deepEqual(heard, []);
+  outbox.doneElsewhere(`parfocal.outbox.${id}`);
+  assert.deepEqual(heard, ["saved"]);
+  assert.deepEqual(outbox.waiting, []);
+});
+
+test("each entry tells its place among all that the device said, and how long ago that was", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.server.answers = [noNetwork(), noNetwork()];
+  outbox.add("/comments", { session: "s", text: "one" });
+  await page.time.pass(200);
+  // Somebody sets the clock: the wait is not measured by it.
+  page.time.wallMillis += 3_600_000;
+  outbox.add("/comments", { session: "s", text: "two" });
+  await settle();
+  page.server.got = [];
+  await page.time.pass(800);
+
+  const told = page.server.got.map(({ body }) => ({
+    text: body.text,
+    sequence: body.sequence,
+    waited: body.waited_millis,
+    by: body.waited_by,
+  }));
+  assert.deepEqual(told, [
+    { text: "one", sequence: 1, waited: 1000, by: "page-clock" },
+    { text: "two", sequence: 2, waited: 800, by: "page-clock" },
+  ]);
+  assert.equal(new Set(page.server.got.map(({ body }) => body.device)).size, 1);
+});
+
+test("a wait over a reload, or with a sleep in it, is measured by the wall clock", async () => {
+  const page = openPage();
+  page.server.answers = [noNetwork()];
+  page.open().add("/comments", { session: "s", text: "kept" });
+  await settle();
+  page.time.wallMillis += 600_000;
+
+  const reloaded = openPage(page.store, page.time, page.newId);
+  reloaded.open();
+  await settle();
+  assert.equal(reloaded.server.got[0]?.body.waited_millis, 600_000);
+  assert.equal(reloaded.server.got[0]?.body.waited_by, "wall-clock");
+
+  const { time, origins } = reloaded;
+  const stamp = origins.stamp();
+  origins.sight(true);
+  time.wallMillis += 300_000;
+  origins.sight(false);
+  const asleep = origins.tell(stamp);
+  assert.deepEqual([asleep.waited_millis, asleep.waited_by], [300_000, "wall-clock"]);
+  assert.equal(
+    origins.tell(origins.stamp()).waited_by,
+    "page-clock",
+    "what is said after it is not affected",
+  );
+});

@@ -1,0 +1,235 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Drafts } from "../static/surgeon/drafts.js";
+import { Origins } from "../static/surgeon/origin.js";
+import { answerTo, onTopOf, ordinal, Questionnaire } from "../static/surgeon/questions.js";
+import { countedIds, FakeTime, fakeStore } from "./around.js";
+
+/** @type {Api.Question} */
+const SHARPNESS = { id: "sharpness", kind: "likert", text: "Sharp?", points: 7, low: "Not", high: "Very" };
+/** @type {Api.Question} */
+const REMARKS = { id: "remarks", kind: "text", text: "Remarks?", optional: true };
+/** @type {Api.Question} */
+const ORDER = { id: "order", kind: "ranking", text: "Which was best?" };
+/** @type {Api.Question} */
+const USABILITY = { id: "usability", kind: "sus", text: "Usability" };
+
+const UNCONFIRMED = "Kept on this device until you tap “This order is right”";
+
+/** A page with questions about three settings; `given` is what it sends. */
+function openPage(store = fakeStore()) {
+  const time = new FakeTime();
+  const newId = countedIds();
+  const drafts = new Drafts(store, new Origins(store, time, newId), newId, "tab");
+  /** @type {{ question: string, value: unknown, part: number | null }[]} */
+  const given = [];
+
+  /** @type {import("../static/surgeon/questions.js").Context} */
+  const context = {
+    settings: 3,
+    later: time.later,
+    draft: ({ id }) => drafts.open(`answer.s/1/${id}`),
+    give: ({ id }, value, part) => given.push({ question: id, value, part }),
+  };
+  /**
+   * @template {import("../static/surgeon/questions.js").AnyAnswer} Kind
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue} [answered]
+   * @returns {Kind}
+   */
+  const ask = (question, answered) => /** @type {Kind} */ (answerTo(question, answered, context));
+  return { store, time, given, ask };
+}
+
+/** @typedef {import("../static/surgeon/questions.js").ScaleAnswer} ScaleAnswer */
+/** @typedef {import("../static/surgeon/questions.js").TextAnswer} TextAnswer */
+/** @typedef {import("../static/surgeon/questions.js").SusAnswer} SusAnswer */
+/** @typedef {import("../static/surgeon/questions.js").RankingAnswer} RankingAnswer */
+
+test("a 0 among points leaves what was there, and anything else replaces it", () => {
+  assert.deepEqual(onTopOf([4, 0, 2], [0, 3, 5]), [4, 3, 5]);
+  assert.deepEqual(onTopOf(undefined, [0, 3]), [0, 3]);
+  assert.equal(onTopOf(3, 5), 5);
+  assert.equal(onTopOf("before", "after"), "after");
+});
+
+test("places are named as in English", () => {
+  const names = [1, 2, 3, 4, 11, 12, 13, 21, 22, 23, 111].map(ordinal);
+  const expected = ["1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "22nd", "23rd", "111th"];
+  assert.deepEqual(names, expected);
+});
+
+test("a point is given when it is chosen, and is unanswered until then", () => {
+  const { ask, given } = openPage();
+  /** @type {ScaleAnswer} */
+  const sharpness = ask(SHARPNESS);
+  assert.equal(sharpness.unanswered, true);
+
+  sharpness.choose(5);
+  assert.deepEqual(given, [{ question: "sharpness", value: 5, part: null }]);
+  assert.deepEqual([sharpness.status, sharpness.unanswered], ["Saving…", false]);
+
+  sharpness.show("waiting");
+  assert.equal(sharpness.unanswered, false, "what is kept on the device is answered");
+  sharpness.show("refused", "not on the scale");
+  assert.deepEqual([sharpness.status, sharpness.unanswered], ["not on the scale", true]);
+});
+
+test("an answer given elsewhere is shown, one that is known already changes nothing", () => {
+  const { ask, given } = openPage();
+  /** @type {ScaleAnswer} */
+  const sharpness = ask(SHARPNESS, 3);
+  assert.deepEqual([sharpness.point, sharpness.status], [3, "Saved"]);
+
+  sharpness.show("waiting");
+  sharpness.take(3);
+  assert.equal(sharpness.reached, "waiting");
+  sharpness.take(6);
+  assert.deepEqual([sharpness.point, sharpness.status], [6, "Saved"]);
+  assert.deepEqual(given, [], "nothing of it is given again");
+});
+
+test("a text is given at the first pause of 900 ms, and at once when the surgeon goes on", async () => {
+  const { ask, given, time } = openPage();
+  /** @type {TextAnswer} */
+  const remarks = ask(REMARKS);
+  remarks.write("Good");
+  await time.pass(899);
+  remarks.write(" Good at rest ");
+  await time.pass(899);
+  assert.deepEqual(given, []);
+  assert.equal(remarks.status, "Writing…");
+
+  await time.pass(1);
+  assert.deepEqual(given, [{ question: "remarks", value: "Good at rest", part: null }]);
+  assert.equal(remarks.text, " Good at rest ", "what stands in the field is left alone");
+
+  remarks.write("Better");
+  remarks.giveNow();
+  remarks.giveNow();
+  await time.pass(5000);
+  assert.deepEqual(given.slice(1), [{ question: "remarks", value: "Better", part: null }]);
+});
+
+test("a text half-written before a reload is given by the next page", async () => {
+  const { ask, store } = openPage();
+  /** @type {TextAnswer} */ (ask(REMARKS)).write("Half");
+
+  const next = openPage(store);
+  /** @type {TextAnswer} */
+  const remarks = next.ask(REMARKS, "Earlier");
+  assert.equal(remarks.text, "Half");
+  await next.time.pass(900);
+  assert.deepEqual(next.given, [{ question: "remarks", value: "Half", part: null }]);
+});
+
+test("a full device loses no text, and a text being written is not replaced by another device's", async () => {
+  const { ask, given, store, time } = openPage();
+  store.full = true;
+  /** @type {TextAnswer} */
+  const remarks = ask(REMARKS);
+  remarks.write("Mine");
+  remarks.take("Theirs");
+  assert.equal(remarks.text, "Mine");
+  await time.pass(900);
+  assert.deepEqual(given, [{ question: "remarks", value: "Mine", part: null }]);
+
+  remarks.take("Theirs", true);
+  assert.equal(remarks.text, "Mine", "nor is one while the surgeon is in the field");
+  remarks.take("Theirs", false);
+  assert.equal(remarks.text, "Theirs");
+});
+
+test("an emptied text gives nothing, and says so where an answer stands", () => {
+  const { ask, given } = openPage();
+  /** @type {TextAnswer} */
+  const remarks = ask(REMARKS, "Earlier");
+  remarks.write("  ");
+  remarks.giveNow();
+  assert.deepEqual(given, []);
+  assert.equal(remarks.status, "The earlier answer stays until you write another.");
+});
+
+test("each item of the usability scale is given alone, and all ten make an answer", () => {
+  const { ask, given } = openPage();
+  /** @type {SusAnswer} */
+  const usability = ask(USABILITY);
+  usability.choose(2, 4);
+  assert.deepEqual(given, [{ question: "usability", value: [0, 0, 4, 0, 0, 0, 0, 0, 0, 0], part: 2 }]);
+
+  usability.show("saved");
+  assert.deepEqual([usability.status, usability.unanswered], ["1 of 10 answered · Saved", true]);
+  usability.take([1, 1, 4, 1, 1, 1, 1, 1, 1, 0]);
+  assert.deepEqual([usability.status, usability.unanswered], ["9 of 10 answered · Saved", true]);
+
+  usability.choose(9, 5);
+  usability.show("saved");
+  assert.deepEqual([usability.status, usability.unanswered], ["Saved", false]);
+  assert.deepEqual(usability.points, [1, 1, 4, 1, 1, 1, 1, 1, 1, 5]);
+});
+
+test("an order counts once it is confirmed, and from then on with every move", () => {
+  const { ask, given } = openPage();
+  /** @type {RankingAnswer} */
+  const order = ask(ORDER);
+  assert.deepEqual(order.order, [1, 2, 3]);
+  assert.equal(order.begun, null);
+
+  assert.equal(order.move(2, 0), 3);
+  assert.deepEqual([order.order, order.status, order.unanswered], [[3, 1, 2], UNCONFIRMED, true]);
+  order.show("saved");
+  assert.equal(order.status, UNCONFIRMED, "it does not say saved before it is");
+  assert.deepEqual(given, []);
+
+  order.confirm();
+  order.move(1, 2);
+  assert.deepEqual(
+    given.map(({ value }) => value),
+    [
+      [3, 1, 2],
+      [3, 2, 1],
+    ],
+  );
+});
+
+test("an order arranged and not confirmed outlives a reload, and another device's order", () => {
+  const { ask, store } = openPage();
+  /** @type {RankingAnswer} */ (ask(ORDER)).move(2, 0);
+
+  const next = openPage(store);
+  /** @type {RankingAnswer} */
+  const order = next.ask(ORDER, [2, 1, 3]);
+  assert.deepEqual([order.order, order.confirmed, order.status], [[3, 1, 2], false, UNCONFIRMED]);
+  order.take([2, 1, 3]);
+  assert.deepEqual(order.order, [3, 1, 2]);
+
+  order.confirm();
+  order.take([2, 1, 3]);
+  assert.deepEqual(order.order, [2, 1, 3]);
+});
+
+test("going on marks what is still open, and answering takes the marks back", () => {
+  const { ask, given } = openPage();
+  /** @type {ScaleAnswer} */
+  const sharpness = ask(SHARPNESS);
+  /** @type {TextAnswer} */
+  const remarks = ask(REMARKS);
+  /** @type {SusAnswer} */
+  const usability = ask(USABILITY, [1, 1, 0, 1, 1, 1, 1, 1, 0, 1]);
+  const questionnaire = new Questionnaire([sharpness, remarks, usability]);
+  remarks.write("Not given yet");
+
+  assert.deepEqual(questionnaire.check(), [sharpness, usability], "an optional question is never open");
+  assert.deepEqual(given, [{ question: "remarks", value: "Not given yet", part: null }]);
+  assert.equal(sharpness.status, "Not answered yet");
+  const open = usability.wantedParts.flatMap((wanted, item) => (wanted ? [item] : []));
+  assert.deepEqual(open, [2, 8]);
+
+  sharpness.choose(4);
+  usability.choose(2, 3);
+  assert.equal(questionnaire.marked, true);
+  usability.choose(8, 3);
+  assert.equal(questionnaire.marked, false);
+  assert.deepEqual(questionnaire.check(), []);
+});

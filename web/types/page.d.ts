@@ -1,0 +1,135 @@
+// Types that the pages use by name. What HTTP says comes from `api.d.ts`, which is generated from the server's
+// own description. The messages of the WebSocket are not described there: they follow `server/http/live*.rs`.
+
+import type { components, paths } from "./api.js";
+
+type Json = "application/json";
+
+declare global {
+  /** What the server says over HTTP. */
+  namespace Api {
+    type Schemas = components["schemas"];
+
+    type Action = Schemas["Action"];
+    type Adjustable = Schemas["Adjustable"];
+    type AnswerValue = Schemas["AnswerValue"];
+    type CameraOffer = Schemas["CameraOffer"];
+    type CommentLine = Schemas["CommentLine"];
+    type Focus = Schemas["Focus"];
+    type LogLine = Schemas["LogLine"];
+    type OperatorView = Schemas["OperatorView"];
+    type Origin = Schemas["Origin"];
+    type Outstanding = Schemas["Outstanding"];
+    type Question = Schemas["Question"];
+    type Said = Schemas["Said"];
+    type SetAside = Schemas["SetAside"];
+    type Setting = Schemas["Setting"];
+    type SurgeonView = Schemas["SurgeonView"];
+    type Timeline = Schemas["Timeline"];
+    type TimelineComment = Schemas["TimelineComment"];
+    type TimelinePoint = Schemas["TimelinePoint"];
+
+    /** The description leaves a policy's members open. */
+    type Choices = Omit<Schemas["Choices"], "policies"> & {
+      policies: { name: string; available: boolean }[];
+    };
+
+    type GetPath = {
+      [Path in keyof paths]: paths[Path] extends {
+        get: { responses: { 200: { content: { [type in Json]: unknown } } } };
+      }
+        ? Path
+        : never;
+    }[keyof paths];
+    type PostPath = {
+      [Path in keyof paths]: paths[Path] extends {
+        post: { requestBody: { content: { [type in Json]: unknown } } };
+      }
+        ? Path
+        : never;
+    }[keyof paths];
+
+    type Got<Path extends GetPath> = Path extends "/api/operator/choices"
+      ? Choices
+      : paths[Path] extends { get: { responses: { 200: { content: { [type in Json]: infer Body } } } } }
+        ? Body
+        : never;
+    type Sent<Path extends PostPath> = paths[Path] extends {
+      post: { requestBody: { content: { [type in Json]: infer Body } } };
+    }
+      ? Body
+      : never;
+    type Answered<Path extends PostPath> = paths[Path] extends {
+      post: { responses: { 200: { content: { [type in Json]: infer Body } } } };
+    }
+      ? Body
+      : null;
+  }
+
+  /** What the server says over the WebSocket. */
+  namespace Stream {
+    interface Circle {
+      x: number;
+      y: number;
+      radius: number;
+    }
+
+    interface Patch {
+      x: number;
+      y: number;
+      width: number;
+      height: number;
+    }
+
+    /** What goes with each picture; the operator's page gets the last four, null while a session is under way. */
+    interface Header {
+      frame: number;
+      run: number;
+      age: number;
+      width: number;
+      height: number;
+      estimated: boolean;
+      patch: Patch;
+      area: Circle | null;
+      asked?: number | null;
+      measured?: number | null;
+      metric?: number | null;
+      belief?: number[] | null;
+    }
+
+    interface Frame {
+      header: Header;
+      bitmap: ImageBitmap;
+      receivedAt: number;
+    }
+
+    interface SurgeonStatus {
+      camera_simulated: boolean;
+      lens_simulated: boolean;
+      notice: string | null;
+    }
+
+    interface OperatorStatus {
+      camera: {
+        name: string;
+        working: boolean;
+        simulated: boolean;
+        fps: number;
+        lost: number;
+        message: string;
+      };
+      camera_offer: Api.CameraOffer | null;
+      lens: { name: string; working: boolean; simulated: boolean; caution: boolean; message: string };
+      policy: string | null;
+      focal_power: number | null;
+      held: string | null;
+      message: string | null;
+      steps_per_second: number;
+      steps: number;
+      telemetry_dropped: number;
+      latency_p50_micros: number | null;
+      latency_p99_micros: number | null;
+      priority: { standing: string; message: string };
+    }
+  }
+}
