@@ -255,7 +255,8 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, width: usize, su
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::{WIDER, block_means, gaussian_blur};
+    use crate::imaging::{WIDER, block_means};
+    use crate::simulation::blur::gaussian_blur;
     use crate::simulation::texture::texture;
 
     /// 0 left of column 64, 200 from there on.
