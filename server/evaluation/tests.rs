@@ -66,7 +66,7 @@ fn a_policy_that_gives_up_has_no_figures() {
     let conditions = Conditions::Same(ScanSettings::default());
     let scans = Benchmark { scenes, conditions, seed: 1, count: 1, frames: 9 };
     let told = evaluate(&registry, &[PolicyName::new("lazy")], &scans, &|_| ()).unwrap_err().to_string();
-    assert!(told.starts_with("policy 'lazy' failed on scan 1: at frame 3 it answered NaN"), "{told}");
+    assert!(told.starts_with("policy 'lazy' failed on scan 1: at frame 3 it returned NaN"), "{told}");
 }
 
 #[test]

@@ -55,7 +55,7 @@ pub enum LinkError {
     #[error("its port failed ({0}): plug its USB cable in")]
     Port(#[from] io::Error),
     /// Nothing came back in time.
-    #[error("it does not reply: check its power and cable")]
+    #[error("it is silent: check its power and cable")]
     Silent,
     /// What came back is no reply.
     #[error(transparent)]
