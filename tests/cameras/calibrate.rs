@@ -33,7 +33,7 @@ fn dark_and_white_make_a_calibration_that_names_itself_and_flattens_the_picture(
     done(&[&capture("dark", "phantom:dark", &out)[..], &["--unit", "7", "--name", "theatre 2"]].concat());
     // Each mistaken for the other, and colour where bands are needed.
     let said = refused(&capture("white", "phantom:dark", &out));
-    assert!(said.contains("nothing was kept: nothing is seen") && said.contains("`calibrate dark`"), "{said}");
+    assert!(said.contains("nothing was saved: nothing is seen") && said.contains("`calibrate dark`"), "{said}");
     assert!(refused(&capture("dark", "phantom:white", &out)).contains("`calibrate white`"));
     let said = done(&capture("white", "phantom:white", &out));
     assert!(said.starts_with("theatre 2, unit 7, version 2 of 20"), "{said}");
@@ -136,5 +136,5 @@ fn a_makers_tables_are_imported() {
 
     fs::write(path("correction.csv"), "1,2,3\n").unwrap();
     let said = refused(&["calibrate", "import", "--correction", &path("correction.csv"), "--out", &out]);
-    assert!(said.contains("line 1 must be 16 numbers"), "{said}");
+    assert!(said.contains("line 1 must have 16 numbers"), "{said}");
 }

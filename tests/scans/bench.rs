@@ -41,7 +41,7 @@ fn a_bench_is_recorded_by_a_stepper_whose_failure_loses_nothing() {
         ])
     };
     let told = complaint(&record());
-    assert!(told.contains("failed at pose 3 (exit status: 5)") && told.contains("2 of 4 poses are kept"), "{told}");
+    assert!(told.contains("failed at pose 3 (exit status: 5)") && told.contains("2 of 4 poses are saved"), "{told}");
     fs::remove_file(&broken).unwrap();
     let output = record();
     assert!(output.status.success(), "{}", complaint(&output));
