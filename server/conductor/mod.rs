@@ -9,6 +9,7 @@
 mod allocate;
 mod circumstances;
 mod course;
+mod error;
 mod flow;
 mod keeping;
 mod lens;
@@ -23,6 +24,7 @@ use std::sync::Arc;
 use rand_chacha::ChaCha12Rng;
 use tokio::sync::{Mutex, Notify, watch};
 
+pub use error::ConductError;
 pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
 pub use timeline::{PauseSpan, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint};
@@ -31,11 +33,10 @@ use crate::autofocus::Registry;
 use crate::clock::Clock;
 use crate::control::{Command, ControlHandle};
 use crate::ids::SessionId;
-use crate::store::{Store, StoreError};
+use crate::store::Store;
 use crate::trial::action::Action;
 use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::phase::Phase;
-use crate::trial::refusal::Refusal;
 use crate::trial::remark::{Holding, NewAnswer, NewComment};
 use crate::trial::role::Role;
 use crate::trial::view::{OperatorView, SurgeonView};
@@ -126,61 +127,6 @@ struct Pen {
     random: ChaCha12Rng,
     /// For practice.
     practice_random: ChaCha12Rng,
-}
-
-/// Why the conductor did not do something.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ConductError {
-    /// There is no such session, segment or question, or it is not the one under way.
-    #[error("{0}")]
-    NotFound(String),
-    /// Another role does this.
-    #[error("{0}")]
-    Forbidden(String),
-    /// It cannot be done in the session's present state; nothing was changed.
-    #[error("{0}")]
-    Conflict(String),
-    /// What was sent makes no sense; says which part.
-    #[error("{0}")]
-    Invalid(String),
-    /// The disk or database failed; nothing was acknowledged.
-    #[error("could not be saved: {0}")]
-    Storage(String),
-    /// The session's protocol is of another version, or damaged.
-    #[error(
-        "session {session} was made with a protocol that this version cannot read ({reason}); go on with the version that made it, or \
-         with another folder by --data-dir"
-    )]
-    Unreadable {
-        /// The session.
-        session: SessionId,
-        /// Why.
-        reason: String,
-    },
-}
-
-impl ConductError {
-    fn no_session() -> Self {
-        Self::NotFound("there is no such session; reload the page".to_owned())
-    }
-}
-
-impl From<StoreError> for ConductError {
-    fn from(error: StoreError) -> Self {
-        Self::Storage(error.to_string())
-    }
-}
-
-impl From<Refusal> for ConductError {
-    fn from(refusal: Refusal) -> Self {
-        let text = refusal.to_string();
-        match refusal {
-            Refusal::NotAllowed(_) => Self::Forbidden(text),
-            Refusal::UnknownSegment => Self::NotFound(text),
-            Refusal::Conflict(_) => Self::Conflict(text),
-            Refusal::Invalid(_) => Self::Invalid(text),
-        }
-    }
 }
 
 impl Conductor {

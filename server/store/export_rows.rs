@@ -6,7 +6,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow, Row as _};
 
 use super::export::{PolicyStepRow, RunRow, TelemetryRow, WeightsRow};
-use super::sessions::parsed;
+use super::values::parsed;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
 

@@ -8,10 +8,10 @@ use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
 use sqlx::{Row, migrate::Migrate};
 
-use super::sessions::{parsed, stamp};
-use super::{
-    DATABASE, DeviceEvent, MIGRATOR, Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError, moment,
-};
+use super::schema::{DATABASE, MIGRATOR};
+use super::values::moment;
+use super::values::{parsed, stamp};
+use super::{DeviceEvent, Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError};
 use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
 use crate::trial::phase::SessionStatus;

@@ -3,8 +3,9 @@
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-use super::sessions::{parsed, stamp};
-use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError, moment, nanoseconds};
+use super::values::{moment, nanoseconds};
+use super::values::{parsed, stamp};
+use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::trial::question::AnswerValue;
 use crate::trial::remark::{Holding, Origin, Said, WaitClock};

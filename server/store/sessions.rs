@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Row};
 
-use super::{Reader, RunClocks, Stamp, Store, StoreError, drop_if_failed, moment, nanoseconds};
+use super::values::{drop_if_failed, nanoseconds, parsed, stamp};
+use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
 use crate::trial::allocation::{Algorithm, Seed};
@@ -308,18 +308,4 @@ pub(super) fn seed(row: &SqliteRow) -> Result<Seed, StoreError> {
 pub(super) fn index(row: &SqliteRow) -> Result<usize, StoreError> {
     let index: i64 = row.try_get("set_index")?;
     usize::try_from(index).map_err(|_| StoreError::Damaged(format!("set index {index}")))
-}
-
-/// The two clocks of a row.
-pub(super) fn stamp(row: &SqliteRow) -> Result<Stamp, StoreError> {
-    Ok(Stamp { wall: parsed::<Timestamp>(row, "wall")?, at: moment(row.try_get("monotonic_ns")?) })
-}
-
-/// Column `column` of `row`, written as text.
-pub(super) fn parsed<T>(row: &SqliteRow, column: &str) -> Result<T, StoreError>
-where
-    T: std::str::FromStr<Err: std::fmt::Display>,
-{
-    let text: String = row.try_get(column)?;
-    text.parse().map_err(|error| StoreError::Damaged(format!("column {column}, '{text}': {error}")))
 }

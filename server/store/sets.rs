@@ -3,7 +3,8 @@
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-use super::sessions::{index, parsed, seed};
+use super::sessions::{index, seed};
+use super::values::parsed;
 use super::{Reader, StoreError};
 use crate::trial::allocation::{Algorithm, Seed};
 use crate::trial::balanced_set::{BalancedSet, Member};

@@ -2,7 +2,7 @@
 //! belongs to no setting of a session is forgotten after a while.
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use sqlx::Connection;
@@ -10,7 +10,8 @@ use sqlx::sqlite::SqliteConnection;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, timeout_at};
 
-use super::{Store, StoreError, drop_if_failed, nanoseconds};
+use super::values::{drop_if_failed, nanoseconds};
+use super::{Store, StoreError};
 use crate::autofocus::PolicyName;
 use crate::control::{Hold, StepRecord};
 use crate::ids::SegmentId;
@@ -30,17 +31,6 @@ pub const KEPT_OUTSIDE: i64 = 2_000_000;
 /// Steps looked at between two checkpoints for whether they can be forgotten: more than come in that time, and few
 /// enough to hold up no comment.
 const LOOKED_AT: i64 = 4_000;
-
-/// What became of telemetry since the start.
-#[derive(Debug, Default)]
-pub struct Counts {
-    /// Records written.
-    pub written: AtomicU64,
-    /// Batches that could not be written at the first try.
-    pub failed_batches: AtomicU64,
-    /// Records given up, the disk having failed for too long.
-    pub lost: AtomicU64,
-}
 
 /// Writes what comes until the sender is gone. A failing disk is logged, counted and tried again; it never ends this.
 pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {

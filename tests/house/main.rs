@@ -11,21 +11,7 @@ use std::path::Path;
 use imports::{Import, SourceTree};
 
 /// Circles that stay, each with the reason why.
-const ALLOWED_CIRCLES: [(&[&str], &str); 4] = [
-    (&["conductor/course.rs", "conductor/mod.rs"], "to be broken"),
-    (
-        &[
-            "store/export/blinded.rs",
-            "store/export/destination.rs",
-            "store/export/folder.rs",
-            "store/export/mod.rs",
-            "store/export/unblinded.rs",
-        ],
-        "to be broken",
-    ),
-    (&["store/export/verify.rs", "store/export/verify_allocation.rs"], "to be broken"),
-    (&["store/mod.rs", "store/reader.rs", "store/sessions.rs", "store/telemetry.rs"], "to be broken"),
-];
+const ALLOWED_CIRCLES: [(&[&str], &str); 0] = [];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

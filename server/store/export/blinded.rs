@@ -10,7 +10,8 @@ use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
-use crate::store::{Answer, Comment, DeviceEvent, Reader, RunClocks, SessionLine, StoreError, nanoseconds, standings};
+use crate::store::values::nanoseconds;
+use crate::store::{Answer, Comment, DeviceEvent, Reader, RunClocks, SessionLine, StoreError, standings};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
@@ -97,7 +98,7 @@ impl Blinded {
 
     /// The description of the whole, without its tables.
     pub fn package(&self, unblinded: bool) -> Value {
-        let name = super::folder_name(self.session(), unblinded);
+        let name = super::folder::folder_name(self.session(), unblinded);
         json!({
             "profile": "tabular-data-package",
             "name": name,

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use super::ExportError;
 use super::destination::{Destination, NewFolder, ZipStream};
 use super::table::{Row, Table};
+use crate::ids::SessionId;
 
 /// Name of the file of checksums, in the form of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
@@ -180,4 +181,10 @@ impl<R: Row> CsvFile<'_, R> {
 
 fn new_block() -> csv::Writer<Vec<u8>> {
     csv::Writer::from_writer(Vec::with_capacity(BLOCK))
+}
+
+/// Name for an export of `session`, without an ending.
+#[must_use]
+pub fn folder_name(session: SessionId, unblinded: bool) -> String {
+    format!("parfocal-{session}{}", if unblinded { "-unblinded" } else { "" })
 }

@@ -4,11 +4,11 @@
 mod blinded;
 mod description;
 mod destination;
+mod error;
 mod folder;
 mod table;
 mod unblinded;
 pub mod verify;
-mod verify_allocation;
 
 use std::path::{Path, PathBuf};
 
@@ -17,10 +17,12 @@ use serde::Serialize;
 pub use self::description::ALL as TABLES;
 pub(super) use self::description::{PolicyStepRow, RunRow, TelemetryRow, WeightsRow};
 pub use self::destination::ZipStream;
+pub use self::error::ExportError;
 pub use self::table::{Column, TEXTS_IN_CSV, Table, Type};
 
 use self::blinded::Blinded;
 use self::folder::Folder;
+pub use self::folder::folder_name;
 use self::unblinded::Unblinded;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
@@ -38,36 +40,6 @@ pub struct Summary {
     pub practice: bool,
     /// Its files.
     pub files: Vec<String>,
-}
-
-/// Why nothing was exported.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// There is no such session.
-    #[error("there is no session {session}; there are: {known}")]
-    NoSession {
-        /// The session asked for.
-        session: SessionId,
-        /// The sessions there are.
-        known: String,
-    },
-    /// Policies were asked for before unblinding.
-    #[error("session {0} has not been unblinded: unblind it on the researcher's page first, or export it blinded")]
-    StillBlinded(SessionId),
-    /// The folder to write holds something.
-    #[error("{} exists and is not empty; choose a new folder", .0.display())]
-    Exists(PathBuf),
-    /// A file could not be written.
-    #[error("cannot write {}: {error}", .path.display())]
-    Unwritable {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        error: std::io::Error,
-    },
-    /// The database failed.
-    #[error("{0}")]
-    Store(#[from] StoreError),
 }
 
 /// An export about to be written: a session as it stands at one moment.
@@ -163,12 +135,6 @@ async fn read(
 /// written.
 pub async fn export(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
     Export::prepare(reader, session, unblinded).await?.into_folder(out).await
-}
-
-/// Name for an export of `session`, without an ending.
-#[must_use]
-pub fn folder_name(session: SessionId, unblinded: bool) -> String {
-    format!("parfocal-{session}{}", if unblinded { "-unblinded" } else { "" })
 }
 
 async fn known_sessions(reader: &Reader) -> Result<String, StoreError> {

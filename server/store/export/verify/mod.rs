@@ -1,6 +1,10 @@
 //! Verification of an export: what anyone can check of it with no database and no trust in the
 //! server.
 
+mod allocation;
+mod files;
+mod verdict;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -8,10 +12,16 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::description::{ALL, AnswerRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow};
-use super::folder::SUMS;
-use super::table::{FORMAT, Row, Table};
-use super::verify_allocation::{commitment, schedule};
+pub use verdict::Verdict;
+
+use crate::store::export::description::{
+    ALL, AnswerRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow,
+};
+use crate::store::export::folder::SUMS;
+use crate::store::export::table::{FORMAT, Row, Table};
+use allocation::{commitment, schedule};
+use files::{cells, csv, json, session_cell, text};
+use verdict::Outcome;
 
 /// One thing checked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -21,18 +31,6 @@ pub struct Check {
     /// How it came out.
     #[serde(flatten)]
     pub verdict: Verdict,
-}
-
-/// How a check came out.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-#[serde(tag = "verdict", content = "detail", rename_all = "kebab-case")]
-pub enum Verdict {
-    /// As it should be; says what was found.
-    Passed(String),
-    /// Not as it should be; says where.
-    Failed(String),
-    /// It cannot be checked; says why.
-    NotChecked(String),
 }
 
 /// Checks the export in `folder`: every check, in order.
@@ -52,8 +50,6 @@ pub fn verify(folder: &Path) -> Vec<Check> {
         check("schedule", schedule(folder)),
     ]
 }
-
-pub(super) type Outcome = Result<Verdict, String>;
 
 fn checksums(folder: &Path) -> Outcome {
     let mut listed = BTreeSet::from([SUMS.to_owned()]);
@@ -233,32 +229,4 @@ fn protocol(folder: &Path) -> Outcome {
     } else {
         Err("protocol.toml is not the one that the session was made with".to_owned())
     }
-}
-
-pub(super) fn text(folder: &Path, file: &str) -> Result<String, String> {
-    std::fs::read_to_string(folder.join(file)).map_err(|error| format!("{file}: {error}"))
-}
-
-pub(super) fn json(folder: &Path, file: &str) -> Result<Value, String> {
-    serde_json::from_str(&text(folder, file)?).map_err(|error| format!("{file}: {error}"))
-}
-
-fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, String> {
-    csv::Reader::from_path(folder.join(file)).map_err(|error| format!("{file}: {error}"))
-}
-
-/// The cells of a column.
-pub(super) fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
-    let mut reader = csv(folder, file)?;
-    let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?;
-    let place =
-        headers.iter().position(|name| name == column).ok_or_else(|| format!("{file} has no column {column}"))?;
-    reader
-        .records()
-        .map(|row| Ok(row.map_err(|error| format!("{file}: {error}"))?.get(place).unwrap_or_default().to_owned()))
-        .collect()
-}
-
-pub(super) fn session_cell(folder: &Path, column: &str) -> Result<String, String> {
-    cells(folder, "sessions.csv", column)?.into_iter().next().ok_or_else(|| "sessions.csv has no session".to_owned())
 }

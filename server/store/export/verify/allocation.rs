@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use super::verify::{Outcome, Verdict, cells, json, session_cell, text};
+use super::files::{cells, json, session_cell, text};
+use super::verdict::{Outcome, Verdict};
 use crate::autofocus::PolicyName;
 use crate::ids::SessionId;
 use crate::trial::allocation::{Algorithm, Order, Seed};

@@ -1,0 +1,60 @@
+//! Why the conductor did not do something.
+
+use crate::ids::SessionId;
+use crate::store::StoreError;
+use crate::trial::refusal::Refusal;
+
+/// Why the conductor did not do something.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ConductError {
+    /// There is no such session, segment or question, or it is not the one under way.
+    #[error("{0}")]
+    NotFound(String),
+    /// Another role does this.
+    #[error("{0}")]
+    Forbidden(String),
+    /// It cannot be done in the session's present state; nothing was changed.
+    #[error("{0}")]
+    Conflict(String),
+    /// What was sent makes no sense; says which part.
+    #[error("{0}")]
+    Invalid(String),
+    /// The disk or database failed; nothing was acknowledged.
+    #[error("could not be saved: {0}")]
+    Storage(String),
+    /// The session's protocol is of another version, or damaged.
+    #[error(
+        "session {session} was made with a protocol that this version cannot read ({reason}); go on with the version that made it, or \
+         with another folder by --data-dir"
+    )]
+    Unreadable {
+        /// The session.
+        session: SessionId,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl ConductError {
+    pub(super) fn no_session() -> Self {
+        Self::NotFound("there is no such session; reload the page".to_owned())
+    }
+}
+
+impl From<StoreError> for ConductError {
+    fn from(error: StoreError) -> Self {
+        Self::Storage(error.to_string())
+    }
+}
+
+impl From<Refusal> for ConductError {
+    fn from(refusal: Refusal) -> Self {
+        let text = refusal.to_string();
+        match refusal {
+            Refusal::NotAllowed(_) => Self::Forbidden(text),
+            Refusal::UnknownSegment => Self::NotFound(text),
+            Refusal::Conflict(_) => Self::Conflict(text),
+            Refusal::Invalid(_) => Self::Invalid(text),
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! The database of a data folder, opened for writing by one process.
+
+use std::collections::BTreeMap;
+use std::fs::{DirBuilder, File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::DirBuilderExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use tokio::sync::{Mutex, MutexGuard};
+
+use crate::autofocus::PolicyName;
+use crate::clock::Moment;
+use crate::files::make_private;
+
+use super::counts::Counts;
+use super::schema::{DATABASE, MIGRATOR};
+use super::values::nanoseconds;
+use super::{DeviceEvent, Reader, StoreError};
+
+/// Name of the lock in the data folder.
+const LOCK: &str = "parfocal.lock";
+
+/// A start of the server.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// When, by the wall clock.
+    pub wall: Timestamp,
+    /// When, by the monotonic clock.
+    pub at: Moment,
+    /// The camera, described.
+    pub camera: String,
+    /// The lens, described.
+    pub lens: String,
+    /// The sensor's calibration, by its title.
+    pub calibration: String,
+    /// SHA-256 of each learned policy's weights, by its name.
+    pub weights: BTreeMap<PolicyName, String>,
+    /// The seed given on the command line.
+    pub seed: Option<u64>,
+}
+
+/// The database of a data folder, held by this process alone. Clone freely.
+#[derive(Clone, Debug)]
+pub struct Store {
+    pub(super) inner: Arc<Inner>,
+}
+
+#[derive(Debug)]
+pub(super) struct Inner {
+    pub(super) trial: SqlitePool,
+    pub(super) telemetry: SqlitePool,
+    pub(super) checkpoints: SqlitePool,
+    pub(super) reader: Reader,
+    /// `SQLite` lets one connection write at a time and polls for its turn; this queue is fair and wakes at once.
+    turn: Mutex<()>,
+    pub(super) run: i64,
+    pub(super) telemetry_counts: Counts,
+    /// Released when dropped, or by the kernel when the process ends in whatever way.
+    _lock: File,
+}
+
+impl Store {
+    /// Opens the data folder `folder`, making it and its database or bringing the database up to date where needed, and
+    /// records the start of `run`.
+    ///
+    /// # Errors
+    /// When another server has the folder, the database is from a newer version, or the disk does not let itself be
+    /// written.
+    pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
+        let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
+        made.map_err(|error| StoreError::folder(folder, &error))?;
+        let lock = lock(folder)?;
+        keep_private(folder);
+        let file = folder.join(DATABASE);
+        let options = SqliteConnectOptions::new()
+            .filename(&file)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5))
+            // Checkpoints are made between batches of telemetry and by a connection of their own, so that none falls on a comment's
+            // commit and nobody waits for one.
+            .pragma("wal_autocheckpoint", "0");
+        let trial = connect(options.clone().synchronous(SqliteSynchronous::Full)).await?;
+        MIGRATOR.run(&trial).await?;
+        let relaxed = options.synchronous(SqliteSynchronous::Normal);
+        let telemetry = connect(relaxed.clone()).await?;
+        let checkpoints = connect(relaxed).await?;
+        let reader = Reader::open_file(&file).await?;
+        let run = begin_run(&trial, run).await?;
+        let inner = Inner {
+            trial,
+            telemetry,
+            checkpoints,
+            reader,
+            turn: Mutex::new(()),
+            run,
+            telemetry_counts: Counts::default(),
+            _lock: lock,
+        };
+        Ok(Self { inner: Arc::new(inner) })
+    }
+
+    /// Number of this start of the server, from 1.
+    #[must_use]
+    pub fn run(&self) -> i64 {
+        self.inner.run
+    }
+
+    /// For reading.
+    #[must_use]
+    pub fn reader(&self) -> &Reader {
+        &self.inner.reader
+    }
+
+    /// What became of telemetry since the start.
+    #[must_use]
+    pub fn telemetry_counts(&self) -> &Counts {
+        &self.inner.telemetry_counts
+    }
+
+    /// Closes the database; what was acknowledged is on disk with or without it.
+    pub async fn close(&self) {
+        self.inner.reader.close().await;
+        self.inner.checkpoints.close().await;
+        self.inner.telemetry.close().await;
+        self.inner.trial.close().await;
+    }
+
+    pub(super) async fn turn(&self) -> MutexGuard<'_, ()> {
+        self.inner.turn.lock().await
+    }
+
+    /// Records that a device began or ceased to work.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        sqlx::query(
+            "INSERT INTO device_events (run, wall, monotonic_ns, device, working, message) VALUES (?, ?, ?, ?, ?, ?)",
+        )
+        .bind(self.inner.run)
+        .bind(event.wall.to_string())
+        .bind(nanoseconds(event.at))
+        .bind(&event.device)
+        .bind(event.working)
+        .bind(&event.message)
+        .execute(&self.inner.telemetry)
+        .await?;
+        Ok(())
+    }
+
+    /// Adds participant `code`; one that is there already stays as it is.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")
+            .bind(code)
+            .bind(wall.to_string())
+            .execute(&self.inner.trial)
+            .await?;
+        Ok(())
+    }
+
+    /// Lets no more than `pages` pages be written, as a full disk would: for tests.
+    #[doc(hidden)]
+    pub async fn limit_pages(&self, pages: u32) -> Result<(), StoreError> {
+        let pragma = sqlx::AssertSqlSafe(format!("PRAGMA max_page_count = {pages}"));
+        sqlx::query(pragma).execute(&self.inner.trial).await?;
+        Ok(())
+    }
+}
+
+async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
+    // One connection, kept for good: its settings and prepared statements with it.
+    let pool = SqlitePoolOptions::new()
+        .max_connections(1)
+        .min_connections(1)
+        .acquire_timeout(Duration::from_secs(5))
+        .idle_timeout(None)
+        .max_lifetime(None)
+        .test_before_acquire(false);
+    Ok(pool.connect_with(options).await?)
+}
+
+async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
+    let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
+    let done = sqlx::query(
+        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, weights, seed)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(run.wall.to_string())
+    .bind(nanoseconds(run.at))
+    .bind(env!("CARGO_PKG_VERSION"))
+    .bind(&run.camera)
+    .bind(&run.lens)
+    .bind(&run.calibration)
+    .bind(weights)
+    .bind(run.seed.map(u64::cast_signed))
+    .execute(trial)
+    .await?;
+    Ok(done.last_insert_rowid())
+}
+
+/// Keeps other accounts out of the folder and its files, which tell seeds, policies and what surgeons said. Earlier versions let
+/// every account read them. What cannot be changed is no reason not to serve, but to be told of.
+fn keep_private(folder: &Path) {
+    let files = ["", "-wal", "-shm"].map(|suffix| folder.join(format!("{DATABASE}{suffix}")));
+    for path in [folder.to_owned(), folder.join(LOCK)].into_iter().chain(files) {
+        match make_private(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => tracing::warn!(
+                "other accounts of this machine may be able to read {}, which holds trial data ({error}); have its owner take their \
+                 rights away, or choose a folder of your own with --data-dir",
+                path.display()
+            ),
+            _ => {}
+        }
+    }
+}
+
+fn lock(folder: &Path) -> Result<File, StoreError> {
+    let path: PathBuf = folder.join(LOCK);
+    let failed = |error: std::io::Error| StoreError::folder(folder, &error);
+    let mut file =
+        OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+    match file.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            let mut holder = String::new();
+            let _ = file.read_to_string(&mut holder);
+            return Err(StoreError::InUse { folder: folder.to_owned(), process: holder.trim().to_owned() });
+        }
+        Err(TryLockError::Error(error)) => return Err(failed(error)),
+    }
+    // Only for the message above; the lock is the kernel's.
+    file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())).map_err(failed)?;
+    Ok(file)
+}

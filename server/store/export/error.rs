@@ -1,0 +1,36 @@
+//! Why nothing was exported.
+
+use std::path::PathBuf;
+
+use crate::ids::SessionId;
+use crate::store::StoreError;
+
+/// Why nothing was exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// There is no such session.
+    #[error("there is no session {session}; there are: {known}")]
+    NoSession {
+        /// The session asked for.
+        session: SessionId,
+        /// The sessions there are.
+        known: String,
+    },
+    /// Policies were asked for before unblinding.
+    #[error("session {0} has not been unblinded: unblind it on the researcher's page first, or export it blinded")]
+    StillBlinded(SessionId),
+    /// The folder to write holds something.
+    #[error("{} exists and is not empty; choose a new folder", .0.display())]
+    Exists(PathBuf),
+    /// A file could not be written.
+    #[error("cannot write {}: {error}", .path.display())]
+    Unwritable {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The database failed.
+    #[error("{0}")]
+    Store(#[from] StoreError),
+}

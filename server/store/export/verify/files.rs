@@ -1,0 +1,34 @@
+//! Reading the files of an export that is being verified. Errors name the file.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+pub fn text(folder: &Path, file: &str) -> Result<String, String> {
+    std::fs::read_to_string(folder.join(file)).map_err(|error| format!("{file}: {error}"))
+}
+
+pub fn json(folder: &Path, file: &str) -> Result<Value, String> {
+    serde_json::from_str(&text(folder, file)?).map_err(|error| format!("{file}: {error}"))
+}
+
+/// A reader of a CSV file of the export.
+pub fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, String> {
+    csv::Reader::from_path(folder.join(file)).map_err(|error| format!("{file}: {error}"))
+}
+
+/// The cells of a column.
+pub fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
+    let mut reader = csv(folder, file)?;
+    let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?;
+    let place =
+        headers.iter().position(|name| name == column).ok_or_else(|| format!("{file} has no column {column}"))?;
+    reader
+        .records()
+        .map(|row| Ok(row.map_err(|error| format!("{file}: {error}"))?.get(place).unwrap_or_default().to_owned()))
+        .collect()
+}
+
+pub fn session_cell(folder: &Path, column: &str) -> Result<String, String> {
+    cells(folder, "sessions.csv", column)?.into_iter().next().ok_or_else(|| "sessions.csv has no session".to_owned())
+}

@@ -1,0 +1,42 @@
+//! Values as the database keeps them.
+
+use jiff::Timestamp;
+use sqlx::Row;
+use sqlx::Sqlite;
+use sqlx::pool::PoolConnection;
+use sqlx::sqlite::SqliteRow;
+
+use super::{Stamp, StoreError};
+use crate::clock::Moment;
+
+/// A moment as the database keeps it; it holds for the next 292 years of uptime.
+pub(super) fn nanoseconds(at: Moment) -> i64 {
+    i64::try_from(at.as_nanos()).unwrap_or(i64::MAX)
+}
+
+/// Not below zero in a sound database.
+pub(super) fn moment(nanoseconds: i64) -> Moment {
+    Moment::from_nanos(u64::try_from(nanoseconds).unwrap_or(0))
+}
+
+/// The two clocks of a row.
+pub(super) fn stamp(row: &SqliteRow) -> Result<Stamp, StoreError> {
+    Ok(Stamp { wall: parsed::<Timestamp>(row, "wall")?, at: moment(row.try_get("monotonic_ns")?) })
+}
+
+/// Column `column` of `row`, written as text.
+pub(super) fn parsed<T>(row: &SqliteRow, column: &str) -> Result<T, StoreError>
+where
+    T: std::str::FromStr<Err: std::fmt::Display>,
+{
+    let text: String = row.try_get(column)?;
+    text.parse().map_err(|error| StoreError::Damaged(format!("column {column}, '{text}': {error}")))
+}
+
+/// Ends `connection` where its transaction failed; the pool then makes another. A full disk can undo a transaction behind
+/// the driver's back or leave it half open, and it would keep everyone else from writing for good.
+pub(super) fn drop_if_failed<T>(mut connection: PoolConnection<Sqlite>, outcome: &Result<T, StoreError>) {
+    if outcome.is_err() {
+        connection.close_on_drop();
+    }
+}
