@@ -1,6 +1,6 @@
-//! How the reference benchmark's scans were chosen: several kinds of disturbance at several strengths, on validation
-//! pictures, judged by `fixed` and the hill-climbers alone against the paper's simulated column. The least largest
-//! deviation wins. `cargo bench --bench calibrate`
+//! How the reference benchmark's scans were chosen: several kinds of disturbance at several
+//! strengths, on validation pictures, judged by `fixed` and the hill-climbers alone against the
+//! paper's simulated column. The least largest deviation wins. `cargo bench --bench calibrate`
 
 use std::sync::Arc;
 

@@ -1,7 +1,8 @@
-//! How the hand that moves over the recorded benchmark's phantom was chosen: several speeds along the surface and towards
-//! it, on brains that the benchmark does not use, judged by `fixed` and the hill-climbers alone against the paper's robotic
-//! column. The least largest deviation wins; the last line is the benchmark itself. `cargo bench --bench calibrate_recorded`, with
-//! `-- frozen` for that line alone.
+//! How the hand that moves over the recorded benchmark's phantom was chosen: several speeds along
+//! the surface and towards it, on brains that the benchmark does not use, judged by `fixed` and the
+//! hill-climbers alone against the paper's robotic column. The least largest deviation wins; the
+//! last line is the benchmark itself. `cargo bench --bench calibrate_recorded`, with `-- frozen`
+//! for that line alone.
 
 use std::sync::Arc;
 

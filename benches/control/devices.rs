@@ -1,8 +1,9 @@
-//! The loop on the bench's devices: Aravis's fake GigE Vision camera on the loopback, and the Optotune driver on an
-//! emulated unit behind a pseudo-terminal.
+//! The loop on the bench's devices: Aravis's fake GigE Vision camera on the loopback, and the
+//! Optotune driver on an emulated unit behind a pseudo-terminal.
 //!
-//! The end of the exposure is known by the camera's clock, and so by the first packet. The transfer comes after it, and is
-//! the link's doing: it is told apart, and the loop's own latency counts from the moment the last packet was in.
+//! The end of the exposure is known by the camera's clock, and so by the first packet. The transfer
+//! comes after it, and is the link's doing: it is told apart, and the loop's own latency counts
+//! from the moment the last packet was in.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};

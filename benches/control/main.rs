@@ -1,6 +1,7 @@
-//! What a focus step costs: the metrics, each policy's step, and a whole step of the control loop; and how long the loop
-//! takes from exposure to lens command. `cargo bench --features aravis --bench control loop` measures the loop alone, with
-//! the phantom, and with Aravis's fake GigE Vision camera and the emulated lens driver.
+//! What a focus step costs: the metrics, each policy's step, and a whole step of the control loop;
+//! and how long the loop takes from exposure to lens command. `cargo bench --features aravis
+//! --bench control loop` measures the loop alone, with the phantom, and with Aravis's fake GigE
+//! Vision camera and the emulated lens driver.
 #![allow(missing_docs, reason = "`criterion_group!` makes a public function")]
 
 #[cfg(feature = "aravis")]

@@ -1,4 +1,5 @@
-//! A slow link: hands on what the server sends at so many bits a second, and holds no more than a packet itself.
+//! A slow link: hands on what the server sends at so many bits a second, and holds no more than a
+//! packet itself.
 
 use std::net::SocketAddr;
 use std::time::Duration;

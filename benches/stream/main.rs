@@ -1,9 +1,10 @@
-//! The whole system's figures: the real server in a process of its own, watched by 1 to 16 viewers, over a slow link, and
-//! beside four processes that keep every processor busy, with real-time priority and without.
+//! The whole system's figures: the real server in a process of its own, watched by 1 to 16 viewers,
+//! over a slow link, and beside four processes that keep every processor busy, with real-time
+//! priority and without.
 //!
-//! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` for the rows of that name. One table; what is
-//! worth comparing is compared within one run. Ages are exact: the server's record of each frame's exposure and the
-//! viewers' clock are the same monotonic clock.
+//! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` for the rows of that name.
+//! One table; what is worth comparing is compared within one run. Ages are exact: the server's
+//! record of each frame's exposure and the viewers' clock are the same monotonic clock.
 
 mod link;
 mod process;

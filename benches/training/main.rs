@@ -1,5 +1,6 @@
-//! What training costs: environment steps, replay memory, and updates beside the same loop in `PyTorch` (`peer.py`).
-//! `cargo bench --bench training`; for the peer, set PYTHON to a Python that has `PyTorch` 2.11.
+//! What training costs: environment steps, replay memory, and updates beside the same loop in
+//! `PyTorch` (`peer.py`). `cargo bench --bench training`; for the peer, set PYTHON to a Python that
+//! has `PyTorch` 2.11.
 
 use std::hint::black_box;
 use std::process::Command;

@@ -1,4 +1,5 @@
-//! `parfocal calibrate`: references taken with the phantom, what is refused, and what the rest of the program makes of it.
+//! `parfocal calibrate`: references taken with the phantom, what is refused, and what the rest of
+//! the program makes of it.
 
 use std::fs;
 use std::path::Path;

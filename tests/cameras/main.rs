@@ -1,4 +1,5 @@
-//! Cameras from outside: what the simulated ones show, what they claim to know, and what they say of bad sources.
+//! Cameras from outside: what the simulated ones show, what they claim to know, and what they say
+//! of bad sources.
 
 mod calibrate;
 

@@ -1,4 +1,5 @@
-//! Recorded focal-time scans from outside: recorded, interrupted, resumed, damaged, imported, played and evaluated on.
+//! Recorded focal-time scans from outside: recorded, interrupted, resumed, damaged, imported,
+//! played and evaluated on.
 
 mod bench;
 mod evaluation;

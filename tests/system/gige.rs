@@ -1,4 +1,5 @@
-//! GigE Vision cameras against Aravis's fake camera, a real peer on the loopback (Debian's package `aravis-tools`).
+//! GigE Vision cameras against Aravis's fake camera, a real peer on the loopback (Debian's package
+//! `aravis-tools`).
 
 use std::process::Command;
 use std::sync::Arc;

@@ -1,6 +1,7 @@
 //! The whole system from outside: the real server, met over HTTP and with a camera on the wire.
 //!
-//! These subjects share `support`, and so are one test: `cargo test --test system http::` runs one of them.
+//! These subjects share `support`, and so are one test: `cargo test --test system http::` runs one
+//! of them.
 
 #[cfg(feature = "aravis")]
 mod gige;

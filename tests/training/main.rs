@@ -1,5 +1,5 @@
-//! Training and evaluation from outside: a short training learns, stopping changes nothing, the same seed gives the same
-//! figures.
+//! Training and evaluation from outside: a short training learns, stopping changes nothing, the
+//! same seed gives the same figures.
 
 use std::cell::Cell;
 use std::io::{BufRead, BufReader};

@@ -1,4 +1,5 @@
-//! Disks that fail for real: full and read-only, at the start and in mid-session. Nothing is acknowledged that is not kept.
+//! Disks that fail for real: full and read-only, at the start and in mid-session. Nothing is
+//! acknowledged that is not kept.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;

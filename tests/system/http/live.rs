@@ -1,4 +1,5 @@
-//! The live stream: paced by its viewers, silent for hidden pages, and for surgeons without a trace of the policy.
+//! The live stream: paced by its viewers, silent for hidden pages, and for surgeons without a trace
+//! of the policy.
 
 use futures_util::{SinkExt, StreamExt};
 use reqwest::header::AUTHORIZATION;

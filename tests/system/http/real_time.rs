@@ -1,4 +1,5 @@
-//! Real-time priority: had where the system allows it, never beyond its bounds, and asked for in words where it is not had.
+//! Real-time priority: had where the system allows it, never beyond its bounds, and asked for in
+//! words where it is not had.
 
 use std::fs;
 use std::process::{Command, Stdio};

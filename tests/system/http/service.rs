@@ -1,4 +1,5 @@
-//! The service: how it starts and ends, what every response carries, files, errors, the description of the interface.
+//! The service: how it starts and ends, what every response carries, files, errors, the description
+//! of the interface.
 
 use std::net::TcpListener;
 

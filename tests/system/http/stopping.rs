@@ -1,5 +1,6 @@
-//! Stopping waits for no disk: with a full disk, or while another program holds the database's lock, whoever stops the
-//! session stops the lens. What happened is recorded, in order, once the disk takes it.
+//! Stopping waits for no disk: with a full disk, or while another program holds the database's
+//! lock, whoever stops the session stops the lens. What happened is recorded, in order, once the
+//! disk takes it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,4 +1,5 @@
-//! Disks that can be filled, and users who may not write: for tests that run as root, which others skip.
+//! Disks that can be filled, and users who may not write: for tests that run as root, which others
+//! skip.
 
 use std::io::Write;
 use std::path::Path;
