@@ -180,7 +180,7 @@ async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::B
     match status {
         StatusCode::NOT_FOUND => "There is nothing at this address.".into(),
         StatusCode::METHOD_NOT_ALLOWED => "This address does not take this kind of request.".into(),
-        StatusCode::PAYLOAD_TOO_LARGE => "That is too long to be kept in one piece.".into(),
+        StatusCode::PAYLOAD_TOO_LARGE => "This text is too long. Send it in shorter parts.".into(),
         StatusCode::REQUEST_TIMEOUT => "The server took too long; try again.".into(),
         other => other.canonical_reason().unwrap_or("The request failed.").into(),
     }

@@ -32,10 +32,13 @@ pub async fn researcher(theatre: &Theatre<'_>) -> String {
     page.click("#unblind").await;
     page.type_into("#reason", "Analysis begins").await;
     // A tablet might hold something that still counts: the dialog says so, and wants to be told that it is known.
-    page.sees("#reason-confirm", "Unblind all the same").await;
+    page.sees("#reason-confirm", "Unblind anyway").await;
     let consequence = page.text("#reason-consequence").await;
-    assert!(consequence.contains("What a tablet still holds counts until"), "{consequence}");
-    assert!(!consequence.contains("not said since the end"), "the tablet has said that it is empty: {consequence}");
+    assert!(consequence.contains("Comments and answers still on a tablet count until"), "{consequence}");
+    assert!(
+        !consequence.contains("not confirmed since the end"),
+        "the tablet has said that it is empty: {consequence}"
+    );
     shoot(page, "researcher-3-unblinding").await;
     page.click("#reason-go").await;
     assert_eq!(page.run("return document.getElementById('reason-dialog').open", json!([])).await, true);

@@ -63,7 +63,7 @@ async fn practice(theatre: &Theatre<'_>) {
     surgeon.sees("#change-what", "The setting has changed.").await;
     theatre.tap_notice(2).await;
     theatre.finish_setting(5).await;
-    surgeon.sees("#panel h2", "To finish").await;
+    surgeon.sees("#panel h2", "Final questions").await;
     surgeon.click(".questions .done button").await;
     surgeon.sees("#panel h2", "Thank you").await;
     operator.sees("#session-actions", "Close and prepare the next").await;
@@ -90,7 +90,7 @@ async fn beside_another_operator(theatre: &Theatre<'_>) {
     other("/api/operator/dismissals", json!({ "session": session })).await;
     operator.sees("#new-session", "Prepare session").await;
     theatre.give_reason("Too late").await;
-    operator.sees("#reason-trouble", "This session was closed meanwhile").await;
+    operator.sees("#reason-trouble", "This session was closed in the meantime").await;
     operator.click("#reason-dialog [data-close]").await;
     operator.sees("#participant", "S-08").await;
     surgeon.sees("#panel", "No trial is under way").await;
@@ -162,7 +162,7 @@ async fn abort(theatre: &Theatre<'_>) {
     theatre.tap_notice(2).await;
     theatre.say("The last word", 2).await;
     operator.click("#session-actions .danger").await;
-    operator.sees("#reason-consequence", "Everything said and answered so far is kept").await;
+    operator.sees("#reason-consequence", "All comments and answers so far are kept").await;
     theatre.give_reason("The participant was called away").await;
     surgeon.sees("#panel h2", "The session was ended").await;
     surgeon.sees("#panel", "Everything you said is saved").await;

@@ -93,7 +93,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     let page = &theatre.operator;
     page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
     page.click("td a.button").await;
-    page.sees("#aside-list", "3 (another device’s later answer differs; 5 counts)").await;
+    page.sees("#aside-list", "3 (another device gave a different answer later; 5 counts)").await;
     page.sees("table.answers", "5").await;
     crate::screenshots::shoot(page, "researcher-6-answers-apart").await;
     assert_eq!(page.run("return document.querySelectorAll('.timeline .aside').length", json!([])).await, 1);

@@ -60,7 +60,7 @@ async fn prepare(theatre: &Theatre<'_>) {
     operator.sees("#protocol-summary", "6 settings").await;
     operator.click("#new-session [type=submit]").await;
     operator.sees("#phase", "Ready to start").await;
-    surgeon.sees("#panel", "6 settings to look at").await;
+    surgeon.sees("#panel", "You will look at 6 settings").await;
     shoot(surgeon, "surgeon-2-ready").await;
     operator.click("#session-actions .primary").await;
     surgeon.sees("#change-title", "Setting 1 of 6").await;
@@ -89,7 +89,7 @@ async fn first_setting_typed_comments(theatre: &Theatre<'_>) {
     theatre.operator.sees("#devices", "timing hidden").await;
     let shown =
         theatre.operator.run("return document.getElementById('policy').selectedOptions[0].text", json!([])).await;
-    assert_eq!(shown, "Not told during a session");
+    assert_eq!(shown, "Hidden during a session");
     shoot(&theatre.operator, "operator-3-inspecting").await;
     theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
@@ -147,7 +147,7 @@ async fn fourth_setting_too_long_a_comment(theatre: &Theatre<'_>) {
                  box.dispatchEvent(new Event('input'));";
     surgeon.run(paste, json!([])).await;
     surgeon.click("#send").await;
-    surgeon.sees("#comment-trouble", "it is back in the box: That is too long").await;
+    surgeon.sees("#comment-trouble", "is back in the box: This text is too long").await;
     assert_eq!(theatre.comment_box().await.len(), 1_000_000);
     assert_eq!(theatre.picture_height().await, height, "neither a long comment nor a message moves the picture");
     let apart = "const edges = (css) => document.querySelector(css).getBoundingClientRect();
@@ -221,7 +221,7 @@ async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre<'_>) {
 
 async fn closing_questions(theatre: &Theatre<'_>) {
     let surgeon = &theatre.surgeon;
-    surgeon.sees("#panel h2", "To finish").await;
+    surgeon.sees("#panel h2", "Final questions").await;
     shoot(surgeon, "surgeon-9-closing").await;
     surgeon.click("[aria-label='Move setting 5 up']").await;
     surgeon.sees("[data-question=preference] > .state", "Kept on this device until you tap").await;

@@ -180,7 +180,7 @@ async fn a_comment_that_comes_back_refused_is_still_about_its_setting() {
     theatre.answer_elsewhere(&driver).await;
     theatre.tap_notice(2).await;
     surgeon.run("window.release()", json!([])).await;
-    surgeon.sees("#comment-trouble", "it is back in the box").await;
+    surgeon.sees("#comment-trouble", "is back in the box").await;
     surgeon.sees("#about", "This comment is about setting 1.").await;
     let shorten = "const box = document.getElementById('comment'); box.value = 'short';
                    box.dispatchEvent(new Event('input')); document.getElementById('send').click();";

@@ -32,7 +32,8 @@ test("the timeline is as long as the last thing that happened, whatever that is"
 });
 
 test("moments and powers lie where the drawing's edges say", () => {
-  // 1056 wide: 44 left, 12 right, so 1000 pixels for 100 seconds. 260 high: 42 above, 26 below, so 192 for a power of 1.
+  // 1056 wide: 44 left, 12 right, so 1000 pixels for 100 seconds.
+  // 260 high: 42 above, 26 below, so 192 for a power of 1.
   const scale = new Scale(100, 1056);
   assert.deepEqual([scale.x(0), scale.x(50), scale.x(100)], [44, 544, 1044]);
   assert.deepEqual([scale.y(0), scale.y(0.5), scale.y(1)], [234, 138, 42]);
@@ -91,17 +92,17 @@ test("a path breaks between settings, where there is no value, and where frames 
 test("the words for a screen reader count what is drawn", () => {
   const settings = [{ setting: 1, from: 0, to: 9 }];
   const plain = description({ ...EMPTY, settings }, false);
-  assert.equal(plain, "Time line: 1 settings, 0 comments, which follow as a list.");
+  assert.equal(plain, "Timeline: 1 setting, 0 comments. The comments follow as a list.");
   const pauses = [{ reason: "lamp", from: 1, to: 2 }];
   const more = description({ ...EMPTY, settings, pauses, comments: [COMMENT] }, true);
-  assert.equal(more, "Focal power over time: 1 settings, 1 pause, 1 comments, which follow as a list.");
+  assert.equal(more, "Focal power over time: 1 setting, 1 pause, 1 comment. The comments follow as a list.");
 });
 
 test("an answer that does not count says why, and what counts instead", () => {
   const late = { value: [4, 0, 2], counted: null, late: true };
   assert.equal(setAsideWords(late), "4, –, 2 (arrived too late)");
   const other = { value: 3, counted: 5, late: false };
-  assert.equal(setAsideWords(other), "3 (another device’s later answer differs; 5 counts)");
+  assert.equal(setAsideWords(other), "3 (another device gave a different answer later; 5 counts)");
 });
 
 test("what a tablet may still hold is said where something may be outstanding", () => {
@@ -110,6 +111,7 @@ test("what a tablet may still hold is said where something may be outstanding", 
   const until = { counts_until: "2026-01-01T10:30:00Z", devices: 2 };
   assert.equal(
     outstandingWords(until, timeOf),
-    "What a tablet still holds counts until 10:30. 2 tablets have not said since the end that nothing is left on it.",
+    "Comments and answers still on a tablet count until 10:30. " +
+      "2 tablets have not confirmed since the end that everything was sent.",
   );
 });

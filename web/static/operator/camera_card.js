@@ -4,7 +4,15 @@ import { inWords, post, Refused } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { CameraSettings, KINDS, labelOf, SETTLED_MS, shown, typed } from "./camera_settings.js";
 
-/** @typedef {{ element: HTMLElement, field: HTMLInputElement, less: HTMLButtonElement, more: HTMLButtonElement }} Row */
+/**
+ * A setting's element, its field, and the buttons beside it.
+ *
+ * @typedef {object} Row
+ * @property {HTMLElement} element
+ * @property {HTMLInputElement} field
+ * @property {HTMLButtonElement} less
+ * @property {HTMLButtonElement} more
+ */
 
 const settings = new CameraSettings();
 /** @type {Map<Api.Setting, Row>} */

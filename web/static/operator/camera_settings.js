@@ -1,9 +1,16 @@
-// Exposure, gain and frame rate of a camera that lets them be changed: their units, steps and bounds.
+// Exposure, gain and frame rate of a camera that lets them be changed: their units, steps and
+// bounds.
 
-/** Exposure is sent in microseconds and shown in milliseconds. A third of a stop is a photographer's step. */
+/**
+ * Exposure is sent in microseconds and shown in milliseconds. A third of a stop is a photographer's
+ * step.
+ */
 const THIRD_OF_A_STOP = 2 ** (1 / 3);
 
-/** A value just asked for counts as the setting's until the camera has answered, so that quick taps add up. */
+/**
+ * A value just asked for counts as the setting's until the camera has answered, so that quick taps
+ * add up.
+ */
 export const SETTLED_MS = 2000;
 
 /**
@@ -73,7 +80,8 @@ export class CameraSettings {
   }
 
   /**
-   * The value one step from the present one, within the bounds; null where the camera does not offer the setting.
+   * The value one step from the present one, within the bounds; null where the camera does not
+   * offer the setting.
    *
    * @param {Api.Setting} setting
    * @param {"less" | "more"} direction

@@ -45,12 +45,12 @@ function draw(now, participant) {
     protocols.value,
   );
   const fixed = [
-    { value: UNTOLD, label: "Not told during a session", hidden: true },
+    { value: UNTOLD, label: "Hidden during a session", hidden: true },
     { value: BY_HAND, label: "By hand" },
   ];
   const named = now.policies.map(({ name, available }) => ({
     value: name,
-    label: available ? name : `${name} (no weights)`,
+    label: available ? name : `${name} (weights missing)`,
     disabled: !available,
   }));
   fill(policies, [...fixed, ...named], policies.value);
@@ -64,8 +64,8 @@ function drawSummary() {
 }
 
 /**
- * Follows what the server offers: `drawn` is called after the lists were drawn anew, `prepare` with the answer to a
- * session that was prepared. Returns what asks the server again.
+ * Follows what the server offers: `drawn` is called after the lists were drawn anew, `prepare` with
+ * the answer to a session that was prepared. Returns what asks the server again.
  *
  * @param {() => void} drawn
  * @param {(answer: Promise<Api.OperatorView | null>) => Promise<void>} prepare

@@ -77,7 +77,7 @@ export function warnings(status) {
   else if (lens.caution) all.push({ text: `Lens: ${lens.message}`, level: "warn" });
 
   if (held !== null && held !== "paused" && !cameraHolds && !lensHolds) {
-    const message = status.message ?? "the lens is being held where it is.";
+    const message = status.message ?? "the lens is held where it is.";
     all.push({ text: `Focus loop: ${message}`, level: "bad" });
   }
 
@@ -86,7 +86,7 @@ export function warnings(status) {
     all.push({ text: `Simulated ${simulated.join(" and ")}: this is not a real instrument.`, level: "warn" });
   }
   if (status.telemetry_dropped > 0) {
-    const dropped = `${status.telemetry_dropped} telemetry records were dropped: the disk cannot keep up.`;
+    const dropped = `${status.telemetry_dropped} telemetry records were lost because the disk is too slow.`;
     all.push({ text: `${dropped} Comments and answers are not affected.`, level: "warn" });
   }
   return all;

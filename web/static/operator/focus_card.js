@@ -7,7 +7,7 @@ import { Orders } from "./orders.js";
 
 export const BY_HAND = "by-hand";
 
-/** What the list of policies shows during a session, when nobody is told which one runs. */
+/** What the list of policies shows during a session, when nobody may know which one runs. */
 export const UNTOLD = "";
 
 const MIDDLE = 0.5;
@@ -21,7 +21,8 @@ let status = null;
 let dragging = false;
 
 /**
- * Draws what the loop's status tells about the focus. During a session, `blinded`, it draws nothing of it.
+ * Draws what the loop's status tells about the focus. During a session, `blinded`, it draws nothing
+ * of it.
  *
  * @param {Stream.OperatorStatus} next
  * @param {boolean} blinded
@@ -50,7 +51,7 @@ export function drawFocus(next, blinded) {
 
 /** Nothing from before the session stays, which would look as if it held now. */
 function drawUntold() {
-  setText(byId("focus-now"), "The session decides until it is closed.");
+  setText(byId("focus-now"), "The session controls the focus until you close it.");
   policies.value = UNTOLD;
   slider.value = String(MIDDLE);
   setText(byId("focal-power-value"), "");

@@ -1,4 +1,5 @@
-// One order at a time, so that the last one given is the last to arrive. Orders overtaken meanwhile are left out.
+// One order at a time, so that the last one given is the last to arrive. Orders overtaken meanwhile
+// are left out.
 
 /** @template Order */
 export class Orders {

@@ -15,7 +15,10 @@ import { Traces } from "./traces.js";
 
 const TICK_MS = 250;
 
-/** After this many frames without a belief the policy has none; the frames of a held lens have none either. */
+/**
+ * After this many frames without a belief the policy has none; the frames of a held lens have none
+ * either.
+ */
 const BELIEF_FRAMES = 25;
 
 /** @type {Api.OperatorView | null} */

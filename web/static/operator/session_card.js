@@ -1,4 +1,5 @@
-// The session under way: where it stands, what the operator can do with it, and what was said and done in it.
+// The session under way: where it stands, what the operator can do with it, and what was said and
+// done in it.
 
 import { post, Refused } from "../shared/api.js";
 import { askReason, askWhetherMeant } from "../shared/dialogs.js";
@@ -98,7 +99,8 @@ export class SessionCard {
     askWhetherMeant({
       heading: `End setting ${setting} now`,
       consequence:
-        "The surgeon’s time with this setting ends for good; the questions about it follow. Comments on it are still kept.",
+        "The surgeon’s time with this setting ends now, and the questions about it follow. " +
+        "This cannot be undone. All comments are kept.",
       go: `End setting ${setting}`,
       done: () => this.#send(session, { action: "finish-segment", segment }),
     });
@@ -119,8 +121,7 @@ export class SessionCard {
   #askAbort({ session }) {
     askReason({
       heading: "Abort the session",
-      consequence:
-        "The session ends for good and cannot be taken up again. Everything said and answered so far is kept.",
+      consequence: "The session ends and cannot be continued. All comments and answers so far are kept.",
       go: "Abort session",
       danger: true,
       done: (reason) => this.#send(session, { action: "abort", reason }),
@@ -137,14 +138,15 @@ export class SessionCard {
   }
 
   /**
-   * Does `action` on the session that was shown when it was asked for: another operator may have closed that one.
+   * Does `action` on the session that was shown when it was asked for: another operator may have
+   * closed that one.
    *
    * @param {string} session
    * @param {Api.Action} action
    */
   async #send(session, action) {
     if (this.#session?.session !== session) {
-      throw new Refused(409, "This session was closed meanwhile: nothing was done.", true);
+      throw new Refused(409, "This session was closed in the meantime. Nothing was done.", true);
     }
     await this.#followAnswer(post("/api/operator/actions", { session, ...action }));
   }

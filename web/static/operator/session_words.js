@@ -17,7 +17,7 @@ export function phaseWords({ phase, setting, settings }) {
     case "ready":
       return "Ready to start";
     case "notice":
-      return `${which}: waiting for the surgeon’s tap`;
+      return `${which}: waiting for the surgeon to tap`;
     case "inspecting":
       return `${which}: inspecting`;
     case "questions":
@@ -87,8 +87,7 @@ export function deeds(view) {
 export function unrecordedWords({ unrecorded, unrecorded_because: because }) {
   if (!unrecorded) return "";
   const why = because ?? "the disk has not answered";
-  const then =
-    "The server goes on trying. If it ends before it can, the session is paused when it starts again.";
+  const then = "The server keeps trying. If it stops first, the session will be paused when it starts again.";
   return `The lens is held, but this is not recorded yet: ${why}. ${then}`;
 }
 
@@ -101,5 +100,5 @@ export function commentWords(comment) {
 /** @param {Api.Choices["protocols"][number]} protocol */
 export function protocolWords({ researcher_title: title, settings, segment_seconds: seconds, practice }) {
   const length = `${title}: ${settings} settings of at most ${clockText(seconds)}`;
-  return practice ? `${length}; practice, kept apart from real data.` : `${length}.`;
+  return practice ? `${length}. This is practice, kept apart from real data.` : `${length}.`;
 }

@@ -1,4 +1,5 @@
-// Focal power, focus metric and belief over the last seconds, on one scale of focal power from 0 (bottom) to 1 (top).
+// Focal power, focus metric and belief over the last seconds, on one scale of focal power from 0
+// (bottom) to 1 (top).
 
 import { makeCanvas, onResize, pixelsPerCss } from "../shared/canvas.js";
 
@@ -55,7 +56,8 @@ export class Traces {
   }
 
   /**
-   * Keeps what came with a frame that was exposed at `time` (milliseconds). While a session is under way nothing does.
+   * Keeps what came with a frame that was exposed at `time` (milliseconds). While a session is
+   * under way nothing does.
    *
    * @param {Stream.Header} header
    * @param {number} time

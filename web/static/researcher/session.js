@@ -1,5 +1,5 @@
-// One session as the researcher sees it: the timeline and the list of comments move together; unblinding asks for a
-// reason.
+// One session as the researcher sees it: the timeline and the list of comments move together;
+// unblinding asks for a reason.
 
 import { get, inWords, post } from "../shared/api.js";
 import { askReason } from "../shared/dialogs.js";
@@ -118,16 +118,19 @@ async function outstandingNow() {
 async function unblind() {
   const open = await outstandingNow();
   const late = open
-    ? ` ${open} What arrives after unblinding is kept, but marked late, and never counts.`
+    ? ` ${open} What arrives after unblinding is kept and marked late, but does not count.`
     : "";
-  const usual = `You and everyone with this page will see which policy ran in which setting. This cannot be undone, and stands in the audit trail and in every export.${late}`;
+  const usual =
+    "You and everyone with this page will see which policy ran in which setting. This cannot be undone. " +
+    `The audit trail and every export will say so.${late}`;
   const emergency =
-    "The session is still under way. Unblinding now is an emergency measure: it is marked as such for good, in the audit trail and in every export. The surgeon’s and operator’s pages still do not show the policies.";
+    "The session is still under way. Unblinding now is an emergency measure. The audit trail and every " +
+    "export will always say so. The surgeon’s and operator’s pages still do not show the policies.";
 
   askReason({
     heading: ended ? "Unblind this session" : "Emergency unblinding",
     consequence: ended ? usual : emergency,
-    confirm: open ? "Unblind all the same" : undefined,
+    confirm: open ? "Unblind anyway" : undefined,
     go: ended ? "Unblind" : "Unblind now",
     danger: true,
     done: async (reason) => {

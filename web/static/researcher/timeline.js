@@ -1,4 +1,5 @@
-// The timeline's arithmetic: where in the drawing a moment and a focal power lie, and the path between them.
+// The timeline's arithmetic: where in the drawing a moment and a focal power lie, and the path
+// between them.
 
 /** @typedef {Api.Timeline} Timeline */
 /** @typedef {Api.TimelinePoint} Point */
@@ -63,7 +64,8 @@ export class Scale {
   }
 
   /**
-   * The box of a span of time, at least `narrowest` pixels wide. One without an end goes on to the end.
+   * The box of a span of time, at least `narrowest` pixels wide. One without an end goes on to the
+   * end.
    *
    * @param {{ from: number, to?: number | null }} span
    * @param {number} narrowest
@@ -108,8 +110,8 @@ export function powerAt(points, seconds) {
 }
 
 /**
- * A line through `value` of each point, as the `d` of an SVG path. It is broken between settings, where there is no
- * value, and where frames were counted anew.
+ * A line through `value` of each point, as the `d` of an SVG path. It is broken between settings,
+ * where there is no value, and where frames were counted anew.
  *
  * @param {Point[]} points
  * @param {(point: Point) => number | null | undefined} value

@@ -1,5 +1,5 @@
-// A session's timeline as SVG: settings shaded, pauses hatched, focal power over time, a marker for each comment, and
-// one for each answer that does not count.
+// A session's timeline as SVG: settings shaded, pauses hatched, focal power over time, a marker for
+// each comment, and one for each answer that does not count.
 
 import { make } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
@@ -132,7 +132,9 @@ function axes(scale, withPower) {
       const place = { x: scale.left - 8, y: scale.y(power) + 4, "text-anchor": "end" };
       parts.push(shape("text", { class: "tick", ...place }, power.toFixed(1)));
     }
-    parts.push(shape("text", { class: "tick", x: 0, y: 14 }, "focal power"));
+    // On two lines: beside it stands the first setting's name.
+    parts.push(shape("text", { class: "tick", x: 0, y: 14 }, "focal"));
+    parts.push(shape("text", { class: "tick", x: 0, y: 28 }, "power"));
   }
 
   for (const seconds of scale.ticks()) {

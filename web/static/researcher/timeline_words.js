@@ -1,5 +1,7 @@
 // The timeline in words.
 
+import { counted } from "../shared/text.js";
+
 /** @typedef {Api.Timeline} Timeline */
 
 /**
@@ -9,13 +11,15 @@
  * @param {boolean} withPath whether the focal path is drawn
  */
 export function description({ settings, pauses, comments, set_aside: setAside }, withPath) {
-  const held = pauses.length > 0 ? ` ${pauses.length} ${pauses.length > 1 ? "pauses" : "pause"},` : "";
-  const answers = setAside.length > 1 ? "answers that do" : "answer that does";
-  const apart = setAside.length > 0 ? ` ${setAside.length} ${answers} not count,` : "";
+  const parts = [counted(settings.length, "setting")];
+  if (pauses.length > 0) parts.push(counted(pauses.length, "pause"));
+  if (setAside.length > 0) {
+    parts.push(counted(setAside.length, "answer that does not count", "answers that do not count"));
+  }
+  parts.push(counted(comments.length, "comment"));
 
-  const what = withPath ? "Focal power over time" : "Time line";
-  const said = `${comments.length} comments, which follow as a list.`;
-  return `${what}: ${settings.length} settings,${held}${apart} ${said}`;
+  const what = withPath ? "Focal power over time" : "Timeline";
+  return `${what}: ${parts.join(", ")}. The comments follow as a list.`;
 }
 
 /** @param {Api.TimelineComment} comment */
@@ -29,7 +33,7 @@ export function commentWords(comment) {
  * @param {Pick<Api.SetAside, "value" | "counted" | "late">} answer
  */
 export function setAsideWords({ value, counted, late }) {
-  const why = late ? "arrived too late" : "another device’s later answer differs";
+  const why = late ? "arrived too late" : "another device gave a different answer later";
   const instead = counted == null ? "" : `; ${answerWords(counted)} counts`;
   return `${answerWords(value)} (${why}${instead})`;
 }
@@ -50,10 +54,10 @@ export function outstandingWords(outstanding, timeOf) {
   if (!outstanding) return null;
   const { counts_until: until, devices } = outstanding;
   const said = [];
-  if (until) said.push(`What a tablet still holds counts until ${timeOf(until)}.`);
+  if (until) said.push(`Comments and answers still on a tablet count until ${timeOf(until)}.`);
   if (devices > 0) {
     const tablets = devices === 1 ? "One tablet has" : `${devices} tablets have`;
-    said.push(`${tablets} not said since the end that nothing is left on it.`);
+    said.push(`${tablets} not confirmed since the end that everything was sent.`);
   }
   return said.join(" ");
 }

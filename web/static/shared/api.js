@@ -1,4 +1,5 @@
-// Talks JSON with the server, and tells three outcomes apart: it worked, the server refused, nobody answered.
+// Talks JSON with the server, and tells three outcomes apart: it worked, the server refused, nobody
+// answered.
 
 /** The server's refusal; its message is written for people. */
 export class Refused extends Error {
@@ -13,7 +14,10 @@ export class Refused extends Error {
     this.ours = ours;
   }
 
-  /** Whether the same request would be refused again: the server itself found a fault in what was sent. */
+  /**
+   * Whether the same request would be refused again: the server itself found a fault in what was
+   * sent.
+   */
   get final() {
     return this.ours && [400, 404, 409, 413, 422].includes(this.status);
   }
@@ -22,7 +26,8 @@ export class Refused extends Error {
 const PATIENCE_MS = 10000;
 
 /**
- * A text that was cut may end with half an emoji, which JSON cannot carry. It is sent as the replacement character.
+ * A text that was cut may end with half an emoji, which JSON cannot carry. It is sent as the
+ * replacement character.
  *
  * @param {string} _name
  * @param {unknown} value
@@ -71,8 +76,9 @@ function explanation(status) {
   if (status === 401 || status === 403) {
     return "This link is no longer valid here. Open it again, or ask for a new one.";
   }
-  if (status === 413) return "That is too long to be saved in one piece.";
-  if (status < 300) return "What answered is not the server. Check the network that this device is on.";
+  if (status === 413) return "This text is too long. Send it in shorter parts.";
+  if (status < 300)
+    return "Something else answered in place of the server. Check which network this device is on.";
   return `The server answered with an error (${status}).`;
 }
 

@@ -13,7 +13,8 @@ import { byId, setText } from "./dom.js";
  */
 
 /**
- * Opens `dialog`. On submit it awaits `done()`, and closes if that worked; `trouble` shows why it did not.
+ * Opens `dialog`. On submit it awaits `done()`, and closes if that worked; `trouble` shows why it
+ * did not.
  *
  * @param {HTMLDialogElement} dialog
  * @param {HTMLElement} trouble

@@ -15,8 +15,8 @@ export function byId(id, kind) {
 }
 
 /**
- * A new element. Properties are set as properties (`className`, `onclick`). Names with a dash, `role` and `for` become
- * attributes. Children are nodes or text; null and false are left out.
+ * A new element. Properties are set as properties (`className`, `onclick`). Names with a dash,
+ * `role` and `for` become attributes. Children are nodes or text; null and false are left out.
  *
  * @template {keyof HTMLElementTagNameMap} Tag
  * @param {Tag} tag
@@ -52,7 +52,8 @@ export function setText(element, text) {
 const drawn = new WeakMap();
 
 /**
- * Replaces the children of `parent` only where they differ: nothing is read out twice, and focus and selection stay.
+ * Replaces the children of `parent` only where they differ: nothing is read out twice, and focus
+ * and selection stay.
  *
  * @param {HTMLElement} parent
  * @param {HTMLElement[]} nodes

@@ -46,7 +46,10 @@ export class Live {
     return isAlive(this.#socket) && this.#reconnection.isSilent(performance.now());
   }
 
-  /** A link that broke silently leaves a socket that looks open; closing it would wait for the other end. */
+  /**
+   * A link that broke silently leaves a socket that looks open; closing it would wait for the other
+   * end.
+   */
   #connectAnew() {
     const socket = this.#socket;
     if (socket && isAlive(socket)) {
@@ -136,8 +139,8 @@ function send(socket, message) {
 }
 
 /**
- * Returns a function that waits for an answer and hands its view of the session to `follow`, unless a view came over
- * `live` meanwhile: that one is newer, or soon followed by one that is.
+ * Returns a function that waits for an answer and hands its view of the session to `follow`, unless
+ * a view came over `live` meanwhile: that one is newer, or soon followed by one that is.
  *
  * @template View
  * @param {Live} live

@@ -1,4 +1,5 @@
-// What is drawn on the picture. `scale` is screen pixels per picture pixel, `line` a line's width in screen pixels.
+// What is drawn on the picture. `scale` is screen pixels per picture pixel, `line` a line's width
+// in screen pixels.
 
 import { contextOf } from "./canvas.js";
 import { markDetail } from "./peaking.js";
@@ -84,7 +85,8 @@ export class Peaking {
   #marks = contextOf(document.createElement("canvas"));
 
   /**
-   * Searches a new picture; `area`, if there is one, is the circle outside which there is nothing to see.
+   * Searches a new picture; `area`, if there is one, is the circle outside which there is nothing
+   * to see.
    *
    * @param {ImageBitmap} bitmap
    * @param {Stream.Circle | null} area

@@ -1,5 +1,6 @@
 /**
- * The page's checkboxes for overlays: `apply(name, on)` is called for each now, and whenever one changes.
+ * The page's checkboxes for overlays: `apply(name, on)` is called for each now, and whenever one
+ * changes.
  *
  * @param {(name: string, on: boolean) => void} apply
  */

@@ -1,7 +1,9 @@
-// The page asks for the next picture by acknowledging the one before, once that is on screen. A slow tablet or a poor
-// network so gets fewer pictures, and never old ones.
+// The page asks for the next picture by acknowledging the one before, once that is on screen. A
+// slow tablet or a poor network so gets fewer pictures, and never old ones.
 
-/** Length of a frame message's first field, which is the length of its header: u16, little-endian. */
+/**
+ * Length of a frame message's first field, which is the length of its header: u16, little-endian.
+ */
 const LENGTH_BYTES = 2;
 
 /**

@@ -6,9 +6,9 @@ const MARK_RGBA = [57, 255, 110, 255];
 const NOISE = 40;
 
 /**
- * Marks the pixels within `circle` that differ most from the mean of their four neighbours (the Laplacian: a blurred
- * edge, however strong, hardly has one): by four times the mean, and by more than noise alone. Taken from green, which
- * carries most of the detail.
+ * Marks the pixels within `circle` that differ most from the mean of their four neighbours (the
+ * Laplacian: a blurred edge, however strong, hardly has one): by four times the mean, and by more
+ * than noise alone. Taken from green, which carries most of the detail.
  *
  * @param {Uint8ClampedArray} rgba the picture, `width` by `height` pixels
  * @param {Uint8ClampedArray} marks of the same size, all zero: gets the marks

@@ -3,7 +3,10 @@
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
 
-/** The server says something at least every 5 s. After this long without a word the connection is dead. */
+/**
+ * The server says something at least every 5 s. After this long without a word the connection is
+ * dead.
+ */
 const SILENCE_MS = 12000;
 
 export class Reconnection {
@@ -30,8 +33,8 @@ export class Reconnection {
   }
 
   /**
-   * Milliseconds to wait before the next attempt: twice as long after each, up to a limit. Randomness keeps the pages of
-   * a restarted server from all coming at one moment.
+   * Milliseconds to wait before the next attempt: twice as long after each, up to a limit.
+   * Randomness keeps the pages of a restarted server from all coming at one moment.
    *
    * @param {number} random from 0 to 1
    */

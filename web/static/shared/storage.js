@@ -1,5 +1,5 @@
-// What a browser keeps over a reload. A device may be full, or its owner may have switched storage off: then reading
-// finds nothing and writing returns false, and the page remembers for itself.
+// What a browser keeps over a reload. A device may be full, or its owner may have switched storage
+// off: then reading finds nothing and writing returns false, and the page remembers for itself.
 
 /**
  * @typedef {object} Store

@@ -1,5 +1,6 @@
 /**
- * A random UUID, version 4. `crypto.randomUUID` is missing on plain http, which a tablet in theatre uses.
+ * A random UUID, version 4. `crypto.randomUUID` is missing on plain http, which a tablet in theatre
+ * uses.
  *
  * @returns {string}
  */

@@ -24,7 +24,7 @@ export class Viewer {
   #colour = make(
     "p",
     { className: "viewer-colour", hidden: true },
-    "Colours estimated from 460–600 nm; reds are inferred.",
+    "Colours are estimated. The camera measures 460–600 nm, which is without red.",
   );
   /** @type {Set<string>} */
   #shown = new Set();

@@ -1,9 +1,11 @@
-// Where answers are kept on this device until they are saved: in the outbox, and as drafts while they are being written.
+// Where answers are kept on this device until they are saved: in the outbox, and as drafts while
+// they are being written.
 
 export const PATH = "/api/surgeon/answers";
 
 /**
- * The questions of a session: after a setting, by its segment, or at the end, where the segment is null.
+ * The questions of a session: after a setting, by its segment, or at the end, where the segment is
+ * null.
  *
  * @typedef {{ session: string, segment: string | null }} Place
  */
@@ -29,8 +31,8 @@ export function slotOf({ session, segment }, question) {
 }
 
 /**
- * Sends text answers that were left half-written, in whatever tab, by questions that are no longer on screen: as they
- * stand.
+ * Sends text answers that were left half-written, in whatever tab, by questions that are no longer
+ * on screen: as they stand.
  *
  * @param {import("./outbox.js").Outbox} outbox
  * @param {import("./drafts.js").Drafts} drafts

@@ -1,5 +1,6 @@
-// The comment that is being written, and those that were said. A comment belongs to the setting under which it was
-// begun, even when the setting changes while it is being written. One begun in another tab is offered, not shown.
+// The comment that is being written, and those that were said. A comment belongs to the setting
+// under which it was begun, even when the setting changes while it is being written. One begun in
+// another tab is offered, not shown.
 
 import { counted } from "../shared/text.js";
 
@@ -134,7 +135,10 @@ export class Comments {
     return this.text.trim() !== "";
   }
 
-  /** What was begun in another tab, while nothing is being written here: its text, whole and shortened. */
+  /**
+   * What was begun in another tab, while nothing is being written here: its text, whole and
+   * shortened.
+   */
   get offer() {
     if (this.disabled || this.text !== "") return null;
     const other = this.#begunElsewhere();
@@ -225,7 +229,9 @@ export class Comments {
     this.trouble = `${refusedWords(body)}: ${reason}`;
   }
 
-  /** The number of the setting that the box's comment is about, where that is not the one on screen. */
+  /**
+   * The number of the setting that the box's comment is about, where that is not the one on screen.
+   */
   get aboutOtherSetting() {
     const begun = this.#begun;
     const isOther = begun !== null && begun.setting > 0 && begun.segment !== this.#here()?.segment;
@@ -245,11 +251,12 @@ export class Comments {
 
     const { trouble, durable } = this.#outbox;
     if (trouble === null) return { kind: "saving", text: "Saving…" };
-    const kept = durable ? "device" : "page: do not close it";
-    return {
-      kind: "unsaved",
-      text: `${counted(waiting, "comment")} not saved yet, kept on this ${kept}. ${trouble}`,
-    };
+    const unsaved =
+      waiting === 1
+        ? "1 comment is not saved yet. It is kept on this"
+        : `${waiting} comments are not saved yet. They are kept on this`;
+    const kept = durable ? "device." : "page: do not close it.";
+    return { kind: "unsaved", text: `${unsaved} ${kept} ${trouble}` };
   }
 }
 
@@ -263,7 +270,7 @@ function begunAt({ segment, setting, frame, run }) {
 
 /** @param {Record<string, any>} body */
 function refusedWords({ kind, text }) {
-  if (kind === "text") return "The comment was not saved, it is back in the box";
+  if (kind === "text") return "The comment was not saved and is back in the box";
   if (kind === "mark") return "The mark was not saved";
   return `“${text}” was not saved`;
 }

@@ -1,5 +1,5 @@
-// Asks for a second press before something that cannot be undone. The second press must be meant: neither the other half
-// of a double tap nor one long after.
+// Asks for a second press before something that cannot be undone. The second press must be meant:
+// neither the other half of a double tap nor one long after.
 
 /** Sooner than this after the first press it is the same press. */
 const SAME_PRESS_MS = 400;

@@ -42,7 +42,8 @@ export function openOutbox() {
 }
 
 /**
- * Calls `changed` when another tab has written a draft, and with the draft's slot when it has sent it or taken it over.
+ * Calls `changed` when another tab has written a draft, and with the draft's slot when it has sent
+ * it or taken it over.
  *
  * @param {(slot: string | null) => void} changed
  */
@@ -53,7 +54,8 @@ export function followDrafts(changed) {
 }
 
 /**
- * While the page is in sight its tab's name is stored nowhere, so that a tab duplicated from it gets a name of its own.
+ * While the page is in sight its tab's name is stored nowhere, so that a tab duplicated from it
+ * gets a name of its own.
  *
  * @param {boolean} leaving
  */

@@ -1,6 +1,6 @@
-// What is being written, kept on this device. A draft belongs to the tab that it is written in. Another tab may take it
-// over when asked to, and sends it as it stands once its place is gone. It carries the key under which it will be sent,
-// so that it is saved once even if two tabs send it.
+// What is being written, kept on this device. A draft belongs to the tab that it is written in.
+// Another tab may take it over when asked to, and sends it as it stands once its place is gone. It
+// carries the key under which it will be sent, so that it is saved once even if two tabs send it.
 
 const PREFIX = "parfocal.draft.";
 
@@ -13,7 +13,8 @@ const PREFIX = "parfocal.draft.";
  */
 
 /**
- * A draft of any tab: `rest` is what follows the asked-for start of its name, `owner` its tab, `slot` where it is stored.
+ * A draft of any tab: `rest` is what follows the asked-for start of its name, `owner` its tab,
+ * `slot` where it is stored.
  *
  * @typedef {Kept & { rest: string, owner: string, slot: string }} Found
  */
@@ -163,8 +164,8 @@ export class Draft {
   }
 
   /**
-   * Gives the key and stamp under which to send what was written, and forgets it. Both are missing where nothing was
-   * written.
+   * Gives the key and stamp under which to send what was written, and forgets it. Both are missing
+   * where nothing was written.
    *
    * @returns {{ key?: string, given?: Stamp }}
    */

@@ -1,5 +1,6 @@
-// Tells the server how much of what was said in a session this device still holds, so that nobody unblinds the session
-// without knowing. It tells once when a session is first shown, and from the session's end on whenever that changes.
+// Tells the server how much of what was said in a session this device still holds, so that nobody
+// unblinds the session without knowing. It tells once when a session is first shown, and from the
+// session's end on whenever that changes.
 
 import { Refused } from "../shared/api.js";
 

@@ -1,5 +1,6 @@
-// Whether a tap or a key is meant for the full-screen notice at a change of setting. One that began before the notice
-// was there, or the second half of a double tap, is not. Keys of a comment that is being typed are not either.
+// Whether a tap or a key is meant for the full-screen notice at a change of setting. One that began
+// before the notice was there, or the second half of a double tap, is not. Keys of a comment that
+// is being typed are not either.
 
 /** A tap this soon after the notice appeared was meant for what was there before. */
 const NOT_MEANT_MS = 600;
@@ -24,8 +25,8 @@ export class NoticeGuard {
   }
 
   /**
-   * What to do with a key pressed while the notice is `open`: let it through, swallow it, or write it into the comment
-   * box, where the surgeon was `writing` when the notice appeared.
+   * What to do with a key pressed while the notice is `open`: let it through, swallow it, or write
+   * it into the comment box, where the surgeon was `writing` when the notice appeared.
    *
    * @param {Key} key
    * @param {number} now
@@ -47,7 +48,8 @@ export class NoticeGuard {
   }
 
   /**
-   * Whether a click is meant. Some browsers take a space's release for a click, whatever became of its press.
+   * Whether a click is meant. Some browsers take a space's release for a click, whatever became of
+   * its press.
    *
    * @param {number} now
    * @param {boolean} byKey

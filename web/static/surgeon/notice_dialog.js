@@ -6,8 +6,8 @@ import { NoticeGuard } from "./notice.js";
 const TAP = "Tap to continue";
 
 /**
- * `accept(segment)` is called when the surgeon taps the notice of `segment`. A surgeon who is writing in `box` when the
- * notice appears goes on writing there.
+ * `accept(segment)` is called when the surgeon taps the notice of `segment`. A surgeon who is
+ * writing in `box` when the notice appears goes on writing there.
  *
  * @param {HTMLTextAreaElement} box
  * @param {(segment: string) => void} accept

@@ -1,10 +1,14 @@
-// Where and when something is said: on which device, as which of all that is said there, and how long ago. An entry may
-// wait for the network. Its wait is measured by the page's monotonic clock, which nobody can set.
+// Where and when something is said: on which device, as which of all that is said there, and how
+// long ago. An entry may wait for the network. Its wait is measured by the page's monotonic clock,
+// which nobody can set.
 
 const DEVICE = "parfocal.device";
 const SEQUENCE = "parfocal.sequence";
 
-/** The clocks of a hidden page may differ by this much. By more, the device slept, or its clock was set. */
+/**
+ * The clocks of a hidden page may differ by this much. By more, the device slept, or its clock was
+ * set.
+ */
 const DRIFT_MS = 1000;
 
 /**
@@ -28,10 +32,15 @@ export class Origins {
   #clock;
   /** This load of the page: only two readings of one page's clock can be compared. */
   #page;
-  /** The device's name where nothing can be stored: then each load of the page counts as a device. */
+  /**
+   * The device's name where nothing can be stored: then each load of the page counts as a device.
+   */
   #ownDevice;
   #latest = 0;
-  /** For how long the page's clock stood still while the device slept, as far as the wall clock tells. */
+  /**
+   * For how long the page's clock stood still while the device slept, as far as the wall clock
+   * tells.
+   */
   #slept = 0;
   /** @type {{ page: number, wall: number } | null} */
   #hiddenSince = null;

@@ -1,7 +1,8 @@
-// Keeps what was said until the server says that it is saved. Every entry is first written to this device, under a key
-// of its own, so that a reload, a Wi-Fi gap or a second tab loses nothing. The entry's idempotency key makes sending it
-// twice harmless, and its origin makes the order of sending harmless. What the server refuses stays on this device too,
-// and is tried again when the page is next opened.
+// Keeps what was said until the server says that it is saved. Every entry is first written to this
+// device, under a key of its own, so that a reload, a Wi-Fi gap or a second tab loses nothing. The
+// entry's idempotency key makes sending it twice harmless, and its origin makes the order of
+// sending harmless. What the server refuses stays on this device too, and is tried again when the
+// page is next opened.
 
 import { inWords, Refused } from "../shared/api.js";
 
@@ -12,8 +13,8 @@ const LONGEST_WAIT_MS = 8000;
 /** @typedef {import("./origin.js").Stamp} Stamp */
 
 /**
- * Something said. `slot` is the question that it answers, if it does; `drafted` whether another tab may send the same
- * draft under the same key; `stored` whether this device keeps it over a reload.
+ * Something said. `slot` is the question that it answers, if it does; `drafted` whether another tab
+ * may send the same draft under the same key; `stored` whether this device keeps it over a reload.
  *
  * @typedef {object} Entry
  * @property {string} id sorts in the order in which things were said
@@ -77,7 +78,8 @@ export class Outbox {
   }
 
   /**
-   * Calls `listener` whenever an entry is added, saved, refused, or could not be sent. Returns what ends that.
+   * Calls `listener` whenever an entry is added, saved, refused, or could not be sent. Returns what
+   * ends that.
    *
    * @param {(change: Change) => void} listener
    */
@@ -106,7 +108,8 @@ export class Outbox {
   }
 
   /**
-   * How much of what was said in a session this device holds, in all its tabs: not saved yet, or refused.
+   * How much of what was said in a session this device holds, in all its tabs: not saved yet, or
+   * refused.
    *
    * @param {string} session
    */
@@ -132,7 +135,7 @@ export class Outbox {
    * @param {string} path
    * @param {Record<string, unknown>} body
    * @param {string | null} [slot] the question that it answers, if it does
-   * @param {{ key?: string, given?: Stamp }} [from] the draft that it was written as, which another tab may send as well
+   * @param {{ key?: string, given?: Stamp }} [from] the draft that it was written as
    */
   add(path, body, slot = null, from = {}) {
     // A clock that is set back must not put what is said later before what was said.
@@ -158,7 +161,8 @@ export class Outbox {
   }
 
   /**
-   * What the server refused for `slot` is in the surgeon's hands again, who has now given another answer.
+   * What the server refused for `slot` is in the surgeon's hands again, who has now given another
+   * answer.
    *
    * @param {string} slot
    */
@@ -185,8 +189,8 @@ export class Outbox {
   }
 
   /**
-   * Waits until nothing for `path` is unsaved: true. False as soon as an attempt at such an entry failed, or the server
-   * did not answer.
+   * Waits until nothing for `path` is unsaved: true. False as soon as an attempt at such an entry
+   * failed, or the server did not answer.
    *
    * @param {string} path
    */
@@ -228,7 +232,8 @@ export class Outbox {
   }
 
   /**
-   * Sends one entry. Returns whether the server answered at all, so that the next entry is worth trying.
+   * Sends one entry. Returns whether the server answered at all, so that the next entry is worth
+   * trying.
    *
    * @param {Entry} entry
    * @returns {Promise<boolean>}
@@ -268,7 +273,7 @@ export class Outbox {
       return true;
     }
 
-    this.trouble = inWords(error, "No connection: trying again by itself.");
+    this.trouble = inWords(error, "No connection. This page keeps trying.");
     const heard = error instanceof Refused;
     this.#tell(entry, "waiting", this.trouble, heard);
     return heard;
@@ -298,7 +303,8 @@ export class Outbox {
   }
 
   /**
-   * Where and when `entry` was said. Entries of an older page know only the wall clock, and its answers not even that.
+   * Where and when `entry` was said. Entries of an older page know only the wall clock, and its
+   * answers not even that.
    *
    * @param {Entry} entry
    */

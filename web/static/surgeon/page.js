@@ -1,4 +1,5 @@
-// The surgeon's page: follows the session's state as the server sends it, and shows the same whatever is being tried.
+// The surgeon's page: follows the session's state as the server sends it, and shows the same
+// whatever is being tried.
 
 import { get, post, Refused } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
@@ -90,7 +91,8 @@ async function refresh() {
 }
 
 /**
- * Does `action`. The page then shows what the server's state says, whether this tab or another moved it.
+ * Does `action`. The page then shows what the server's state says, whether this tab or another
+ * moved it.
  *
  * @param {Api.Action} action
  */
@@ -101,7 +103,7 @@ async function act(action) {
     tell(byId("trouble"), "");
   } catch (error) {
     const refused = error instanceof Refused;
-    notice.ask(refused ? "Tap to continue" : "No answer yet: tap again");
+    notice.ask(refused ? "Tap to continue" : "The server did not answer. Tap again.");
     if (refused && error.status < 500) await refresh();
     if (isStillMeant(action)) {
       tellTrouble(byId("trouble"), error, "The server does not answer. Try again in a moment.");
@@ -133,7 +135,8 @@ function drawBar() {
   finish.disabled = !looking;
   if (finish.disabled) forgetFirstPress();
 
-  const unrecorded = "This step is not recorded yet: the server cannot write to its disk. Tell the operator.";
+  const unrecorded =
+    "This step is not recorded yet because the server cannot write to its disk. Tell the operator.";
   setText(byId("unrecorded"), state?.unrecorded ? unrecorded : "");
   setText(byId("prompt"), looking ? (state?.prompt ?? "") : "");
   drawTime();
@@ -167,7 +170,7 @@ function drawPanel() {
 function panelContent() {
   if (!known) return null;
   if (!state) {
-    const text = "The view is live. A trial begins here by itself when the operator starts one.";
+    const text = "The view is live. When the operator starts a trial, it begins here.";
     return card("aside", "No trial is under way", text);
   }
   if (state.paused && !isEnded(state)) return pausedCard(state);
@@ -178,7 +181,7 @@ function panelContent() {
     case "questions":
       return questions(state, `Setting ${state.setting}: a few questions`);
     case "closing":
-      return questions(state, "To finish");
+      return questions(state, "Final questions");
     case "completed":
       return card("centred", "Thank you", `The trial is complete. ${kept()}`);
     case "aborted":
@@ -189,7 +192,7 @@ function panelContent() {
 }
 
 function kept() {
-  return comments.unsent ? "Your last comment is still in its box: send it, or clear it." : saved();
+  return comments.unsent ? "Your last comment is still in the box. Save it or delete it." : saved();
 }
 
 function saved() {
@@ -202,12 +205,12 @@ function pausedCard({ may_resume: mayResume }) {
   const text = "The operator has paused the session. You can still comment.";
   if (!mayResume) return card("centred clear", "Paused", text);
 
-  const resume = make("button", { type: "button", className: "primary" }, "Go on");
+  const resume = make("button", { type: "button", className: "primary" }, "Continue");
   resume.onclick = () => act({ action: "resume" });
   return card(
     "centred clear",
     "Paused",
-    `The server was restarted. ${saved()} Go on where you were.`,
+    `The server was restarted. ${saved()} Continue where you were.`,
     resume,
   );
 }

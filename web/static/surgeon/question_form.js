@@ -6,7 +6,8 @@ import { NOT_ANSWERED, ordinal, RankingAnswer, ScaleAnswer, SusAnswer, TextAnswe
 /** @typedef {import("./questions.js").AnyAnswer} AnyAnswer */
 
 /**
- * One question's element; `draw` shows the answer's state, `wantedPlace` the first place still to be answered.
+ * One question's element; `draw` shows the answer's state, `wantedPlace` the first place still to
+ * be answered.
  *
  * @typedef {object} QuestionBox
  * @property {AnyAnswer} answer

@@ -86,7 +86,7 @@ export class QuestionPanel {
       return;
     }
     if (this.#questionnaire.refused) {
-      tell(this.#missing, "An answer was not taken: see above.");
+      tell(this.#missing, "One answer was not saved. The reason is shown above.");
       return;
     }
 

@@ -1,15 +1,26 @@
-// The protocol's questions, and how far the answer to each has got. Each answer goes to the outbox the moment it is given.
-// What stands on the page is what the server has, unless something newer is on its way.
+// The protocol's questions, and how far the answer to each has got. Each answer goes to the outbox
+// the moment it is given. What stands on the page is what the server has, unless something newer is
+// on its way.
 
 /** @typedef {"saving" | "saved" | "waiting" | "refused" | "partly" | ""} Reached */
 /** @typedef {import("./drafts.js").Draft} Draft */
 
 /**
+ * Sends an answer, or a part of one, which was written as the draft `from`.
+ *
+ * @callback Give
+ * @param {Api.Question} question
+ * @param {Api.AnswerValue} value
+ * @param {number | null} part
+ * @param {ReturnType<Draft["take"]>} from
+ * @returns {void}
+ */
+
+/**
  * What answers do with the rest of the page.
  *
  * @typedef {object} Context
- * @property {(question: Api.Question, value: Api.AnswerValue, part: number | null, from: ReturnType<Draft["take"]>) => void} give
- *   sends an answer, or part `part` of one, which was written as the draft `from`
+ * @property {Give} give
  * @property {(question: Api.Question) => Draft} draft
  * @property {(run: () => void, ms: number) => () => void} later
  * @property {number} settings how many settings there are
@@ -35,11 +46,12 @@ export const NOT_ANSWERED = "Not answered yet";
 const REACHED_WORDS = {
   saving: "Saving…",
   saved: "Saved",
-  waiting: "Kept on this device; will be saved when the connection is back",
+  waiting: "Kept on this device. It will be saved when the connection is back.",
 };
 
 /**
- * What stands once `given` has come on top of `earlier`. A 0 among points leaves what was there, as on the server.
+ * What stands once `given` has come on top of `earlier`. A 0 among points leaves what was there, as
+ * on the server.
  *
  * @param {Api.AnswerValue | undefined} earlier
  * @param {Api.AnswerValue} given
@@ -83,17 +95,25 @@ class Answer {
     this.context = context;
   }
 
-  /** What the surgeon has begun and must still confirm, in words; null where nothing is. @returns {string | null} */
+  /**
+   * What the surgeon has begun and must still confirm, in words; null where nothing is. @returns
+   * {string | null}
+   */
   get begun() {
     return null;
   }
 
-  /** What is still to be answered of it, in words; null where nothing is. @returns {string | null} */
+  /**
+   * What is still to be answered of it, in words; null where nothing is. @returns {string | null}
+   */
   get open() {
     return null;
   }
 
-  /** Whether a part of it is still to be answered, where it has parts: by place. @returns {boolean[]} */
+  /**
+   * Whether a part of it is still to be answered, where it has parts: by place. @returns
+   * {boolean[]}
+   */
   get wantedParts() {
     return [];
   }
@@ -345,7 +365,10 @@ export class SusAnswer extends Answer {
   }
 }
 
-/** An order of the settings. It counts once it is confirmed: one tap on an arrow says nothing about the other settings. */
+/**
+ * An order of the settings. It counts once it is confirmed: one tap on an arrow says nothing about
+ * the other settings.
+ */
 export class RankingAnswer extends Answer {
   order;
   confirmed;

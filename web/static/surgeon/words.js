@@ -1,6 +1,6 @@
 // What the surgeon reads about the session.
 
-import { clockText } from "../shared/text.js";
+import { clockText, counted } from "../shared/text.js";
 
 /** @typedef {Api.SurgeonView} View */
 
@@ -48,8 +48,8 @@ export function simulatedWords({ camera_simulated: camera, lens_simulated: lens 
 
 /** @param {View} state */
 export function readyWords({ settings }) {
-  const many = settings === 1 ? "One setting" : `${settings} settings`;
-  return `${many} to look at, one after another. Waiting for the operator to start.`;
+  const many = settings === 1 ? "one setting" : `${settings} settings, one after another`;
+  return `You will look at ${many}. The operator will start the trial.`;
 }
 
 /**
@@ -59,11 +59,11 @@ export function readyWords({ settings }) {
  * @param {number} waiting how much is not saved yet
  */
 export function savedWords(refused, waiting) {
-  const said = refused === 1 ? "One thing that you said" : `${refused} things that you said`;
-  const are = refused === 1 ? "is" : "are";
+  const unsaved = counted(refused, "comment or answer", "comments or answers");
+  const are = refused === 1 ? "It is" : "They are";
   const kept =
-    refused > 0 ? `${said} could not be saved and ${are} kept on this device: tell the operator. ` : "";
+    refused > 0 ? `${unsaved} could not be saved. ${are} kept on this device. Tell the operator. ` : "";
 
-  if (waiting > 0) return `${kept}Please leave this page open: some of what you said is still being saved.`;
+  if (waiting > 0) return `${kept}Please keep this page open. Some of what you said is still being saved.`;
   return kept.trim() || "Everything you said is saved.";
 }
