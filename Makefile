@@ -34,7 +34,7 @@ web:
 
 # After a change of the HTTP interface: the types that the pages are checked against.
 web-types:
-	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --quiet --locked $(FEATURES) --test http the_pages_are_checked
+	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
 unit:

@@ -1,8 +1,10 @@
-//! The whole system from outside: the real server, met over HTTP and with a camera on the wire.
+//! The whole system from outside: the real server, met over HTTP, in browsers, and with a camera on the
+//! wire.
 //!
 //! These subjects share `support`, and so are one test: `cargo test --test system http::` runs one
 //! of them.
 
+mod browser;
 #[cfg(feature = "aravis")]
 mod gige;
 mod http;

@@ -5,13 +5,12 @@ use std::process::Command;
 use serde_json::json;
 use sqlx::Row;
 
-use crate::screenshots::shoot;
-use crate::theatre::Theatre;
-use crate::wait::until;
-use crate::webdriver::Browser;
+use super::screenshots::shoot;
+use super::theatre::Theatre;
+use super::wait::until;
 
 /// The researcher looks at the session and unblinds it; gives its id.
-pub async fn researcher(theatre: &Theatre<'_>) -> String {
+pub async fn researcher(theatre: &Theatre) -> String {
     let page = &theatre.operator;
     page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
     page.sees("tbody", "completed").await;
@@ -19,16 +18,16 @@ pub async fn researcher(theatre: &Theatre<'_>) -> String {
     page.click("td a.button").await;
     page.sees("#comment-list", "Follows me well 🧠").await;
     page.sees(".closing", "SUS score 67.5").await;
-    let session = page.run("return document.getElementById('session').dataset.session", json!([])).await;
-    let session = session.as_str().unwrap().to_owned();
-    assert_eq!(fetched(page, &format!("{session}/export.zip")).await, "200 PK");
-    assert_eq!(fetched(page, &format!("{session}/export.zip?unblinded=true")).await, "409 {\"");
+    let session = page.attribute("#session", "data-session").await.unwrap();
+    let export = format!("/api/researcher/sessions/{session}/export.zip");
+    assert_eq!(page.start_of(&export).await, "200 PK");
+    assert_eq!(page.start_of(&format!("{export}?unblinded=true")).await, "409 {\"");
     page.click("#comment-list li:first-child button").await;
     page.sees("#timeline figcaption", "Follows me well 🧠").await;
     shoot(page, "researcher-2-blinded").await;
-    let held = "return [...document.querySelectorAll('.timeline .pause title')].map((title) => title.textContent)";
-    let held = page.run(held, json!([])).await.to_string();
-    assert!(held.contains("The server restarted"), "the timeline shows when the lens was held: {held}");
+    let held = page.properties(".timeline .pause title", "textContent").await;
+    let restarted = held.iter().any(|reason| reason.contains("The server restarted"));
+    assert!(restarted, "the timeline shows when the lens was held: {held:?}");
     page.click("#unblind").await;
     page.type_into("#reason", "Analysis begins").await;
     // A tablet might hold something that still counts: the dialog says so, and wants to be told that it is known.
@@ -41,36 +40,26 @@ pub async fn researcher(theatre: &Theatre<'_>) -> String {
     );
     shoot(page, "researcher-3-unblinding").await;
     page.click("#reason-go").await;
-    assert_eq!(page.run("return document.getElementById('reason-dialog').open", json!([])).await, true);
+    assert!(page.is("#reason-dialog", "open").await);
     page.click("#reason-confirmed").await;
     page.click("#reason-go").await;
     page.sees(".unblinded", "mlr-hill-climber").await;
     until("the focal path", || async {
-        page.run("return document.querySelector('.timeline .path')?.getAttribute('d').length > 100", json!([])).await
-            == true
+        page.attribute(".timeline .path", "d").await.is_some_and(|path| path.len() > 100)
     })
     .await;
-    page.run("scrollTo(0, 0)", json!([])).await;
+    page.to_top().await;
     shoot(page, "researcher-4-unblinded").await;
-    assert_eq!(fetched(page, &format!("{session}/export.zip?unblinded=true")).await, "200 PK");
+    assert_eq!(page.start_of(&format!("{export}?unblinded=true")).await, "200 PK");
     page.open(&theatre.server.url("/researcher/dictionary")).await;
     page.sees("main", "comments.csv").await;
     shoot(page, "researcher-5-dictionary").await;
     session
 }
 
-/// Status and first two bytes of what the researcher's page gets at `path`.
-async fn fetched(page: &Browser<'_>, path: &str) -> String {
-    let script =
-        "const answer = new XMLHttpRequest(); answer.open('GET', '/api/researcher/sessions/' + arguments[0], false);
-                  answer.overrideMimeType('text/plain; charset=x-user-defined'); answer.send();
-                  return answer.status + ' ' + answer.responseText.slice(0, 2)";
-    page.run(script, json!([path])).await.as_str().unwrap().to_owned()
-}
-
 /// What is in the database, read by another program than the server.
-pub async fn database(theatre: &Theatre<'_>, session: &str) {
-    let pool = crate::theatre::database(theatre.server.data.path()).await;
+pub async fn database(theatre: &Theatre, session: &str) {
+    let pool = super::theatre::database(theatre.server.data.path()).await;
     let rows = sqlx::query(
         "SELECT kind, text, setting, frame FROM comments LEFT JOIN segments USING (segment) WHERE comments.session = ? ORDER BY comments.number",
     );
@@ -119,7 +108,7 @@ pub async fn database(theatre: &Theatre<'_>, session: &str) {
 }
 
 /// The command's export is whole by the verifier's word.
-pub fn export(theatre: &Theatre<'_>, session: &str) {
+pub fn export(theatre: &Theatre, session: &str) {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().join("export");
     let parfocal = || Command::new(env!("CARGO_BIN_EXE_parfocal"));

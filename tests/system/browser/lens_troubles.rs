@@ -4,19 +4,18 @@ use std::sync::Arc;
 
 use parfocal::clock::SystemClock;
 use parfocal::lens::emulator::{Emulator, Fault, Model};
-use serde_json::json;
 
-use crate::screenshots::shoot;
+use super::browser::Driver;
+use super::screenshots::shoot;
+use super::theatre::operator;
 use crate::support::Server;
-use crate::theatre::operator;
-use crate::webdriver::Driver;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_operator_reads_what_is_wrong_with_the_lens() {
     let mut emulator = Emulator::start(Model::default(), Arc::new(SystemClock)).unwrap();
     let lens = format!("optotune:{}", emulator.path().display());
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--lens", &lens]);
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let operator = operator(&driver, &server).await;
     operator.sees("#devices", "Optotune lens").await;
     operator.sees_no("#warnings .bad").await;
@@ -44,11 +43,9 @@ async fn the_operator_reads_what_is_wrong_with_the_lens() {
     emulator.set_temperature(25.0);
     emulator.unplug();
     operator.sees("#warnings .bad", "is the driver plugged in?; trying again").await;
-    let lines = operator.run("return document.querySelectorAll('#warnings .bad').length", json!([])).await;
-    assert_eq!(lines, 1, "one trouble, one line");
+    assert_eq!(operator.count("#warnings .bad").await, 1, "one trouble, one line");
     shoot(&operator, "operator-10-lens-unplugged").await;
     emulator.plug_in().unwrap();
     operator.sees_no("#warnings .bad").await;
-    let policy = operator.run("return document.getElementById('policy').value", json!([])).await;
-    assert_eq!(policy, "mgm-hill-climber", "it goes on as before");
+    assert_eq!(operator.value("#policy").await, "mgm-hill-climber", "it goes on as before");
 }

@@ -5,13 +5,13 @@ use std::time::Duration;
 use parfocal::clock::{Clock, SystemClock};
 use serde_json::json;
 
-use crate::theatre::Theatre;
-use crate::wait::until;
-use crate::webdriver::{Browser, Driver};
+use super::browser::{Browser, Driver};
+use super::theatre::Theatre;
+use super::wait::until;
 
 const REMARKS: &str = "[data-question=remarks] textarea";
 
-impl Theatre<'_> {
+impl Theatre {
     /// The operator ends the session and takes it off the screens.
     pub async fn put_away(&self) {
         self.operator.click("#session-actions .danger").await;
@@ -32,7 +32,7 @@ impl Theatre<'_> {
 
     /// Waits until what `sql` gives, in the database, is `expected`.
     pub async fn keeps(&self, sql: &'static str, expected: &[&str]) {
-        let pool = crate::theatre::database(self.server.data.path()).await;
+        let pool = super::theatre::database(self.server.data.path()).await;
         until(&format!("{sql} to give {expected:?}"), || async {
             sqlx::query_scalar::<_, String>(sql).fetch_all(&pool).await.unwrap() == expected
         })
@@ -42,7 +42,7 @@ impl Theatre<'_> {
 }
 
 /// A key as a keyboard sends it; `text` where it writes something.
-async fn press(page: &Browser<'_>, key: &str, text: &str, repeat: bool) {
+async fn press(page: &Browser, key: &str, text: &str, repeat: bool) {
     let code = if key == "Enter" { 13 } else { 0 };
     let down =
         json!({ "type": "keyDown", "key": key, "text": text, "autoRepeat": repeat, "windowsVirtualKeyCode": code });
@@ -55,7 +55,7 @@ async fn press(page: &Browser<'_>, key: &str, text: &str, repeat: bool) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_answer_left_half_written_is_sent_when_its_question_is_gone() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
     theatre.begin("S-07", "short").await;
@@ -63,9 +63,7 @@ async fn an_answer_left_half_written_is_sent_when_its_question_is_gone() {
     theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
     // Written and left at once, before the page has sent it.
-    let write = "const area = document.querySelector(arguments[0]); area.value = 'Half an answer';
-                 area.dispatchEvent(new Event('input')); location.replace('about:blank')";
-    surgeon.run(write, json!([REMARKS])).await;
+    surgeon.write_and_leave(REMARKS, "Half an answer").await;
     theatre.put_away().await;
     surgeon.open(&format!("http://{}/surgeon", theatre.proxy.address)).await;
     theatre.keeps("SELECT value FROM answers", &["\"Half an answer\""]).await;
@@ -73,11 +71,10 @@ async fn an_answer_left_half_written_is_sent_when_its_question_is_gone() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_tablet_that_stores_nothing_loses_nothing_that_is_written() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
-    let refuse = "Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError'); };";
-    surgeon.tools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": refuse })).await;
+    surgeon.fill_storage().await;
     surgeon.reload().await;
     theatre.begin("S-08", "short").await;
     theatre.tap_notice(1).await;
@@ -95,7 +92,7 @@ async fn a_tablet_that_stores_nothing_loses_nothing_that_is_written() {
 #[tokio::test(flavor = "multi_thread")]
 async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish() {
     const TEXT: &str = "before we begin the light is dim and the view is wet";
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
     theatre.begin("S-09", "short").await;
@@ -116,7 +113,7 @@ async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish()
     surgeon.sees("#change-title", "Setting 2 of ").await;
     theatre.tap_notice(2).await;
 
-    surgeon.run("document.getElementById('finish').focus()", json!([])).await;
+    surgeon.focus("#finish").await;
     press(surgeon, "Enter", "\r", false).await;
     surgeon.sees("#finish", "Tap again to finish").await;
     let since = SystemClock.now();
@@ -130,21 +127,18 @@ async fn keys_of_a_comment_do_not_accept_the_notice_nor_does_a_held_key_finish()
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_box_takes_nothing_before_the_page_knows_what_it_would_be_about() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
     // A network that swallows everything, from the page's first moment.
-    let silence =
-        "window.fetch = () => new Promise(() => {}); window.WebSocket = class extends EventTarget { close() {} };";
-    surgeon.tools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": silence })).await;
+    surgeon.silence().await;
     surgeon.reload().await;
-    let disabled = surgeon.run("return document.getElementById('comment').disabled", json!([])).await;
-    assert_eq!(disabled, true, "what is typed there could not be kept");
+    assert!(surgeon.is("#comment", "disabled").await, "what is typed there could not be kept");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_long_comment_left_behind_leaves_the_next_participant_a_box_as_ever() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     theatre.begin("S-10", "short").await;
     theatre.tap_notice(1).await;
@@ -152,39 +146,30 @@ async fn a_long_comment_left_behind_leaves_the_next_participant_a_box_as_ever() 
     theatre.put_away().await;
     theatre.begin("S-11", "short").await;
     theatre.tap_notice(1).await;
-    let state = "const box = document.getElementById('comment'); return [box.value, box.className,
-                 getComputedStyle(document.getElementById('quick')).visibility]";
-    assert_eq!(theatre.surgeon.run(state, json!([])).await, json!(["", "", "visible"]));
+    assert_eq!(theatre.comment_box().await, "");
+    assert_eq!(theatre.surgeon.property("#comment", "className").await.as_deref(), Some(""));
+    assert_eq!(theatre.surgeon.style("#quick", "visibility").await, "visible");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_comment_that_comes_back_refused_is_still_about_its_setting() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
     theatre.begin("S-12", "short").await;
     theatre.tap_notice(1).await;
     // Longer than the server takes, and its refusal on the way until the next setting has begun.
-    let send = "const sent = window.fetch;
-                const held = new Promise((done) => (window.release = done));
-                window.fetch = async (path, request) => {
-                    if (path.endsWith('/comments')) await held;
-                    return sent(path, request);
-                };
-                const box = document.getElementById('comment');
-                box.value = 'long '.repeat(4000);
-                box.dispatchEvent(new Event('input'));
-                document.getElementById('send').click();";
-    surgeon.run(send, json!([])).await;
+    surgeon.hold("/comments").await;
+    surgeon.paste("#comment", &"long ".repeat(4000)).await;
+    surgeon.click("#send").await;
     theatre.finish().await;
     theatre.answer_elsewhere(&driver).await;
     theatre.tap_notice(2).await;
-    surgeon.run("window.release()", json!([])).await;
+    surgeon.release().await;
     surgeon.sees("#comment-trouble", "is back in the box").await;
     surgeon.sees("#about", "This comment is about setting 1.").await;
-    let shorten = "const box = document.getElementById('comment'); box.value = 'short';
-                   box.dispatchEvent(new Event('input')); document.getElementById('send').click();";
-    surgeon.run(shorten, json!([])).await;
+    surgeon.paste("#comment", "short").await;
+    surgeon.click("#send").await;
     let sql = "SELECT text || ' ' || setting FROM comments JOIN segments USING (segment)";
     theatre.keeps(sql, &["short 1"]).await;
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::proxy::Connection;
-use crate::wire::{Received, take_apart};
+use super::proxy::Connection;
+use super::wire::{Received, take_apart};
 
 /// Names of policies, and words that only someone who knows the policy would use.
 const TELLING: [&str; 16] = [

@@ -1,13 +1,13 @@
 //! The operator changes a real camera's settings: typed, tapped, refused, and seen to take effect.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::fake_camera::Fake;
-use crate::screenshots::shoot;
+use super::browser::{Browser, Driver};
+use super::screenshots::shoot;
+use super::theatre::operator;
+use super::wait::until;
 use crate::support::Server;
-use crate::theatre::operator;
-use crate::wait::until;
-use crate::webdriver::{Browser, Driver};
+use crate::support::fake_camera::Fake;
 
 const DELETE: &str = "\u{e017}";
 
@@ -31,20 +31,8 @@ async fn becomes(server: &Server, setting: &str, expected: f64) {
 }
 
 /// What stands in the field of a setting.
-async fn field(operator: &Browser<'_>, setting: &str) -> String {
-    let value = "return document.getElementById(arguments[0]).value";
-    operator.run(value, json!([format!("camera-{setting}")])).await.as_str().unwrap().to_owned()
-}
-
-/// Mean gray of the picture, 0..=255.
-async fn brightness(operator: &Browser<'_>) -> f64 {
-    let mean = "const from = document.querySelector('#view canvas');
-                const small = Object.assign(document.createElement('canvas'), { width: 32, height: 32 });
-                const pen = small.getContext('2d');
-                pen.drawImage(from, 0, 0, 32, 32);
-                const data = pen.getImageData(0, 0, 32, 32).data;
-                return data.reduce((sum, one, index) => sum + (index % 4 < 3 ? one : 0), 0) / (3 * 32 * 32)";
-    operator.run(mean, json!([])).await.as_f64().unwrap()
+async fn field(operator: &Browser, setting: &str) -> String {
+    operator.property(&format!("#camera-{setting}"), "value").await.unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -52,22 +40,22 @@ async fn the_operator_sets_exposure_gain_and_frame_rate() {
     let Some(_fake) = Fake::start(&[]) else { return };
     let camera = "gige:Aravis-Fake-TEST?format=Mono8&width=512&height=512&exposure=10000";
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--camera", camera]);
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let operator = operator(&driver, &server).await;
     operator.sees("#camera-settings", "Exposure, ms").await;
     operator.sees("#camera-settings", "Gain").await;
     operator.sees("#camera-settings", "Frame rate, fps").await;
     assert_eq!(field(&operator, "exposure").await, "10");
-    until("a picture", || async { brightness(&operator).await > 20.0 }).await;
+    until("a picture", || async { operator.brightness().await > 20.0 }).await;
 
     // The fake camera's ramp is as dark as the exposure is short: at a millisecond nothing is left of it.
     operator.type_into("#camera-exposure", &keys("1")).await;
     becomes(&server, "exposure", 1000.0).await;
-    until("a dark picture", || async { brightness(&operator).await < 10.0 }).await;
+    until("a dark picture", || async { operator.brightness().await < 10.0 }).await;
     operator.click("#camera-settings [aria-label='More exposure']").await;
     becomes(&server, "exposure", 1260.0).await; // a third of a stop: the cube root of 2
     operator.type_into("#camera-exposure", &keys("8")).await;
-    until("a bright picture", || async { brightness(&operator).await > 20.0 }).await;
+    until("a bright picture", || async { operator.brightness().await > 20.0 }).await;
 
     operator.type_into("#camera-frame-rate", &keys("20")).await;
     becomes(&server, "frame-rate", 20.0).await;
@@ -82,7 +70,7 @@ async fn the_operator_sets_exposure_gain_and_frame_rate() {
 }
 
 /// A value that the camera cannot have: said with the bounds in the unit that is shown, and the old one stands there again.
-async fn refused(operator: &Browser<'_>, server: &Server) {
+async fn refused(operator: &Browser, server: &Server) {
     operator.type_into("#camera-exposure", &keys("99999999")).await;
     operator.sees("#camera-trouble", "Exposure must be from ").await;
     operator.sees("#camera-trouble", " ms.").await;

@@ -2,20 +2,19 @@
 
 use std::sync::Arc;
 
-use serde_json::json;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions, Connection};
 
-use crate::disk::SmallDisk;
-use crate::screenshots::shoot;
-use crate::theatre::Theatre;
-use crate::wait::until;
-use crate::webdriver::Driver;
+use super::browser::Driver;
+use super::screenshots::shoot;
+use super::theatre::Theatre;
+use super::wait::until;
+use crate::support::disk::SmallDisk;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     let Some(disk) = SmallDisk::mount() else { return };
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::on(&driver, Arc::clone(&disk.folder)).await;
     let surgeon = &theatre.surgeon;
     theatre.begin("S-06", "limited").await;
@@ -29,9 +28,8 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
         let text = format!("{} {}", said.len(), "long ".repeat(2000));
         said.push(text.trim().to_owned());
         async move {
-            let say = "const box = document.getElementById('comment'); box.value = arguments[0];
-                       box.dispatchEvent(new Event('input')); document.getElementById('send').click();";
-            surgeon.run(say, json!([text])).await;
+            surgeon.paste("#comment", &text).await;
+            surgeon.click("#send").await;
             until("an answer", || async { surgeon.text("#comment-state").await != "Saving…" }).await;
             surgeon.text("#comment-state").await.contains("kept on this device")
         }
@@ -45,7 +43,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
     disk.empty();
     theatre.sees_saved(said.len()).await;
 
-    let pool = crate::theatre::database(disk.folder.path()).await;
+    let pool = super::theatre::database(disk.folder.path()).await;
     let kept: Vec<String> =
         sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
     assert_eq!(kept, said, "each once, in the order said");
@@ -54,7 +52,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
     theatre.begin("S-07", "short").await;
@@ -64,9 +62,7 @@ async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
     sqlx::query("BEGIN IMMEDIATE").execute(&mut other_program).await.unwrap();
 
     operator.sees("#session-actions", "Pause").await;
-    let pause = "[...document.querySelectorAll('#session-actions button')]
-                 .find((button) => button.textContent.startsWith('Pause')).click()";
-    operator.run(pause, json!([])).await;
+    operator.click_labelled("#session-actions", "Pause").await;
     theatre.give_reason("The phone").await;
     operator.sees("#session-badges", "Paused").await;
     surgeon.sees("#panel h2", "Paused").await;
@@ -81,7 +77,7 @@ async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
     operator.sees_no("#unrecorded").await;
     surgeon.sees_no("#unrecorded").await;
     assert!(!operator.text("#log").await.contains("not recorded"));
-    let pool = crate::theatre::database(theatre.server.data.path()).await;
+    let pool = super::theatre::database(theatre.server.data.path()).await;
     let paused = "SELECT payload ->> 'reason' FROM events WHERE kind = 'paused'";
     let reasons: Vec<String> = sqlx::query_scalar(paused).fetch_all(&pool).await.unwrap();
     assert_eq!(reasons, ["The phone"]);

@@ -5,8 +5,8 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 use uuid::Uuid;
 
+use super::theatre;
 use crate::support::{Server, client};
-use crate::theatre;
 
 /// The surgeon's and the operator's programs.
 struct Trial {
@@ -102,7 +102,7 @@ impl Trial {
 
     /// The comments in the database.
     async fn kept(&self) -> Vec<String> {
-        let pool = crate::theatre::database(self.server.data.path()).await;
+        let pool = super::theatre::database(self.server.data.path()).await;
         let comments = sqlx::query_scalar("SELECT text FROM comments ORDER BY number").fetch_all(&pool).await.unwrap();
         pool.close().await;
         comments

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::theatre;
-use crate::webdriver::{Browser, Driver};
+use super::browser::{Browser, Driver};
+use super::theatre;
 
 /// A fresh outbox as `outbox`; `answers` are given in turn, and what was posted is in `posted`.
 const OUTBOX: &str = r#"
@@ -25,13 +25,13 @@ const OUTBOX: &str = r#"
     const kept = () => Object.keys(localStorage).filter((key) => key.startsWith("parfocal.outbox.")).length;
 "#;
 
-async fn run(page: &Browser<'_>, script: &str) -> Value {
-    page.run(&format!("return (async () => {{ {OUTBOX} {script} }})()"), json!([])).await
+async fn run(page: &Browser, script: &str) -> Value {
+    page.run(&format!("return (async () => {{ {OUTBOX} {script} }})()"), &[]).await
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let server = theatre::server();
     let page = driver.browser().await;
     page.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
@@ -158,7 +158,7 @@ const WAIT: &str = r#"
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_taken_for_quick() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let server = theatre::server();
     let page = driver.browser().await;
     page.open(&server.url(&format!("/enter?key={}", server.key("surgeon")))).await;
@@ -193,5 +193,5 @@ async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_ta
     let script = format!(
         "return (async () => {{ {again} {WAIT} const outbox = openOutbox(); await saved(outbox); return wait(bodies[0], 600); }})()"
     );
-    assert_eq!(page.run(&script, json!([])).await, json!([true, "wall-clock"]));
+    assert_eq!(page.run(&script, &[]).await, json!([true, "wall-clock"]));
 }

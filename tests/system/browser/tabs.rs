@@ -1,28 +1,18 @@
 //! Two tabs and two tablets of one surgeon: a draft is in one of them, and of two answers the one given last counts.
 
-use serde_json::json;
-
-use crate::theatre::Theatre;
-use crate::webdriver::{Browser, Driver};
+use super::browser::{Browser, Driver};
+use super::theatre::Theatre;
 
 const COMMENTS: &str = "SELECT text FROM comments ORDER BY number";
 
-/// Lets no answer through until `window.release()` is called.
-const HOLD_ANSWERS: &str = "const sent = window.fetch;
-    window.fetch = async (path, request) => {
-        if (path.endsWith('/answers')) throw new TypeError('Failed to fetch');
-        return sent(path, request);
-    };
-    window.release = () => { window.fetch = sent; dispatchEvent(new Event('online')); };";
-
-async fn chosen(page: &Browser<'_>, name: &str) -> serde_json::Value {
-    let script = "return document.querySelector(`input[name=${arguments[0]}]:checked`)?.value ?? null";
-    page.run(script, json!([name])).await
+/// The point that is chosen on the scale called `name`, if one is.
+async fn chosen(page: &Browser, name: &str) -> Option<String> {
+    page.property(&format!("input[name={name}]:checked"), "value").await
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_draft_belongs_to_one_tab_and_a_second_one_offers_it() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
     let page = format!("http://{}/surgeon", theatre.proxy.address);
@@ -32,7 +22,7 @@ async fn a_draft_belongs_to_one_tab_and_a_second_one_offers_it() {
 
     let first = surgeon.new_tab(&page).await;
     surgeon.sees("#elsewhere", "Continue “Half a thought”").await;
-    crate::screenshots::shoot(surgeon, "surgeon-17-begun-elsewhere").await;
+    super::screenshots::shoot(surgeon, "surgeon-17-begun-elsewhere").await;
     assert_eq!(theatre.comment_box().await, "", "what is written in one tab is not in the other");
     surgeon.click("#elsewhere").await;
     assert_eq!(theatre.comment_box().await, "Half a thought");
@@ -52,15 +42,13 @@ async fn a_draft_belongs_to_one_tab_and_a_second_one_offers_it() {
     surgeon.sees("#panel", "No trial is under way").await;
     surgeon.to_tab(&second).await;
     surgeon.sees("#panel", "No trial is under way").await;
-    let empty = "return Object.keys(localStorage).filter((key) => /outbox|draft/.test(key))";
-    crate::wait::until("both tabs to have sent all", || async { surgeon.run(empty, json!([])).await == json!([]) })
-        .await;
+    super::wait::until("both tabs to have sent all", || async { surgeon.kept_on_device().await.is_empty() }).await;
     theatre.keeps(COMMENTS, &["Half a thought, whole", "Left in a tab"]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     let surgeon = &theatre.surgeon;
     let other = driver.browser().await;
@@ -70,18 +58,20 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     theatre.finish().await;
 
     surgeon.sees("#panel h2", "a few questions").await;
-    surgeon.run(HOLD_ANSWERS, json!([])).await;
+    surgeon.cut("/answers").await;
     theatre.choose("sharpness", 3).await;
     surgeon.sees("[data-question=sharpness] > .state", "Kept on this device").await;
     other.click("input[name=sharpness][value='5']").await;
     other.sees("[data-question=sharpness] > .state", "Saved").await;
 
-    surgeon.run("window.release()", json!([])).await;
+    surgeon.release().await;
     surgeon.sees("[data-question=sharpness] > .state", "Saved").await;
     theatre.keeps("SELECT value FROM answers ORDER BY number", &["5", "3"]).await;
-    crate::wait::until("the first tablet to show what counts", || async { chosen(surgeon, "sharpness").await == "5" })
-        .await;
-    assert_eq!(chosen(&other, "sharpness").await, "5");
+    super::wait::until("the first tablet to show what counts", || async {
+        chosen(surgeon, "sharpness").await.as_deref() == Some("5")
+    })
+    .await;
+    assert_eq!(chosen(&other, "sharpness").await.as_deref(), Some("5"));
 
     // Both say that they hold nothing once the session is over, and the researcher sees that they disagreed.
     theatre.operator.click("#session-actions .danger").await;
@@ -95,6 +85,6 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     page.click("td a.button").await;
     page.sees("#aside-list", "3 (another device gave a different answer later; 5 counts)").await;
     page.sees("table.answers", "5").await;
-    crate::screenshots::shoot(page, "researcher-6-answers-apart").await;
-    assert_eq!(page.run("return document.querySelectorAll('.timeline .aside').length", json!([])).await, 1);
+    super::screenshots::shoot(page, "researcher-6-answers-apart").await;
+    assert_eq!(page.count(".timeline .aside").await, 1);
 }

@@ -1,18 +1,16 @@
 //! The whole trial: six settings with everything that happens in a theatre, then the researcher, the database, the
 //! export, and what reached the surgeon's browser.
 
-use serde_json::json;
-
-use crate::aftermath::{database, export, researcher};
-use crate::blinding;
-use crate::screenshots::{resize, shoot};
-use crate::theatre::{Theatre, kill, start_again};
-use crate::wait::until;
-use crate::webdriver::Driver;
+use super::aftermath::{database, export, researcher};
+use super::blinding;
+use super::browser::Driver;
+use super::screenshots::{resize, shoot};
+use super::theatre::{Theatre, kill, start_again};
+use super::wait::until;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_surgeon_completes_a_blinded_trial() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let mut theatre = Theatre::open(&driver).await;
     prepare(&theatre).await;
     first_setting_typed_comments(&theatre).await;
@@ -34,23 +32,20 @@ async fn a_surgeon_completes_a_blinded_trial() {
 }
 
 /// The operator adds a participant and prepares and starts a session; the surgeon waits.
-async fn prepare(theatre: &Theatre<'_>) {
+async fn prepare(theatre: &Theatre) {
     let (operator, surgeon) = (&theatre.operator, &theatre.surgeon);
     surgeon.sees("#panel", "No trial is under way").await;
     surgeon.sees("#simulated", "Simulated camera and lens").await;
     operator.sees("#warnings", "Simulated camera and lens").await;
-    until("a picture", || async {
-        surgeon.run("return document.querySelector('.viewer-stale').hidden", json!([])).await == true
-    })
-    .await;
+    until("a picture", || async { surgeon.is(".viewer-stale", "hidden").await }).await;
     shoot(surgeon, "surgeon-1-no-session").await;
     shoot(operator, "operator-1-no-session").await;
 
     operator.click("#add-participant").await;
     operator.type_into("#code", "anna").await;
     operator.click("#participant-dialog [type=submit]").await;
-    assert_eq!(operator.run("return document.getElementById('code').validity.patternMismatch", json!([])).await, true);
-    operator.run("document.getElementById('code').value = ''", json!([])).await;
+    assert!(operator.fails("#code", "patternMismatch").await);
+    operator.clear("#code").await;
     operator.type_into("#code", "S-01").await;
     shoot(operator, "operator-2-participant").await;
     operator.click("#participant-dialog [type=submit]").await;
@@ -68,7 +63,7 @@ async fn prepare(theatre: &Theatre<'_>) {
     shoot(surgeon, "surgeon-3-notice").await;
 }
 
-async fn first_setting_typed_comments(theatre: &Theatre<'_>) {
+async fn first_setting_typed_comments(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     surgeon.type_into("#change-tap", "\u{e00c}").await; // Escape: the notice stays
     theatre.tap_notice(1).await;
@@ -77,19 +72,15 @@ async fn first_setting_typed_comments(theatre: &Theatre<'_>) {
     surgeon.sees("#prompt", "How does the focus feel now?").await;
     shoot(surgeon, "surgeon-4-inspecting").await;
     resize(surgeon, 820, 780).await;
-    let width = surgeon.run("return document.getElementById('comment').offsetWidth", json!([])).await;
-    assert!(
-        width.as_f64() > Some(700.0),
-        "beside an upright tablet's keyboard there is as much room to write: {width}"
-    );
+    let width = surgeon.area("#comment").await.width;
+    assert!(width > 700.0, "beside an upright tablet's keyboard there is as much room to write: {width}");
     resize(surgeon, 1180, 820).await;
     theatre.operator.sees("#comments", "Follows me well 🧠").await;
     theatre.operator.sees("#phase", "Setting 1 of 6: inspecting").await;
     theatre.operator.sees("#traces-hidden", "hidden while a session runs").await;
     theatre.operator.sees("#devices", "timing hidden").await;
-    let shown =
-        theatre.operator.run("return document.getElementById('policy').selectedOptions[0].text", json!([])).await;
-    assert_eq!(shown, "Hidden during a session");
+    let shown = theatre.operator.property("#policy option:checked", "text").await;
+    assert_eq!(shown.as_deref(), Some("Hidden during a session"));
     shoot(&theatre.operator, "operator-3-inspecting").await;
     theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
@@ -104,14 +95,13 @@ async fn first_setting_typed_comments(theatre: &Theatre<'_>) {
     surgeon.click(".questions .done button").await;
 }
 
-async fn second_setting_quick_comments_and_double_taps(theatre: &Theatre<'_>) {
+async fn second_setting_quick_comments_and_double_taps(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(2).await;
-    let twice = "const b = document.querySelector(arguments[0]); b.click(); b.click()";
-    surgeon.run(twice, json!(["#quick button:nth-child(3)"])).await;
-    surgeon.run(twice, json!(["#mark"])).await;
+    surgeon.double_click("#quick button:nth-child(3)").await;
+    surgeon.double_click("#mark").await;
     theatre.sees_saved(4).await;
-    surgeon.run(twice, json!(["#finish"])).await;
+    surgeon.double_click("#finish").await;
     surgeon.sees("#finish", "Tap again to finish").await;
     surgeon.sees("#finish-heard", "Tap again to finish").await;
     shoot(surgeon, "surgeon-14-finish").await;
@@ -120,7 +110,7 @@ async fn second_setting_quick_comments_and_double_taps(theatre: &Theatre<'_>) {
     theatre.finish_setting(2).await;
 }
 
-async fn third_setting_reload_and_second_tab(theatre: &Theatre<'_>) {
+async fn third_setting_reload_and_second_tab(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(3).await;
     theatre.write("Half a thought").await;
@@ -139,32 +129,29 @@ async fn third_setting_reload_and_second_tab(theatre: &Theatre<'_>) {
     theatre.answer_questions(6).await;
 }
 
-async fn fourth_setting_too_long_a_comment(theatre: &Theatre<'_>) {
+async fn fourth_setting_too_long_a_comment(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(4).await;
-    let height = theatre.picture_height().await;
-    let paste = "const box = document.getElementById('comment'); box.value = 'x'.repeat(1_000_000);
-                 box.dispatchEvent(new Event('input'));";
-    surgeon.run(paste, json!([])).await;
+    let picture = theatre.picture().await;
+    surgeon.paste("#comment", &"x".repeat(1_000_000)).await;
     surgeon.click("#send").await;
     surgeon.sees("#comment-trouble", "is back in the box: This text is too long").await;
     assert_eq!(theatre.comment_box().await.len(), 1_000_000);
-    assert_eq!(theatre.picture_height().await, height, "neither a long comment nor a message moves the picture");
-    let apart = "const edges = (css) => document.querySelector(css).getBoundingClientRect();
-                 return edges('.viewer-colour').bottom <= edges('.dock .trouble').top";
-    assert_eq!(surgeon.run(apart, json!([])).await, true, "a message covers what is said about the colours");
+    assert_eq!(theatre.picture().await, picture, "neither a long comment nor a message moves the picture");
+    let colours = surgeon.area(".viewer-colour").await;
+    let message = surgeon.area(".dock .trouble").await;
+    assert!(colours.bottom() <= message.top, "a message covers what is said about the colours");
     shoot(surgeon, "surgeon-15-long-comment").await;
     surgeon.reload().await;
     surgeon.sees("#setting", "Setting 4 of 6").await;
     until("the paste to be back", || async { theatre.comment_box().await.len() == 1_000_000 }).await;
-    let shorten = paste.replace("'x'.repeat(1_000_000)", "'Shortened'");
-    surgeon.run(&shorten, json!([])).await;
+    surgeon.paste("#comment", "Shortened").await;
     surgeon.click("#send").await;
     theatre.sees_saved(6).await;
     theatre.finish_setting(4).await;
 }
 
-async fn fifth_setting_killed_server(theatre: &mut Theatre<'_>) {
+async fn fifth_setting_killed_server(theatre: &mut Theatre) {
     theatre.tap_notice(5).await;
     theatre.say("Saved before the crash", 7).await;
     kill(&mut theatre.server);
@@ -178,12 +165,12 @@ async fn fifth_setting_killed_server(theatre: &mut Theatre<'_>) {
     })
     .await;
     theatre.surgeon.sees("#view .viewer-stale", "Not live").await;
-    let cut = "const edge = document.getElementById('quick').getBoundingClientRect();
-               return [...document.querySelectorAll('#quick button')].map((each) => each.getBoundingClientRect())
-                   .filter(({ right, bottom }) => right > edge.right + 1 || bottom > edge.bottom + 1).length";
-    assert_eq!(theatre.surgeon.run(cut, json!([])).await, 0, "every quick comment can be tapped without a connection");
-    let prompt = "return getComputedStyle(document.getElementById('prompt')).visibility";
-    assert_eq!(theatre.surgeon.run(prompt, json!([])).await, "hidden", "the prompt gives way to the warning");
+    let edge = theatre.surgeon.area("#quick").await;
+    let cut = theatre.surgeon.areas("#quick button").await.into_iter();
+    let cut = cut.filter(|each| each.right() > edge.right() + 1.0 || each.bottom() > edge.bottom() + 1.0);
+    assert_eq!(cut.count(), 0, "every quick comment can be tapped without a connection");
+    let prompt = theatre.surgeon.style("#prompt", "visibility").await;
+    assert_eq!(prompt, "hidden", "the prompt gives way to the warning");
     shoot(&theatre.surgeon, "surgeon-6-no-connection").await;
     start_again(&mut theatre.server);
     theatre.surgeon.sees("#panel h2", "Paused").await;
@@ -197,7 +184,7 @@ async fn fifth_setting_killed_server(theatre: &mut Theatre<'_>) {
     theatre.finish_setting(7).await;
 }
 
-async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre<'_>) {
+async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre) {
     let (operator, surgeon) = (&theatre.operator, &theatre.surgeon);
     theatre.tap_notice(6).await;
     operator.sees("#phase", "Setting 6 of 6: inspecting").await;
@@ -219,7 +206,7 @@ async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre<'_>) {
     theatre.answer_questions(1).await;
 }
 
-async fn closing_questions(theatre: &Theatre<'_>) {
+async fn closing_questions(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     surgeon.sees("#panel h2", "Final questions").await;
     shoot(surgeon, "surgeon-9-closing").await;
@@ -240,7 +227,7 @@ async fn closing_questions(theatre: &Theatre<'_>) {
 }
 
 /// Each item is kept when it is given: over a reload, and beside what another tablet gives.
-async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre<'_>) {
+async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     let give = async |items: std::ops::Range<usize>| {
         for (item, point) in [4, 2, 3, 1, 4, 3, 2, 2, 4, 2].into_iter().enumerate().take(items.end).skip(items.start) {
@@ -256,10 +243,10 @@ async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre<'_>) {
     surgeon.sees("#missing", "2 questions are still open").await;
     surgeon.sees(".sus fieldset:nth-child(5) .gap", "Not answered yet").await;
     assert_eq!(surgeon.text(".sus fieldset:nth-child(4) .gap").await, "");
-    let seen = "const { top, bottom } = document.querySelector('.sus fieldset:nth-child(5)').getBoundingClientRect();
-                const panel = document.getElementById('panel').getBoundingClientRect();
-                return top >= panel.top && bottom <= panel.bottom";
-    assert_eq!(surgeon.run(seen, json!([])).await, true, "the first item without an answer is on screen");
+    let item = surgeon.area(".sus fieldset:nth-child(5)").await;
+    let panel = surgeon.area("#panel").await;
+    let is_seen = item.top >= panel.top && item.bottom() <= panel.bottom();
+    assert!(is_seen, "the first item without an answer is on screen");
     shoot(surgeon, "surgeon-16-missing").await;
     let first = surgeon.new_tab(&format!("http://{}/surgeon", theatre.proxy.address)).await;
     surgeon.sees(state, "4 of 10 answered").await;
@@ -269,6 +256,6 @@ async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre<'_>) {
     surgeon.sees(state, "9 of 10 answered").await;
     give(9..10).await;
     surgeon.sees(state, "Saved").await;
-    let chosen = "return [...document.querySelectorAll('.sus input:checked')].map((input) => Number(input.value))";
-    assert_eq!(surgeon.run(chosen, json!([])).await, json!([4, 2, 3, 1, 4, 3, 2, 2, 4, 2]));
+    let chosen = surgeon.values(".sus input:checked").await;
+    assert_eq!(chosen, ["4", "2", "3", "1", "4", "3", "2", "2", "4", "2"]);
 }

@@ -1,6 +1,6 @@
 //! Takes a recorded connection apart: HTTP/1.1 exchanges (RFC 9112) and, after an upgrade, WebSocket messages (RFC 6455).
 
-use crate::proxy::Connection;
+use super::proxy::Connection;
 
 /// Something that the browser received.
 #[derive(Debug)]

@@ -4,18 +4,18 @@
 use serde_json::{Value, json};
 use sqlx::Row;
 
-use crate::blinding;
-use crate::screenshots::shoot;
+use super::blinding;
+use super::browser::Driver;
+use super::screenshots::shoot;
+use super::theatre::Theatre;
 use crate::support::client;
-use crate::theatre::Theatre;
-use crate::webdriver::Driver;
 
 /// What a researcher might write: it names a policy, and so is for the researcher's eyes alone.
 const EMERGENCY: &str = "Bleeding: is it the mgm-hill-climber?";
 
 #[tokio::test(flavor = "multi_thread")]
 async fn practice_a_time_limit_an_emergency_and_an_abort() {
-    let driver = Driver::start().await;
+    let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
     the_belief_of_a_policy_that_has_one(&theatre).await;
     practice(&theatre).await;
@@ -34,7 +34,7 @@ async fn practice_a_time_limit_an_emergency_and_an_abort() {
     assert!(seen.texts > 40 && seen.pictures > 40, "{} texts, {} pictures", seen.texts, seen.pictures);
 }
 
-async fn the_belief_of_a_policy_that_has_one(theatre: &Theatre<'_>) {
+async fn the_belief_of_a_policy_that_has_one(theatre: &Theatre) {
     let operator = &theatre.operator;
     operator.sees_no("#belief-choice").await;
     operator.select("#policy", "parfocal").await;
@@ -47,7 +47,7 @@ async fn the_belief_of_a_policy_that_has_one(theatre: &Theatre<'_>) {
     operator.sees("#belief-choice", "Belief").await;
 }
 
-async fn practice(theatre: &Theatre<'_>) {
+async fn practice(theatre: &Theatre) {
     let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
     theatre.begin("S-03", "practice").await;
     // That the policy has a belief would name it.
@@ -72,7 +72,7 @@ async fn practice(theatre: &Theatre<'_>) {
 }
 
 /// Another operator closes the session while this one is asked why to pause it, and adds a participant.
-async fn beside_another_operator(theatre: &Theatre<'_>) {
+async fn beside_another_operator(theatre: &Theatre) {
     let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
     theatre.begin("S-07", "practice").await;
     surgeon.sees("#change-what", "This is the first setting.").await;
@@ -97,7 +97,7 @@ async fn beside_another_operator(theatre: &Theatre<'_>) {
 }
 
 /// The page finds out by itself, and follows what happened meanwhile.
-async fn a_link_that_breaks_without_a_word(theatre: &Theatre<'_>) {
+async fn a_link_that_breaks_without_a_word(theatre: &Theatre) {
     theatre.proxy.break_silently();
     theatre.begin("S-05", "practice").await;
     theatre.surgeon.sees("#change-what", "This is the first setting.").await;
@@ -109,7 +109,7 @@ async fn a_link_that_breaks_without_a_word(theatre: &Theatre<'_>) {
 }
 
 /// Nobody ends the setting: its ten seconds do.
-async fn time_limit(theatre: &Theatre<'_>) {
+async fn time_limit(theatre: &Theatre) {
     theatre.begin("S-04", "limited").await;
     theatre.tap_notice(1).await;
     theatre.write("Cut off in the mid").await;
@@ -121,10 +121,10 @@ async fn time_limit(theatre: &Theatre<'_>) {
 }
 
 /// The researcher unblinds the session while it is under way; gives the address of the list of sessions.
-async fn emergency_unblinding(theatre: &Theatre<'_>) -> String {
+async fn emergency_unblinding(theatre: &Theatre) -> String {
     let (surgeon, page) = (&theatre.surgeon, &theatre.operator);
     surgeon.sees("#change-title", "Setting 2 of 2").await;
-    let before = shown(theatre).await;
+    let before = surgeon.everything().await;
     let researcher = theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")));
     let operator = page.new_tab(&researcher).await;
     page.click("td a.button").await;
@@ -132,7 +132,7 @@ async fn emergency_unblinding(theatre: &Theatre<'_>) -> String {
     page.click("#unblind").await;
     page.sees("#reason-consequence", "under way").await;
     page.click("#reason-go").await;
-    assert_eq!(page.run("return document.getElementById('reason').validity.valueMissing", json!([])).await, true);
+    assert!(page.fails("#reason", "valueMissing").await);
     shoot(page, "researcher-6-emergency").await;
     theatre.give_reason(EMERGENCY).await;
     page.sees(".masthead", "Emergency unblinding").await;
@@ -141,23 +141,14 @@ async fn emergency_unblinding(theatre: &Theatre<'_>) -> String {
     page.close_tab(&operator).await;
     page.sees("#log", "Unblinded by the researcher").await;
     assert!(!page.text("body").await.contains("Bleeding"), "the operator, beside the surgeon, is not told the reason");
-    assert_eq!(shown(theatre).await, before, "nothing on the surgeon's page has changed");
+    assert_eq!(surgeon.everything().await, before, "nothing on the surgeon's page has changed");
     surgeon.reload().await;
     surgeon.sees("#change-title", "Setting 2 of 2").await;
-    assert_eq!(shown(theatre).await, before, "nor has it after a reload");
+    assert_eq!(surgeon.everything().await, before, "nor has it after a reload");
     researcher
 }
 
-/// What stands on the surgeon's page, seen or not.
-async fn shown(theatre: &Theatre<'_>) -> Value {
-    // But for what the stream is doing, which hangs on the moment.
-    let text = "const page = document.body.cloneNode(true);
-                for (const told of page.querySelectorAll('.viewer-stale, .viewer-heard')) told.remove();
-                return page.textContent.replace(/\\s+/g, ' ')";
-    theatre.surgeon.run(text, json!([])).await
-}
-
-async fn abort(theatre: &Theatre<'_>) {
+async fn abort(theatre: &Theatre) {
     let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
     theatre.tap_notice(2).await;
     theatre.say("The last word", 2).await;
@@ -173,7 +164,7 @@ async fn abort(theatre: &Theatre<'_>) {
 }
 
 /// The list of sessions has practice in a place of its own.
-async fn practice_stays_apart(theatre: &Theatre<'_>, researcher: &str) {
+async fn practice_stays_apart(theatre: &Theatre, researcher: &str) {
     let page = &theatre.operator;
     page.open(researcher).await;
     page.sees("[aria-labelledby=sessions]", "S-04").await;
@@ -184,8 +175,8 @@ async fn practice_stays_apart(theatre: &Theatre<'_>, researcher: &str) {
     shoot(page, "researcher-7-practice-apart").await;
 }
 
-async fn database(theatre: &Theatre<'_>) {
-    let pool = crate::theatre::database(theatre.server.data.path()).await;
+async fn database(theatre: &Theatre) {
+    let pool = super::theatre::database(theatre.server.data.path()).await;
     let sql = "SELECT protocol, practice, (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments
                FROM sessions AS s ORDER BY rowid";
     let sessions = sqlx::query(sql).fetch_all(&pool).await.unwrap();

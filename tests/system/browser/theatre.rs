@@ -5,25 +5,24 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rustix::process::Signal;
-use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 
-use crate::proxy::Proxy;
+use super::browser::{Area, Browser, Driver};
+use super::proxy::Proxy;
+use super::wait::until;
 use crate::support::Server;
-use crate::wait::until;
-use crate::webdriver::{Browser, Driver};
 
 /// Server and browsers.
-pub struct Theatre<'a> {
+pub struct Theatre {
     /// The server.
     pub server: Server,
     /// What the surgeon's browser receives goes through here.
     pub proxy: Proxy,
     /// The surgeon's browser.
-    pub surgeon: Browser<'a>,
+    pub surgeon: Browser,
     /// The operator's browser.
-    pub operator: Browser<'a>,
+    pub operator: Browser,
 }
 
 /// A server on the phantom and the simulated lens, with the test's protocol.
@@ -38,14 +37,14 @@ pub async fn database(folder: &Path) -> SqlitePool {
 }
 
 /// A browser on the operator's page of `server`.
-pub async fn operator<'a>(driver: &'a Driver, server: &Server) -> Browser<'a> {
+pub async fn operator(driver: &Driver, server: &Server) -> Browser {
     let browser = driver.browser().await;
     browser.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
     browser
 }
 
 fn start(data: Arc<TempDir>, address: &str) -> Server {
-    let protocols = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser");
+    let protocols = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/system/browser");
     // Few frames: the camera and two browsers share the machine.
     Server::on(data, &["--bind", address, "--fps", "10", "--protocols", protocols.to_str().unwrap()])
 }
@@ -60,14 +59,14 @@ pub fn start_again(server: &mut Server) {
     *server = start(Arc::clone(&server.data), &server.address.to_string());
 }
 
-impl<'a> Theatre<'a> {
+impl Theatre {
     /// Opens the theatre: both are let in by their links.
-    pub async fn open(driver: &'a Driver) -> Self {
+    pub async fn open(driver: &Driver) -> Self {
         Self::on(driver, Arc::new(tempfile::tempdir().unwrap())).await
     }
 
     /// The same on the data folder `data`.
-    pub async fn on(driver: &'a Driver, data: Arc<TempDir>) -> Self {
+    pub async fn on(driver: &Driver, data: Arc<TempDir>) -> Self {
         let server = start(data, "127.0.0.1:0");
         let proxy = Proxy::to(server.address).await;
         let (surgeon, operator) = tokio::join!(driver.browser(), driver.browser());
@@ -111,7 +110,7 @@ impl<'a> Theatre<'a> {
     /// The surgeon writes `text` into the comment box, at its end.
     pub async fn write(&self, text: &str) {
         self.surgeon.click("#comment").await;
-        self.surgeon.tools("Input.insertText", json!({ "text": text })).await;
+        self.surgeon.insert(text).await;
     }
 
     /// The surgeon writes a comment, presses Enter and sees it saved as the `total`th.
@@ -127,16 +126,14 @@ impl<'a> Theatre<'a> {
         self.surgeon.sees("#comment-state", &told).await;
     }
 
-    /// Height of the live picture's place on the surgeon's page.
-    pub async fn picture_height(&self) -> Value {
-        let height = "return document.getElementById('view').getBoundingClientRect().height";
-        self.surgeon.run(height, json!([])).await
+    /// The live picture's place on the surgeon's page.
+    pub async fn picture(&self) -> Area {
+        self.surgeon.area("#view").await
     }
 
     /// What stands in the comment box.
     pub async fn comment_box(&self) -> String {
-        let value = self.surgeon.run("return document.getElementById('comment').value", json!([])).await;
-        value.as_str().unwrap().to_owned()
+        self.surgeon.property("#comment", "value").await.unwrap()
     }
 
     /// The surgeon is done with the setting: by two taps, the second as late as it takes to be meant.

@@ -1,0 +1,394 @@
+//! A browser to drive: headless Chromium through chromedriver, by the W3C `WebDriver` protocol.
+//!
+//! Elements are named by CSS selectors. What a test does waits until it can be done; what it asks is asked once.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{Ipv4Addr, TcpStream};
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::time::Duration;
+
+use fantoccini::actions::{InputSource, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
+use fantoccini::elements::Element;
+use fantoccini::error::CmdError;
+use fantoccini::key::Key;
+use fantoccini::wd::{TimeoutConfiguration, WebDriverCompatibleCommand, WindowHandle};
+use fantoccini::{Client, ClientBuilder, Locator};
+use hyper_util::client::legacy::connect::HttpConnector;
+use reqwest::{Method, Url};
+use serde_json::{Value, json};
+
+use super::wait::until;
+
+const NEEDED: &str =
+    "the browser tests need Chromium and its driver; on Debian: apt-get install chromium chromium-driver";
+const ARGUMENTS: [&str; 9] = [
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--window-size=1180,960",
+];
+
+/// What chromedriver says before the port that it has chosen.
+const STARTED: &str = "started successfully on port ";
+
+/// A running chromedriver; ends, with its browsers, when dropped.
+pub struct Driver {
+    process: Child,
+    port: u16,
+    /// Kept open: closed, it would end a chromedriver that says more.
+    _said: BufReader<ChildStdout>,
+}
+
+impl Driver {
+    /// Starts chromedriver on a free port.
+    pub fn start() -> Self {
+        let mut process = Command::new("chromedriver")
+            .arg("--port=0")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap_or_else(|error| panic!("cannot start chromedriver ({error}): {NEEDED}"));
+
+        let mut said = BufReader::new(process.stdout.take().unwrap());
+        let mut lines = said.by_ref().lines().map_while(Result::ok);
+        let port = lines.find_map(|line| line.split_once(STARTED)?.1.trim_end_matches('.').parse().ok());
+        Self { process, port: port.expect("chromedriver says its port"), _said: said }
+    }
+
+    /// A browser with a fresh profile.
+    pub async fn browser(&self) -> Browser {
+        let profile = tempfile::tempdir().unwrap();
+        let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
+        arguments.push(format!("--user-data-dir={}", profile.path().display()));
+        let wanted = json!({
+            "goog:chromeOptions": { "args": arguments },
+            "goog:loggingPrefs": { "browser": "ALL" },
+        });
+
+        let Value::Object(wanted) = wanted else { unreachable!("an object") };
+        let client = ClientBuilder::new(HttpConnector::new())
+            .capabilities(wanted)
+            .connect(&format!("http://127.0.0.1:{}", self.port))
+            .await
+            .unwrap_or_else(|error| panic!("cannot start Chromium ({error}): {NEEDED}"));
+        let timeouts = TimeoutConfiguration::new(Some(Duration::from_mins(1)), Some(Duration::from_mins(1)), None);
+        client.update_timeouts(timeouts).await.unwrap();
+        Browser { client, _profile: profile }
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        // It ends its browsers when asked to; ended by a signal, it would leave them running.
+        let asked = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).and_then(|mut line| {
+            line.set_read_timeout(Some(Duration::from_secs(10)))?;
+            let head = "POST /shutdown HTTP/1.1\r\nHost: 127.0.0.1";
+            write!(line, "{head}:{}\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{}}", self.port)?;
+            line.read_to_end(&mut Vec::new())
+        });
+        if asked.is_err() {
+            let _ = self.process.kill();
+        }
+        let _ = self.process.wait();
+    }
+}
+
+/// A command of chromedriver's own.
+#[derive(Debug)]
+struct ChromeCommand {
+    path: &'static str,
+    body: Value,
+}
+
+impl WebDriverCompatibleCommand for ChromeCommand {
+    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
+        base.join(&format!("session/{}/{}", session.unwrap_or_default(), self.path))
+    }
+
+    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
+        (Method::POST, Some(self.body.to_string()))
+    }
+}
+
+/// A box on the page, in CSS pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Area {
+    /// Left edge.
+    pub left: f64,
+    /// Upper edge.
+    pub top: f64,
+    /// Width.
+    pub width: f64,
+    /// Height.
+    pub height: f64,
+}
+
+impl Area {
+    /// Right edge.
+    pub fn right(self) -> f64 {
+        self.left + self.width
+    }
+
+    /// Lower edge.
+    pub fn bottom(self) -> f64 {
+        self.top + self.height
+    }
+}
+
+/// A browser with a profile of its own.
+pub struct Browser {
+    client: Client,
+    _profile: tempfile::TempDir,
+}
+
+/// Pages and tabs.
+impl Browser {
+    /// Opens `url`.
+    pub async fn open(&self, url: &str) {
+        self.client.goto(url).await.unwrap();
+    }
+
+    /// Loads the page anew.
+    pub async fn reload(&self) {
+        self.client.refresh().await.unwrap();
+    }
+
+    /// Opens a second tab on `url` and goes there; gives the first.
+    pub async fn new_tab(&self, url: &str) -> WindowHandle {
+        let first = self.client.window().await.unwrap();
+        let tab = self.client.new_window(true).await.unwrap();
+        self.client.switch_to_window(tab.handle).await.unwrap();
+        self.open(url).await;
+        first
+    }
+
+    /// Goes to `tab`; gives the one left.
+    pub async fn to_tab(&self, tab: &WindowHandle) -> WindowHandle {
+        let left = self.client.window().await.unwrap();
+        self.client.switch_to_window(tab.clone()).await.unwrap();
+        left
+    }
+
+    /// Closes the tab and goes back to `tab`.
+    pub async fn close_tab(&self, tab: &WindowHandle) {
+        self.client.close_window().await.unwrap();
+        self.client.switch_to_window(tab.clone()).await.unwrap();
+    }
+
+    /// The page as it is seen, as a PNG.
+    pub async fn screenshot(&self) -> Vec<u8> {
+        self.client.screenshot().await.unwrap()
+    }
+
+    /// A command of the developer tools.
+    pub async fn tools(&self, command: &str, parameters: Value) -> Value {
+        self.chrome("goog/cdp/execute", json!({ "cmd": command, "params": parameters })).await
+    }
+
+    /// What the page's scripts complained of since the last call.
+    pub async fn complaints(&self) -> Vec<String> {
+        let log = self.chrome("se/log", json!({ "type": "browser" })).await;
+        let severe = log.as_array().into_iter().flatten().filter(|line| line["level"] == "SEVERE");
+        severe.map(|line| line["message"].as_str().unwrap_or_default().to_owned()).collect()
+    }
+
+    async fn chrome(&self, path: &'static str, body: Value) -> Value {
+        let answer = self.client.issue_cmd(ChromeCommand { path, body }).await;
+        answer.unwrap_or_else(|error| panic!("{path}: {error}"))
+    }
+
+    /// Runs `script`, the body of a function of `arguments`, and gives what it returns. See [`super::scripts`].
+    pub async fn run(&self, script: &str, arguments: &[Value]) -> Value {
+        self.client.execute(script, arguments.to_vec()).await.unwrap_or_else(|error| panic!("{error}: {script}"))
+    }
+}
+
+/// What is done on a page.
+impl Browser {
+    /// Clicks, as a pointer does, once that is possible.
+    pub async fn click(&self, css: &str) {
+        until(&format!("{css} to be clickable"), || async { self.try_click(css).await }).await;
+    }
+
+    /// Clicks; whether that was possible.
+    pub async fn try_click(&self, css: &str) -> bool {
+        let Ok(element) = self.find(css).await else { return false };
+        element.click().await.is_ok()
+    }
+
+    /// Clicks on the button within `css` whose label starts with `label`.
+    pub async fn click_labelled(&self, css: &str, label: &str) {
+        until(&format!("the button '{label}'"), || async {
+            for button in self.all(&format!("{css} button")).await {
+                if button.text().await.is_ok_and(|text| text.starts_with(label)) {
+                    return button.click().await.is_ok();
+                }
+            }
+            false
+        })
+        .await;
+    }
+
+    /// Clicks twice, as fast as a pointer can.
+    pub async fn double_click(&self, css: &str) {
+        let element = self.find(css).await.unwrap();
+        let to = PointerAction::MoveToElement { element, duration: None, x: 0.0, y: 0.0 };
+        let down = PointerAction::Down { button: MOUSE_BUTTON_LEFT };
+        let up = PointerAction::Up { button: MOUSE_BUTTON_LEFT };
+        let twice = [to, down.clone(), up.clone(), down, up];
+        let mouse = twice.into_iter().fold(MouseActions::new("mouse".to_owned()), |mouse, action| mouse.then(action));
+        self.client.perform_actions(mouse).await.unwrap();
+    }
+
+    /// Types `text` at the end of what stands there, once the element takes keys.
+    pub async fn type_into(&self, css: &str, text: &str) {
+        until(&format!("{css} to take keys"), || async {
+            let Ok(element) = self.find(css).await else { return false };
+            element.send_keys(text).await.is_ok()
+        })
+        .await;
+    }
+
+    /// Empties the field.
+    pub async fn clear(&self, css: &str) {
+        self.find(css).await.unwrap().clear().await.unwrap();
+    }
+
+    /// Pastes `text` in place of what stands there.
+    pub async fn paste(&self, css: &str, text: &str) {
+        self.click(css).await;
+        let all = format!("{}a{}", char::from(Key::Control), char::from(Key::Null));
+        self.type_into(css, &all).await;
+        self.tools("Input.insertText", json!({ "text": text })).await;
+    }
+
+    /// Writes `text` where the cursor is, as a tablet's keyboard does.
+    pub async fn insert(&self, text: &str) {
+        self.tools("Input.insertText", json!({ "text": text })).await;
+    }
+
+    /// Chooses the option `value` of a list.
+    pub async fn select(&self, css: &str, value: &str) {
+        until(&format!("{css} to offer {value}"), || async {
+            let Ok(list) = self.find(css).await else { return false };
+            let _ = list.select_by_value(value).await;
+            list.prop("value").await.is_ok_and(|chosen| chosen.as_deref() == Some(value))
+        })
+        .await;
+    }
+}
+
+/// What is seen on a page.
+impl Browser {
+    /// Waits until the element is shown and its text contains `text`.
+    pub async fn sees(&self, css: &str, text: &str) {
+        until(&format!("{css} to say '{text}'"), || async { self.text(css).await.contains(text) }).await;
+    }
+
+    /// Waits until nothing that `css` selects is shown.
+    pub async fn sees_no(&self, css: &str) {
+        until(&format!("{css} to be gone"), || async {
+            for element in self.all(css).await {
+                // An element that has left the page meanwhile is not shown.
+                if element.is_displayed().await.unwrap_or(false) {
+                    return false;
+                }
+            }
+            true
+        })
+        .await;
+    }
+
+    /// Text of the element, or empty where there is none or it is not shown.
+    pub async fn text(&self, css: &str) -> String {
+        loop {
+            let text = match self.find(css).await {
+                Ok(element) => element.text().await,
+                Err(error) if error.is_no_such_element() => return String::new(),
+                Err(error) => Err(error),
+            };
+            match text {
+                Ok(text) => return text,
+                // The page has drawn it anew meanwhile.
+                Err(error) if error.is_stale_element_reference() => {}
+                Err(error) => panic!("{css}: {error}"),
+            }
+        }
+    }
+
+    /// What stands in a field.
+    pub async fn value(&self, css: &str) -> String {
+        self.property(css, "value").await.unwrap_or_default()
+    }
+
+    /// What stands in each of several fields.
+    pub async fn values(&self, css: &str) -> Vec<String> {
+        self.properties(css, "value").await
+    }
+
+    /// Whether the element has `property`, such as disabled.
+    pub async fn is(&self, css: &str, property: &str) -> bool {
+        self.property(css, property).await.as_deref() == Some("true")
+    }
+
+    /// A property of the element; none where it is null, or where there is no such element.
+    pub async fn property(&self, css: &str, property: &str) -> Option<String> {
+        self.find(css).await.ok()?.prop(property).await.ok().flatten()
+    }
+
+    /// A property of each element.
+    pub async fn properties(&self, css: &str, property: &str) -> Vec<String> {
+        let mut values = Vec::new();
+        for element in self.all(css).await {
+            values.extend(element.prop(property).await.unwrap());
+        }
+        values
+    }
+
+    /// An attribute of the element, if there are both.
+    pub async fn attribute(&self, css: &str, attribute: &str) -> Option<String> {
+        self.find(css).await.ok()?.attr(attribute).await.ok().flatten()
+    }
+
+    /// The computed value of a CSS property.
+    pub async fn style(&self, css: &str, property: &str) -> String {
+        self.find(css).await.unwrap().css_value(property).await.unwrap()
+    }
+
+    /// How many elements there are, shown or not.
+    pub async fn count(&self, css: &str) -> usize {
+        self.all(css).await.len()
+    }
+
+    /// Where the element is.
+    pub async fn area(&self, css: &str) -> Area {
+        area(&self.find(css).await.unwrap()).await
+    }
+
+    /// Where each element is.
+    pub async fn areas(&self, css: &str) -> Vec<Area> {
+        let mut areas = Vec::new();
+        for element in self.all(css).await {
+            areas.push(area(&element).await);
+        }
+        areas
+    }
+
+    async fn find(&self, css: &str) -> Result<Element, CmdError> {
+        self.client.find(Locator::Css(css)).await
+    }
+
+    async fn all(&self, css: &str) -> Vec<Element> {
+        self.client.find_all(Locator::Css(css)).await.unwrap()
+    }
+}
+
+async fn area(element: &Element) -> Area {
+    let (left, top, width, height) = element.rectangle().await.unwrap();
+    Area { left, top, width, height }
+}

@@ -1,0 +1,23 @@
+//! A whole blinded trial in real browsers on the real server, as surgeon, operator and researcher
+//! do it; what reached the surgeon's browser; and a server killed again and again.
+
+mod aftermath;
+mod blinding;
+mod browser;
+mod by_hand;
+#[cfg(feature = "aravis")]
+mod camera_card;
+mod course;
+mod full_disk;
+mod killed;
+mod lens_troubles;
+mod outbox;
+mod proxy;
+mod screenshots;
+mod scripts;
+mod tabs;
+mod theatre;
+mod trial;
+mod wait;
+mod wire;
+mod writing;

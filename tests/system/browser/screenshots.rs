@@ -1,0 +1,31 @@
+//! Screenshots of every page and state, at tablet and laptop size, for people to look at.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::browser::Browser;
+
+const SIZES: [(u32, u32); 3] = [(1180, 820), (820, 1180), (1440, 900)];
+
+/// Takes `name` at each size into `target/screenshots/`.
+pub async fn shoot(browser: &Browser, name: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/screenshots");
+    std::fs::create_dir_all(&folder).unwrap();
+    for (width, height) in SIZES {
+        resize(browser, width, height).await;
+        let png = browser.screenshot().await;
+        std::fs::write(folder.join(format!("{name}-{width}x{height}.png")), png).unwrap();
+    }
+    let (width, height) = SIZES[0];
+    resize(browser, width, height).await;
+}
+
+/// Gives the page this size, as a turned tablet or its keyboard does, and waits until it is drawn.
+pub async fn resize(browser: &Browser, width: u32, height: u32) {
+    let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+    browser.tools("Emulation.setDeviceMetricsOverride", size).await;
+    // Two frames: one in which the page lays itself out anew, one in which what watches its size has drawn.
+    let drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))";
+    browser.tools("Runtime.evaluate", json!({ "expression": drawn, "awaitPromise": true })).await;
+}
