@@ -24,7 +24,7 @@ export class Viewer {
   #colour = make(
     "p",
     { className: "viewer-colour", hidden: true },
-    "Colours are estimated. The camera measures 460–600 nm, which is without red.",
+    "Estimated colours: the camera measures no red light.",
   );
   /** @type {Set<string>} */
   #shown = new Set();
