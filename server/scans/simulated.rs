@@ -284,7 +284,7 @@ impl Scan {
     pub fn view(&mut self, focal_power: FocalPower) -> View {
         let patch = self.observe(focal_power);
         let wider = match self.scene.clone() {
-            Scene::Flat(clip) => self.look_widely(&clip, patch, focal_power).wider,
+            Scene::Flat(clip) => self.look_widely(&clip, &patch, focal_power).wider,
             Scene::Stack(stack) => {
                 let (corner, position) = self.place_in_stack(&stack, focal_power);
                 stack.planes.view(corner, position).wider
@@ -334,7 +334,7 @@ impl Scan {
 
     /// What the wider patches show of a sharp picture, blurred, with the veil over it if there is one. They stay within the usable part
     /// of the picture.
-    fn look_widely(&mut self, clip: &Clip, patch: Patch, focal_power: FocalPower) -> View {
+    fn look_widely(&mut self, clip: &Clip, patch: &Patch, focal_power: FocalPower) -> View {
         let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
         let mut view = self.view_of_flat(clip, patch, corner(&self.crop), sigma);
         if let Some(at) = self.veil.as_ref().map(corner) {
@@ -349,11 +349,11 @@ impl Scan {
         view
     }
 
-    fn view_of_flat(&mut self, clip: &Clip, patch: Patch, corner: (f64, f64), sigma: f64) -> View {
+    fn view_of_flat(&mut self, clip: &Clip, patch: &Patch, corner: (f64, f64), sigma: f64) -> View {
         let Area { left, top, right, bottom } = clip.area();
         let (x, y) = whole(corner);
         let inside = (x.saturating_sub(left), y.saturating_sub(top));
-        View::around(patch, inside, (right - left, bottom - top), |square| {
+        View::around(*patch, inside, (right - left, bottom - top), |square| {
             let square = Square { x: square.x + left, y: square.y + top, ..square };
             let spot = self.settings.spot;
             let Some(unrest) = &self.unrest else {
