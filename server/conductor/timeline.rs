@@ -193,8 +193,8 @@ fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
     spans
 }
 
-/// A restart is noted when the server is back. When it had ended, the setting's clock and the last frame before tell, whichever
-/// is later.
+/// A restart is recorded when the server is back. The server ended when the setting's clock stopped
+/// or the last frame before was exposed, whichever is later.
 fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSpan> {
     let mut spans: Vec<PauseSpan> = Vec::new();
     let mut inspecting = false;

@@ -47,8 +47,10 @@ impl Reader {
         session: SessionId,
         take: impl AsyncFnMut(PolicyStepRow) -> Result<(), E>,
     ) -> Result<(), E> {
-        let sql = "SELECT g.setting, t.run, t.frame, p.name AS policy, t.metric, t.policy_micros, t.latency_micros, t.held
-             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number LEFT JOIN policies AS p ON p.number = t.policy
+        let sql = "SELECT g.setting, t.run, t.frame, p.name AS policy, t.metric, t.policy_micros,
+                    t.latency_micros, t.held
+             FROM segments AS g JOIN telemetry AS t ON t.segment = g.number
+                  LEFT JOIN policies AS p ON p.number = t.policy
              WHERE g.session = ? ORDER BY g.setting, t.number";
         self.hand_out(session, sql, take).await
     }

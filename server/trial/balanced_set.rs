@@ -62,7 +62,8 @@ impl BalancedSet {
 
         if others().any(|other| other.status == SessionStatus::UnderWay) {
             return Err(Refusal::conflict(
-                "a session of the same balanced set is under way, and this one's order would tell its own; wait for its end",
+                "a session of the same balanced set is under way, and this one's order would tell its own; \
+                 wait for its end",
             ));
         }
 
@@ -72,7 +73,8 @@ impl BalancedSet {
             .find(|other| Some(other.place) == place && other.status != SessionStatus::Aborted && !other.unblinded);
         if let Some(Member { participant, made, .. }) = blinded_twin {
             return Err(Refusal::Conflict(format!(
-                "the session of {participant} made at {made} took this one's place and has the same order; unblind that one first"
+                "the session of {participant} made at {made} took this one's place and has the same order; \
+                 unblind that one first"
             )));
         }
         Ok(())

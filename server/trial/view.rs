@@ -1,5 +1,5 @@
-//! What each role may see of a session. [`SurgeonView`] has no field for a policy, its order, its timing, its metric or its
-//! focal power, and the code that serves surgeons sees no other view.
+//! What each role may see of a session. [`SurgeonView`] has no field for a policy, its order, its
+//! timing, its metric or its focal power, and the code that serves surgeons sees no other view.
 
 use std::collections::BTreeMap;
 

@@ -117,8 +117,9 @@ impl OperatorStatus {
 /// A hold that lasts as long is no slow start, but a fault that the operator must know of.
 const LASTING: Duration = Duration::from_secs(3);
 
-/// A hold that has gone on for `held_for`, and the words for it, as far as they may be told while a session is under way: one by the
-/// policy when it lasts, and then in the same words whatever went wrong. Only learned policies take time to start and to think.
+/// What may be told of a hold, and its words, while a session is under way; it has lasted `held_for`.
+/// A hold caused by the policy is told only when it lasts, and then in the same words whatever went
+/// wrong: only learned policies take time to start and to compute.
 fn told_blinded(hold: Hold, held_for: Duration, message: Option<&Arc<str>>) -> (Option<Hold>, Option<Arc<str>>) {
     if !hold.caused_by_policy() {
         return (Some(hold), message.cloned());

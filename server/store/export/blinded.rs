@@ -21,8 +21,9 @@ use crate::trial::remark::WaitClock;
 use crate::trial::standing::Standing;
 
 /// What an export says of itself first.
-const ABOUT: &str = "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, comparable within a run. \
-    Focal power is normalised to 0..1 over the lens's range. session.json holds all tables but telemetry and policy_steps.";
+const ABOUT: &str = "Exported by parfocal. Wall times are UTC; monotonic times are nanoseconds, \
+    comparable within a run. Focal power is normalised to 0..1 over the lens's range. session.json \
+    holds all tables but telemetry and policy_steps.";
 
 /// A session without what unblinding tells.
 pub struct Blinded {
