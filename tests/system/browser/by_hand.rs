@@ -1,6 +1,6 @@
 //! The operator focuses by hand: the lens ends where the slider was let go, however slow the network.
 
-use super::browser::Driver;
+use super::driver::Driver;
 use super::theatre::operator;
 use crate::support::Server;
 

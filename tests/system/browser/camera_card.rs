@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::browser::{Browser, Driver};
+use super::driver::{Browser, Driver};
 use super::screenshots::shoot;
 use super::theatre::operator;
 use super::wait::until;

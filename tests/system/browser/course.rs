@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use sqlx::Row;
 
 use super::blinding;
-use super::browser::Driver;
+use super::driver::Driver;
 use super::screenshots::shoot;
 use super::theatre::Theatre;
 use crate::support::client;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions, Connection};
 
-use super::browser::Driver;
+use super::driver::Driver;
 use super::screenshots::shoot;
 use super::theatre::Theatre;
 use super::wait::until;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use parfocal::clock::SystemClock;
 use parfocal::lens::emulator::{Emulator, Fault, Model};
 
-use super::browser::Driver;
+use super::driver::Driver;
 use super::screenshots::shoot;
 use super::theatre::operator;
 use crate::support::Server;

@@ -3,11 +3,11 @@
 
 mod aftermath;
 mod blinding;
-mod browser;
 mod by_hand;
 #[cfg(feature = "aravis")]
 mod camera_card;
 mod course;
+mod driver;
 mod full_disk;
 mod killed;
 mod lens_troubles;

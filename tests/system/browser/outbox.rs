@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::browser::{Browser, Driver};
+use super::driver::{Browser, Driver};
 use super::theatre;
 
 /// A fresh outbox as `outbox`; `answers` are given in turn, and what was posted is in `posted`.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::browser::Browser;
+use super::driver::Browser;
 
 const SIZES: [(u32, u32); 3] = [(1180, 820), (820, 1180), (1440, 900)];
 

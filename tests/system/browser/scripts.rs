@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::browser::Browser;
+use super::driver::Browser;
 
 /// From now on holds each request whose path ends in `arguments[0]`, until `window.release()`; keeps their bodies.
 const HOLD: &str = "const send = window.fetch;

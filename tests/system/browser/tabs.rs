@@ -1,6 +1,6 @@
 //! Two tabs and two tablets of one surgeon: a draft is in one of them, and of two answers the one given last counts.
 
-use super::browser::{Browser, Driver};
+use super::driver::{Browser, Driver};
 use super::theatre::Theatre;
 
 const COMMENTS: &str = "SELECT text FROM comments ORDER BY number";

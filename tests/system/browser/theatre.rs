@@ -8,7 +8,7 @@ use rustix::process::Signal;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 
-use super::browser::{Area, Browser, Driver};
+use super::driver::{Area, Browser, Driver};
 use super::proxy::Proxy;
 use super::wait::until;
 use crate::support::Server;

@@ -3,7 +3,7 @@
 
 use super::aftermath::{database, export, researcher};
 use super::blinding;
-use super::browser::Driver;
+use super::driver::Driver;
 use super::screenshots::{resize, shoot};
 use super::theatre::{Theatre, kill, start_again};
 use super::wait::until;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use parfocal::clock::{Clock, SystemClock};
 use serde_json::json;
 
-use super::browser::{Browser, Driver};
+use super::driver::{Browser, Driver};
 use super::theatre::Theatre;
 use super::wait::until;
 

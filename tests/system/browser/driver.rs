@@ -241,7 +241,7 @@ impl Browser {
         let down = PointerAction::Down { button: MOUSE_BUTTON_LEFT };
         let up = PointerAction::Up { button: MOUSE_BUTTON_LEFT };
         let twice = [to, down.clone(), up.clone(), down, up];
-        let mouse = twice.into_iter().fold(MouseActions::new("mouse".to_owned()), |mouse, action| mouse.then(action));
+        let mouse = twice.into_iter().fold(MouseActions::new("mouse".to_owned()), MouseActions::then);
         self.client.perform_actions(mouse).await.unwrap();
     }
 
