@@ -28,13 +28,13 @@ pub enum Reference {
 /// How one sensor's counts become reflectances and colours. Band = 4 * row + column of the mosaic cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// What it is of.
+    /// Name of the sensor.
     pub name: String,
     /// Serial number of the sensor's unit, if it is known.
     pub unit: Option<String>,
-    /// Which calibration of that unit it is; counts up with every change.
+    /// Version of that unit's calibration; counts up with every change.
     pub version: String,
-    /// When it was changed last, if it is known.
+    /// Date of the last change, if known.
     pub date: Option<String>,
     /// Significant bits of a sample, 1..=16.
     pub bit_depth: u8,
@@ -69,8 +69,8 @@ const DEFAULT_BANDS: [(f64, f64); BANDS] = [
 ];
 
 impl Default for Calibration {
-    /// The bands of one calibrated unit, 10 bit. Every unit ships its own calibration; until that is given there is no
-    /// dark offset, white is full scale in every band, and nothing is corrected.
+    /// The bands of one calibrated unit, 10 bit. Every unit ships its own calibration; until it is
+    /// given there is no dark offset, white is full scale in every band, and nothing is corrected.
     fn default() -> Self {
         Self {
             name: "CMV2K-SSM4X4-VIS 460-600 nm".to_owned(),
@@ -96,7 +96,7 @@ impl Calibration {
         })
     }
 
-    /// What exports and reports call it: name, unit, version and date.
+    /// How exports and reports name it: name, unit, version and date.
     #[must_use]
     pub fn title(&self) -> String {
         let unit = self.unit.as_ref().map_or(String::new(), |unit| format!(", unit {unit}"));
@@ -128,12 +128,14 @@ impl Reference {
             Self::PerBand(counts) => return *counts,
             Self::PerPixel(frame) => frame,
         };
+
         let mut sums = [0_u64; BANDS];
         for (y, row) in frame.samples().chunks_exact(frame.width()).enumerate() {
             for (x, &sample) in row.iter().enumerate() {
                 sums[4 * (y % 4) + x % 4] += u64::from(sample);
             }
         }
+
         let cells = (frame.band_width() * frame.band_height()) as f64;
         sums.map(|sum| (sum as f64 / cells) as f32)
     }
@@ -155,6 +157,7 @@ mod tests {
     fn default_is_ten_bit_with_the_published_bands() {
         let calibration = Calibration::default();
         assert!((calibration.full_scale() - 1023.0).abs() < f32::EPSILON);
+
         let centre = |row: usize, column: usize| calibration.bands[4 * row + column].centre_nm;
         assert_eq!((centre(0, 0), centre(1, 2), centre(3, 3)).0.to_bits(), 570.5_f64.to_bits());
         assert!((centre(1, 2) - 550.8).abs() < 1e-9 && (centre(3, 3) - 484.5).abs() < 1e-9);

@@ -1,5 +1,5 @@
-//! Reading a calibration from TOML text. Keys that are left out keep the default's value. References per pixel stand in
-//! pictures beside it, which the caller reads.
+//! Reading a calibration from TOML text. Keys that are left out keep the default's value. References
+//! per pixel are pictures in files of their own, which the caller reads.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use toml::{Spanned, Value};
 use super::calibration::{BANDS, Band, Calibration, Reference, full_scale};
 use super::frame::MosaicFrame;
 
-/// Why a calibration could not be read. The caller knows the file and says its name.
+/// Why a calibration could not be read. The caller knows the file and puts its name in front.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CalibrationError {
     /// The text is not TOML.
@@ -20,7 +20,7 @@ pub enum CalibrationError {
         /// What is wrong with it.
         problem: String,
     },
-    /// A key is unknown, or its value cannot be.
+    /// A key is unknown, or its value is invalid.
     #[error("line {line}, key '{key}': {problem}")]
     Key {
         /// Line of the value, from 1.
@@ -50,7 +50,7 @@ impl Calibration {
     /// ```
     ///
     /// # Errors
-    /// For text that is not TOML, an unknown key, or a value that cannot be; it names the line and the key.
+    /// For text that is not TOML, an unknown key, or an invalid value; names the line and the key.
     pub fn from_toml(text: &str) -> Result<Self, CalibrationError> {
         let no_pictures =
             "a count, or a list of 16; a picture's name stands only in a calibration that is read from a file";
@@ -67,26 +67,33 @@ impl Calibration {
     ) -> Result<Self, CalibrationError> {
         let mut keys = Keys::parse(text)?;
         let mut calibration = Self::default();
+
         if let Some(name) = keys.text("name")? {
             calibration.name = name;
         }
         if let Some(version) = keys.text("version")? {
             calibration.version = version;
         }
-        (calibration.unit, calibration.date) = (keys.text("unit")?, keys.text("date")?);
+        calibration.unit = keys.text("unit")?;
+        calibration.date = keys.text("date")?;
+
         if let Some(bit_depth) =
             keys.take::<u8>("bit_depth", "a whole number", |&bits| check((8..=16).contains(&bits), "must be 8 to 16"))?
         {
             calibration.bit_depth = bit_depth;
+            // White follows the bit depth unless the text gives its own counts.
             calibration.white = Reference::PerBand([full_scale(bit_depth); BANDS]);
         }
+
         keys.bands(&mut calibration.bands)?;
         keys.references(&mut calibration, &picture)?;
+
         if let Some(rows) = keys.take("spectral_correction", "16 rows of 16 numbers", |rows: &Rows| {
             check(rows.iter().flatten().all(|value| value.is_finite()), "must be 16 rows of 16 finite numbers")
         })? {
             calibration.correction = rows;
         }
+
         keys.none_left()?;
         Ok(calibration)
     }
@@ -98,7 +105,7 @@ fn check(holds: bool, problem: &str) -> Result<(), String> {
     if holds { Ok(()) } else { Err(problem.to_owned()) }
 }
 
-/// The keys not yet taken, and where they stand.
+/// The keys not yet taken, and their places in the text.
 struct Keys<'a> {
     text: &'a str,
     values: BTreeMap<String, Spanned<Value>>,
@@ -125,9 +132,11 @@ impl<'a> Keys<'a> {
         check: impl FnOnce(&T) -> Result<(), String>,
     ) -> Result<Option<T>, CalibrationError> {
         let Some(value) = self.values.remove(key) else { return Ok(None) };
+
         let at = value.span().start;
         let read = value.into_inner().try_into::<T>();
         let read = read.map_err(|error| self.error(key, at, format!("must be {expected}: {}", error.message())))?;
+
         check(&read).map_err(|problem| self.error(key, at, problem))?;
         Ok(Some(read))
     }
@@ -143,12 +152,15 @@ impl<'a> Keys<'a> {
                 check(holds, &format!("every value must be between {low} and {high} nm"))
             }
         };
+
         if let Some(centres) = self.take("centre_nm", "16 wavelengths in nm", in_range(380.0, 780.0))? {
             bands.iter_mut().zip(centres).for_each(|(band, centre)| band.centre_nm = centre);
         }
+
         if let Some(widths) = self.take("fwhm_nm", "16 widths in nm", in_range(1.0, 100.0))? {
             bands.iter_mut().zip(widths).for_each(|(band, width)| band.fwhm_nm = width);
         }
+
         Ok(())
     }
 
@@ -159,7 +171,8 @@ impl<'a> Keys<'a> {
     ) -> Result<(), CalibrationError> {
         let most = calibration.full_scale();
         let places = ["dark", "white"].map(|key| self.values.get(key).map_or(0, |value| value.span().start));
-        // White must be a count above dark at least: a smaller span would blow noise up without bound.
+
+        // White must be at least a count above dark: a smaller span would amplify noise without bound.
         let dark = match self.picture("dark", most, picture)? {
             Some(dark) => Some(dark),
             None => self.counts("dark", |dark| {
@@ -167,6 +180,7 @@ impl<'a> Keys<'a> {
                 check(holds, &format!("every count must be between 0 and {}", most - 1.0))
             })?,
         };
+
         let above_dark = format!("every count must be above that band's dark by 1 or more, and at most {most}");
         let white = match self.picture("white", most, picture)? {
             Some(white) => Some(white),
@@ -175,14 +189,18 @@ impl<'a> Keys<'a> {
                 check(holds, &above_dark)
             })?,
         };
+
         calibration.dark = dark.unwrap_or(Reference::PerBand(calibration.dark.band_means()));
         if let Some(white) = white {
             calibration.white = white;
         }
-        let (dark_means, white_means) = (calibration.dark.band_means(), calibration.white.band_means());
+
+        let dark_means = calibration.dark.band_means();
+        let white_means = calibration.white.band_means();
         if !white_means.iter().zip(&dark_means).all(|(white, dark)| *white >= dark + 1.0) {
             return Err(self.error("white", places[1], above_dark));
         }
+
         match calibration.size() {
             Some((width, height)) if !calibration.fits(width, height) => {
                 Err(self.error("white", places[1], "must be a picture of the size of the dark one".to_owned()))
@@ -201,12 +219,15 @@ impl<'a> Keys<'a> {
         if !self.values.get(key).is_some_and(|value| value.get_ref().is_str()) {
             return Ok(None);
         }
+
         let at = self.values.get(key).map_or(0, |value| value.span().start);
         let name = self.text(key)?.unwrap_or_default();
         let frame = read(&name).map_err(|problem| self.error(key, at, problem))?;
+
         if frame.samples().iter().any(|&sample| f32::from(sample) > most) {
             return Err(self.error(key, at, format!("{name} has counts above {most}, the limit of the bit depth")));
         }
+
         Ok(Some(Reference::PerPixel(frame)))
     }
 
@@ -220,9 +241,11 @@ impl<'a> Keys<'a> {
             Value::Integer(_) | Value::Float(_) => Some(value.get_ref().clone()),
             _ => None,
         });
+        // One count becomes a list of 16 in place, so that both forms are read and checked alike.
         if let (Some(single), Some(value)) = (single, self.values.get_mut(key)) {
             *value.get_mut() = Value::Array(vec![single; BANDS]);
         }
+
         Ok(self.take(key, "a count, or a list of 16", check)?.map(Reference::PerBand))
     }
 
@@ -254,6 +277,7 @@ mod tests {
     fn reads_every_key() {
         let list =
             |first: f64, step: f64| format!("{:?}", (0..16).map(|i| first + step * f64::from(i)).collect::<Vec<_>>());
+
         let rows = format!("{:?}", [[0.5_f32; BANDS]; BANDS]);
         let text = format!(
             "name = 'unit 12'\nversion = 'b'\nbit_depth = 12\ncentre_nm = {}\nfwhm_nm = {}\ndark = 60\nwhite = {}\n\
@@ -262,9 +286,11 @@ mod tests {
             list(10.0, 0.5),
             list(3000.0, 10.0),
         );
+
         let read = Calibration::from_toml(&text).unwrap();
         assert_eq!((read.name.as_str(), read.version.as_str(), read.bit_depth), ("unit 12", "b", 12));
         assert_eq!(read.bands[2], Band { centre_nm: 476.0, fwhm_nm: 11.0 });
+
         assert_eq!(read.dark, Reference::PerBand([60.0; BANDS]));
         assert!((read.white.band_means()[15] - 3150.0).abs() < 1e-3);
         assert_eq!(read.correction, [[0.5; BANDS]; BANDS]);

@@ -7,8 +7,8 @@ use toml::Value;
 use super::calibration::{BANDS, Calibration, Reference};
 
 impl Calibration {
-    /// The calibration as TOML. References per pixel are pictures: `dark` and `white` are the names under which the
-    /// caller keeps them.
+    /// The calibration as TOML. References per pixel are pictures: `dark` and `white` are the names
+    /// of the files in which the caller keeps them.
     #[must_use]
     pub fn to_toml(&self, dark: &str, white: &str) -> String {
         let mut text = String::new();
@@ -16,21 +16,26 @@ impl Calibration {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "{key} = {value}");
         };
+
         put("name", quoted(&self.name));
         if let Some(unit) = &self.unit {
             put("unit", quoted(unit));
         }
+
         put("version", quoted(&self.version));
         if let Some(date) = &self.date {
             put("date", quoted(date));
         }
+
         put("bit_depth", self.bit_depth.to_string());
         put("centre_nm", format!("{:?}", self.bands.map(|band| band.centre_nm)));
         put("fwhm_nm", format!("{:?}", self.bands.map(|band| band.fwhm_nm)));
         put("dark", reference(&self.dark, dark));
         put("white", reference(&self.white, white));
+
         let rows: Vec<String> = self.correction.iter().map(|row: &[f32; BANDS]| format!("  {row:?},\n")).collect();
         put("spectral_correction", format!("[\n{}]", rows.concat()));
+
         text
     }
 }
@@ -52,7 +57,7 @@ mod tests {
     use crate::imaging::MosaicFrame;
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn a_calibration_survives_writing_and_reading() {
         let white = MosaicFrame::new(8, 4, vec![900; 32]).unwrap();
         let mut calibration = Calibration {
             name: "a \"quoted\" name".into(),
@@ -64,6 +69,7 @@ mod tests {
             ..Calibration::default()
         };
         calibration.correction[3][5] = -0.125;
+
         let text = calibration.to_toml("dark.tiff", "white.tiff");
         let read = Calibration::from_toml_with(&text, |name| {
             assert_eq!(name, "white.tiff");

@@ -17,7 +17,7 @@ const LARGEST_SIDE: u32 = 16_384;
 /// Bytes that decoding one picture may take.
 const LARGEST_MEMORY: u64 = 512 << 20;
 
-/// What was read.
+/// A decoded picture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Picture {
     /// A colour picture, and its gray made from all of its bits.
@@ -29,7 +29,7 @@ pub enum Picture {
 }
 
 impl Picture {
-    /// The picture in gray, whatever it was: a mosaic by `reconstructor`.
+    /// The picture in gray; `reconstructor` makes it from a mosaic.
     #[must_use]
     pub fn into_gray(self, reconstructor: &mut Reconstructor) -> GrayImage {
         match self {
@@ -43,28 +43,28 @@ impl Picture {
     }
 }
 
-/// Why bytes are no picture. Reads on after "FILE: ".
+/// Why bytes are not a picture. Reads on after "FILE: ".
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
     /// There are no bytes.
     #[error("the file is empty")]
     Empty,
-    /// The bytes do not begin as any picture does.
+    /// The bytes do not begin like any picture.
     #[error("not a PNG, JPEG or TIFF picture (a raw mosaic's name ends in .raw or .bin)")]
     NotAPicture,
-    /// A picture of a format that is not read.
+    /// A picture of an unsupported format.
     #[error("cannot read {0} pictures; convert it to PNG, JPEG or TIFF")]
     OtherFormat(&'static str),
-    /// The format is right and the contents are not.
+    /// The format is right, but the contents are damaged.
     #[error("damaged or cut short: {0}")]
     Damaged(String),
-    /// A kind of pixel that is not read.
+    /// An unsupported kind of pixel.
     #[error("cannot read pixels of this kind ({0}); convert it to 8 or 16 bit gray or RGB")]
     OtherPixels(String),
     /// More pixels or memory than is sensible.
     #[error("too large: the limit is {LARGEST_SIDE} pixels per side and {} MiB", LARGEST_MEMORY >> 20)]
     TooLarge,
-    /// A mosaic was asked for, and it is colour or 8 bit.
+    /// A mosaic was asked for, but the picture is colour or 8 bit.
     #[error("a mosaic is a 16-bit gray picture, not {0}")]
     NotAMosaic(&'static str),
     /// A mosaic of an odd size.
@@ -86,15 +86,17 @@ pub enum DecodeError {
 
 /// Reads a PNG, JPEG or TIFF picture of 8 or 16 bit, gray or RGB; alpha is left out.
 ///
-/// A 16-bit gray picture of the sensor's full size is a mosaic, and with `mosaic` any 16-bit gray picture is, whose sides
-/// must then be multiples of 4.
+/// A 16-bit gray picture of the sensor's full size is a mosaic. With `mosaic`, any 16-bit gray
+/// picture is one, and its sides must be multiples of 4.
 ///
 /// # Errors
 /// When the bytes are not such a picture, or not all of one.
 pub fn decode(bytes: &[u8], mosaic: bool) -> Result<Picture, DecodeError> {
     let picture = decode_any(bytes)?;
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let width = picture.width() as usize;
+    let height = picture.height() as usize;
     let mosaic_by_size = is_mosaic(&picture);
+
     match picture {
         DynamicImage::ImageLuma16(samples) if mosaic || mosaic_by_size => {
             Ok(Picture::Mosaic(MosaicFrame::new(width, height, samples.into_raw())?))
@@ -144,12 +146,14 @@ pub fn decode_raw(bytes: &[u8]) -> Result<MosaicFrame, DecodeError> {
     if bytes.len() != expected {
         return Err(DecodeError::RawLength { expected, found: bytes.len() });
     }
+
     let samples = bytes.as_chunks::<2>().0.iter().map(|&pair| u16::from_le_bytes(pair)).collect();
     Ok(MosaicFrame::new(width, height, samples)?)
 }
 
-/// Reads a PNG, JPEG or TIFF picture, whatever its pixels, floating-point ones excepted: nothing says which value is white,
-/// and the `image` crate, which takes 1 for it, would make most such pictures white.
+/// Reads a PNG, JPEG or TIFF picture with any pixels except floating-point ones: nothing says which
+/// value of those is white, and the `image` crate, which takes 1 for it, would make most of them
+/// white.
 ///
 /// # Errors
 /// When the bytes are not such a picture, not all of one, or one too large.
@@ -157,17 +161,21 @@ pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     if bytes.is_empty() {
         return Err(DecodeError::Empty);
     }
+
     let format = image::guess_format(bytes).map_err(|_| DecodeError::NotAPicture)?;
     if !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Tiff) {
         return Err(DecodeError::OtherFormat(format.extensions_str().first().copied().unwrap_or("these")));
     }
+
     if format == ImageFormat::Jpeg && !jpeg_ends(bytes) {
         return Err(DecodeError::Damaged("the end of the JPEG data is missing".to_owned()));
     }
+
     let mut limits = Limits::default();
     limits.max_image_width = Some(LARGEST_SIDE);
     limits.max_image_height = Some(LARGEST_SIDE);
     limits.max_alloc = Some(LARGEST_MEMORY);
+
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
     let picture = reader.decode().map_err(|error| match error {
@@ -175,6 +183,7 @@ pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
         ImageError::Unsupported(error) => DecodeError::OtherPixels(error.to_string()),
         error => DecodeError::Damaged(error.to_string()),
     })?;
+
     match picture {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
             Err(DecodeError::OtherPixels(format!("{:?}", picture.color())))
@@ -183,7 +192,8 @@ pub fn decode_any(bytes: &[u8]) -> Result<DynamicImage, DecodeError> {
     }
 }
 
-/// Whether an end marker follows the last scan: the decoder fills up pictures that are cut short, and says nothing.
+/// Whether an end marker follows the last scan: the decoder silently fills up pictures that are cut
+/// short.
 fn jpeg_ends(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xFF, marker]);
     last(0xD9) > last(0xDA)
@@ -233,11 +243,14 @@ mod tests {
     fn mosaics_are_known_by_their_size_or_by_word() {
         let full = encoded(&gray16(2048, 1088, 700), ImageFormat::Png);
         assert!(matches!(decode(&full, false), Ok(Picture::Mosaic(frame)) if frame.samples()[5] == 700));
+
         let small = encoded(&gray16(64, 48, 700), ImageFormat::Tiff);
         assert!(matches!(decode(&small, false), Ok(Picture::Gray(_))));
         assert!(matches!(decode(&small, true), Ok(Picture::Mosaic(frame)) if frame.band_width() == 16));
+
         let odd = encoded(&gray16(63, 48, 700), ImageFormat::Png);
         assert!(decode(&odd, true).unwrap_err().to_string().contains("multiple of 4"));
+
         let colour = encoded(&DynamicImage::new_rgb8(64, 48), ImageFormat::Png);
         assert!(matches!(decode(&colour, true), Err(DecodeError::NotAMosaic(_))));
     }
@@ -247,19 +260,21 @@ mod tests {
         let mut bytes = vec![0; 2 * 2048 * 1088];
         bytes[2..4].copy_from_slice(&[0xFF, 0x03]);
         assert_eq!(decode_raw(&bytes).unwrap().samples()[1], 1023);
+
         bytes.pop();
         let message = decode_raw(&bytes).unwrap_err().to_string();
         assert!(message.contains("4456448 bytes") && message.ends_with("has 4456447"), "{message}");
     }
 
     #[test]
-    fn what_is_cut_short_is_an_error_at_any_length() {
+    fn a_picture_cut_short_at_any_length_is_an_error() {
         let picture = DynamicImage::ImageRgb8(image::ImageBuffer::from_fn(64, 48, |x, y| {
             image::Rgb([x, y, x ^ y].map(|value| u8::try_from(value % 256).unwrap()))
         }));
         for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Tiff] {
             let bytes = encoded(&picture, format);
             assert!(decode(&bytes, false).is_ok());
+
             for length in (0..bytes.len() - 12).step_by(7) {
                 assert!(decode(&bytes[..length], false).is_err(), "{format:?} cut to {length} of {}", bytes.len());
             }
@@ -267,13 +282,14 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_told_what_they_are() {
+    fn errors_say_what_other_files_are() {
         assert!(matches!(decode(b"", false), Err(DecodeError::Empty)));
         assert!(matches!(decode(b"a text, not a picture", false), Err(DecodeError::NotAPicture)));
         let message = decode(b"GIF89a and so on", false).unwrap_err().to_string();
         assert!(message.starts_with("cannot read gif pictures"), "{message}");
+
         let floats = DynamicImage::ImageRgb32F(image::ImageBuffer::new(4, 4));
-        // Of any reader: 8-bit pictures made of such would be white.
+        // Either reader refuses them: an 8-bit picture made of them would be white.
         let floats = encoded(&floats, ImageFormat::Tiff);
         assert!(matches!(decode(&floats, false), Err(DecodeError::OtherPixels(_))));
         assert!(matches!(decode_any(&floats), Err(DecodeError::OtherPixels(_))));

@@ -46,6 +46,7 @@ impl MosaicFrame {
         if width == 0 || height == 0 || !width.is_multiple_of(CELL) || !height.is_multiple_of(CELL) {
             return Err(FrameError::BadSize { width, height });
         }
+
         check_length(width, height, 1, samples.len())?;
         Ok(Self { width, height, samples })
     }

@@ -32,7 +32,8 @@ pub struct PatchArea {
     pub height: usize,
 }
 
-/// What the paper's policies see: 32x32 gray values on the 0..255 scale, row by row, from the centre of the content area.
+/// What the paper's policies see: 32x32 gray values on the 0..255 scale, row by row, from the centre
+/// of the content area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch(pub [f32; PATCH_SIDE * PATCH_SIDE]);
 
@@ -47,8 +48,8 @@ pub struct TooSmall {
 }
 
 impl PatchArea {
-    /// The patch at the centre of `content`, moved as little as needed to lie inside a `width` x `height` picture;
-    /// at the picture's centre where there is no content area.
+    /// The patch at the centre of `content`, moved as little as needed to lie inside a `width` x
+    /// `height` picture; at the picture's centre where there is no content area.
     ///
     /// # Errors
     /// When the picture is smaller than the patch.
@@ -56,17 +57,19 @@ impl PatchArea {
         if width < PATCH_SIDE || height < PATCH_SIDE {
             return Err(TooSmall { width, height });
         }
+
         let (x, y) = match content {
             Some(area) => (start(area.x, width), start(area.y, height)),
             None => ((width - PATCH_SIDE) / 2, (height - PATCH_SIDE) / 2),
         };
+
         Ok(Self { x, y, width: PATCH_SIDE, height: PATCH_SIDE })
     }
 }
 
 /// First pixel of a patch around `centre` that keeps inside `0..length`.
 fn start(centre: f64, length: usize) -> usize {
-    // The cast makes 0 of what is negative.
+    // A float-to-integer cast saturates: a negative place becomes 0.
     let first = (centre - PATCH_SIDE as f64 / 2.0).round() as usize;
     first.min(length - PATCH_SIDE)
 }

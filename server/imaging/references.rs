@@ -1,4 +1,4 @@
-//! Reference exposures, dark and white: several frames averaged, and refused where they could not calibrate a sensor.
+//! Averages dark and white reference exposures, and refuses those that cannot calibrate a sensor.
 
 pub use super::bad_reference::BadReference;
 use super::calibration::BANDS;
@@ -8,24 +8,27 @@ use super::geometry::ContentArea;
 
 /// Share of the pixels that may be defective: hot, dead or stuck.
 const DEFECTS: f64 = 0.001;
-/// Most that the mean of a dark exposure may be, as a share of full scale; a hundredth is usual.
+/// Largest mean of a dark exposure, as a share of full scale; a hundredth is usual.
 const DARK_MEAN: f64 = 0.1;
-/// Least that the brightest band of a white target must reach, as a share of full scale: below it noise rules.
+/// Least level of the brightest band of a white target, as a share of full scale: below it noise
+/// rules.
 const WHITE_LEVEL: f64 = 0.3;
 /// A picture this dark sees nothing at all.
 const NOTHING: f64 = 0.05;
 /// Least that every band must see of the white target above dark, as a share of full scale.
 const BAND_LEVEL: f64 = 0.02;
-/// Where in a band's sorted counts its level is taken: in a part that is lit, should another lie in shadow.
+/// Share of a band's sorted counts at which its level is read: high, so that a shadow over part of
+/// the picture does not lower it.
 const LIT: f64 = 0.9;
-/// Least ratio of the darkest to the brightest twentieth of a band over the content area. Optics lose a third to the rim.
+/// Least ratio of the darkest to the brightest twentieth of a band over the content area. Optics
+/// lose a third to the rim.
 const EVENNESS: f64 = 0.4;
-/// Most that the mean of a frame may change from one to another: of the light, for white; of full scale, for dark.
+/// Largest change of the mean between frames: of the light, for white; of full scale, for dark.
 const UNSTEADINESS: f64 = 0.02;
 /// Part of the content area's radius that is judged: its rim is soft.
 const INSIDE: f64 = 0.9;
 
-/// Frames added up.
+/// A running sum of frames, to be averaged.
 #[derive(Debug, Clone, Default)]
 pub struct Average {
     size: (usize, usize),
@@ -39,7 +42,7 @@ pub struct Average {
 }
 
 impl Average {
-    /// Nothing as yet, of a sensor whose largest count is `full_scale`.
+    /// An empty average, for a sensor whose largest count is `full_scale`.
     #[must_use]
     pub fn new(full_scale: f32) -> Self {
         Self { full_scale: full_scale as u16, ..Self::default() }
@@ -52,15 +55,18 @@ impl Average {
     pub fn add(&mut self, frame: &MosaicFrame) -> Result<(), BadReference> {
         let found = (frame.width(), frame.height());
         if self.means.is_empty() {
-            (self.size, self.sums) = (found, vec![0; frame.samples().len()]);
+            self.size = found;
+            self.sums = vec![0; frame.samples().len()];
         }
         check_size(found, "the first frame", self.size)?;
+
         let mut total = 0_u64;
         for (sum, &sample) in self.sums.iter_mut().zip(frame.samples()) {
             *sum += u32::from(sample);
             total += u64::from(sample);
             self.saturated += usize::from(sample >= self.full_scale);
         }
+
         self.means.push(total as f64 / frame.samples().len() as f64);
         Ok(())
     }
@@ -68,43 +74,51 @@ impl Average {
     /// The mean as a dark reference.
     ///
     /// # Errors
-    /// When it cannot be one; says why and what to do.
+    /// When the frames are unfit for one; says why and what to do.
     pub fn dark(&self) -> Result<MosaicFrame, BadReference> {
         let mean = self.mean()?;
-        let (full, level) = (f64::from(self.full_scale), self.level());
+        let full = f64::from(self.full_scale);
+        let level = self.level();
         if level > DARK_MEAN * full {
             return Err(BadReference::DarkTooBright(level / full));
         }
+
+        // Twice the mean that is allowed: single hot pixels pass, a lit corner does not.
         let limit = (2.0 * DARK_MEAN * full) as u16;
         let lit = share(mean.samples().iter().filter(|&&sample| sample > limit).count(), self.sums.len());
         if lit > DEFECTS {
             return Err(BadReference::LightLeaks(lit));
         }
+
         self.check_steady(full)?;
         Ok(mean)
     }
 
-    /// The mean as a white reference beside `dark`. Only the content area is judged, where there is one.
+    /// The mean as a white reference beside `dark`. Judges only the content area, where there is one.
     ///
     /// # Errors
-    /// When it cannot be one; says why and what to do.
+    /// When the frames are unfit for one; says why and what to do.
     pub fn white(&self, dark: &MosaicFrame) -> Result<MosaicFrame, BadReference> {
         let mean = self.mean()?;
         check_size(self.size, "the dark reference", (dark.width(), dark.height()))?;
+
         let saturated = share(self.saturated, self.means.len() * self.sums.len());
         if saturated > DEFECTS {
             return Err(BadReference::Saturated(saturated));
         }
+
         let full = f64::from(self.full_scale);
         let light = Light::new(&mean, dark);
         let bands: [Vec<f64>; BANDS] = std::array::from_fn(|band| light.band(band));
         check_levels(&bands, full)?;
         check_even(&bands)?;
+
         let all: usize = bands.iter().map(Vec::len).sum();
         let blind = bands.iter().flatten().filter(|&&counts| counts < 1.0).count();
         if share(blind, all) > DEFECTS {
             return Err(BadReference::NotAboveDark(share(blind, all)));
         }
+
         let dark_level = dark.samples().iter().map(|&sample| f64::from(sample)).sum::<f64>() / self.sums.len() as f64;
         self.check_steady((self.level() - dark_level).max(1.0))?;
         Ok(mean)
@@ -115,6 +129,7 @@ impl Average {
         if frames == 0 {
             return Err(BadReference::Nothing);
         }
+
         let samples = self.sums.iter().map(|sum| ((sum + frames / 2) / frames) as u16).collect();
         let (width, height) = self.size;
         MosaicFrame::new(width, height, samples).map_err(|_: FrameError| BadReference::Nothing)
@@ -144,9 +159,11 @@ fn check_levels(bands: &[Vec<f64>; BANDS], full: f64) -> Result<(), BadReference
     if brightest < NOTHING {
         return Err(BadReference::Blind(brightest.max(0.0)));
     }
+
     if brightest < WHITE_LEVEL {
         return Err(BadReference::WhiteTooDark(brightest));
     }
+
     match levels.iter().position(|&level| level < BAND_LEVEL) {
         Some(band) => Err(BadReference::BandTooDark { band, level: levels[band].max(0.0) }),
         None => Ok(()),
@@ -198,6 +215,7 @@ impl<'a> Light<'a> {
             let (x, y) = (index % width, index / width);
             (0..BANDS).map(|band| self.counts(self.place(x, y, band))).sum::<f64>().max(0.0)
         };
+
         let cells: Vec<f64> = (0..width * height).map(cell).collect();
         let most = cells.iter().copied().fold(1.0, f64::max);
         GrayImage { width, height, data: cells.iter().map(|cell| (220.0 * cell / most) as f32).collect() }
@@ -208,9 +226,11 @@ impl<'a> Light<'a> {
         let inside = |x: usize, y: usize| {
             self.content.is_none_or(|area| (x as f64 - area.x).hypot(y as f64 - area.y) < INSIDE * area.radius)
         };
+
         let places = (0..self.white.band_height()).flat_map(|y| (0..self.white.band_width()).map(move |x| (x, y)));
         let mut counts: Vec<f64> =
             places.filter(|&(x, y)| inside(x, y)).map(|(x, y)| self.counts(self.place(x, y, band))).collect();
+
         counts.sort_unstable_by(f64::total_cmp);
         counts
     }
@@ -254,9 +274,11 @@ mod tests {
     fn light_in_a_dark_exposure_is_refused() {
         assert_eq!(average(&[]).dark(), Err(BadReference::Nothing));
         assert_eq!(average(&[frame(|_, _| 400)]).dark(), Err(BadReference::DarkTooBright(400.0 / 1023.0)));
+
         // A corner of 51 x 27 of 512 x 272 samples.
         let leak = average(&[frame(|x, y| if x < 51 && y < 27 { 500 } else { 8 })]).dark().unwrap_err();
         assert_eq!(leak, BadReference::LightLeaks(51.0 * 27.0 / (512.0 * 272.0)));
+
         let flicker = average(&[frame(|_, _| 8), frame(|_, _| 60)]).dark().unwrap_err();
         assert_eq!(flicker, BadReference::Unsteady(52.0 / 1023.0));
     }
@@ -271,17 +293,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_white_reference_says_why() {
+    fn a_bad_white_reference_says_what_is_wrong() {
         let refused = |count: &dyn Fn(usize, usize) -> u16| white(&[frame(count)]).unwrap_err();
         assert_eq!(refused(&|x, _| if x % 4 == 0 { 1023 } else { 800 }), BadReference::Saturated(0.25));
         assert!(matches!(refused(&|_, _| 12), BadReference::Blind(_)));
         assert_eq!(refused(&|_, _| 214), BadReference::WhiteTooDark(204.0 / 1023.0));
         assert!(matches!(refused(&|x, _| 10 + (19 * x / 10) as u16), BadReference::Uneven(_)), "a slope");
         assert!(matches!(refused(&|x, _| if x < 256 { 800 } else { 10 }), BadReference::Uneven(_)), "a shadow");
+
         let band_9 = |x: usize, y: usize| if x % 4 == 1 && y % 4 == 2 { 11 } else { 800 };
         assert_eq!(refused(&band_9), BadReference::BandTooDark { band: 9, level: 1.0 / 1023.0 });
+
         let dead = |x: usize, y: usize| if x.is_multiple_of(128) && y.is_multiple_of(2) { 3 } else { 800 };
         assert_eq!(refused(&dead), BadReference::NotAboveDark(1.0 / 256.0));
+
         let flicker = white(&[frame(|_, _| 800), frame(|_, _| 760)]).unwrap_err();
         assert_eq!(flicker, BadReference::Unsteady(40.0 / 770.0));
     }
