@@ -1,6 +1,6 @@
-//! What can be wrong with a reference exposure, in words for whoever takes it.
+//! What can be wrong with a reference exposure, in words for the person who takes it.
 
-/// Why an exposure is no reference.
+/// Why an exposure is unfit as a reference.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BadReference {
     /// There was no frame.
@@ -43,7 +43,7 @@ pub enum BadReference {
          the exposure", 100.0 * level
     )]
     BandTooDark {
-        /// Which, from 0.
+        /// The band, from 0.
         band: usize,
         /// Share of full scale.
         level: f64,

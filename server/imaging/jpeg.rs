@@ -5,7 +5,8 @@ use turbojpeg::{Compressor, Image, OutputBuf, PixelFormat, Subsamp};
 
 use super::frame::RgbImage;
 
-/// Encodes pictures as JPEG with 4:2:0 chroma. Keep one and reuse it: it keeps its compressor and memory.
+/// Encodes pictures as JPEG with 4:2:0 chroma. Keep one and reuse it: it keeps its compressor and
+/// memory.
 #[derive(Debug)]
 pub struct JpegEncoder {
     compressor: Compressor,
@@ -48,16 +49,19 @@ impl JpegEncoder {
     /// Encodes `rgb`.
     ///
     /// # Errors
-    /// When the picture is empty or inconsistent, or libjpeg-turbo refuses it (a side over 65 500 pixels).
+    /// When the picture is empty or inconsistent, or libjpeg-turbo refuses it (a side over 65 500
+    /// pixels).
     pub fn encode(&mut self, rgb: &RgbImage) -> Result<Bytes, JpegError> {
         let &RgbImage { width, height, ref data } = rgb;
         if width == 0 || height == 0 || data.len() != 3 * width * height {
             return Err(JpegError::BadPicture { width, height, bytes: data.len() });
         }
+
         self.buffer.resize(self.compressor.buf_len(width, height)?, 0);
         let image = Image { pixels: data.as_slice(), width, pitch: 3 * width, height, format: PixelFormat::RGB };
         let mut output = OutputBuf::borrowed(&mut self.buffer);
         self.compressor.compress(image, &mut output)?;
+
         Ok(Bytes::copy_from_slice(&output))
     }
 }

@@ -4,23 +4,26 @@ use super::frame::{GrayImage, RgbImage};
 use super::geometry::{PATCH_SIDE, Patch, PatchArea};
 use super::view::{Square, View};
 
-/// Makes `gray` from `rgb`: 0.2126 R + 0.7152 G + 0.0722 B of the encoded values (ITU-R BT.709 weights), as the
-/// content-area method does. `gray` is resized as needed.
+/// Makes `gray` from `rgb`: 0.2126 R + 0.7152 G + 0.0722 B of the encoded values (ITU-R BT.709
+/// weights), as the content-area method does. `gray` is resized as needed.
 pub fn rgb_to_gray(rgb: &RgbImage, gray: &mut GrayImage) {
     gray.width = rgb.width;
     gray.height = rgb.height;
     gray.data.clear();
+
     let (pixels, _) = rgb.data.as_chunks::<3>();
     gray.data.extend(pixels.iter().map(|pixel| luma(pixel.map(f32::from))));
     gray.data.resize(rgb.width * rgb.height, 0.0);
 }
 
-/// The gray patch of `rgb` at `area`, computing just those pixels; black where `area` leaves the picture.
+/// The gray patch of `rgb` at `area`, computing just those pixels; black where `area` leaves the
+/// picture.
 #[must_use]
 pub fn rgb_patch(rgb: &RgbImage, area: PatchArea) -> Patch {
     let (pixels, _) = rgb.data.as_chunks::<3>();
     Patch(std::array::from_fn(|i| {
-        let (x, y) = (area.x + i % PATCH_SIDE, area.y + i / PATCH_SIDE);
+        let x = area.x + i % PATCH_SIDE;
+        let y = area.y + i / PATCH_SIDE;
         let pixel = if x < rgb.width { pixels.get(y * rgb.width + x) } else { None };
         pixel.map_or(0.0, |pixel| luma(pixel.map(f32::from)))
     }))

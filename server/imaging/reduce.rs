@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::frame::GrayImage;
 
-/// `picture` at `width` x `height` pixels, each the mean of the area that it covers. A side is at least 1 and at most the
-/// picture's own. Where it divides the picture's side these are means of whole blocks.
+/// `picture` at `width` x `height` pixels, each the mean of the area that it covers. A side is at
+/// least 1 and at most the picture's own. Where it divides the picture's side these are means of
+/// whole blocks.
 ///
 /// The `image` crate cannot do this for gray levels: it clamps floating-point samples to 0..=1.
 #[must_use]
@@ -23,6 +24,7 @@ pub fn reduced(picture: &GrayImage, width: usize, height: usize) -> GrayImage {
         }
         data.extend(columns.iter().map(|column| column.pixels().map(|(x, weight)| weight * sum[x]).sum::<f32>()));
     }
+
     GrayImage { width: columns.len(), height: lines.len(), data }
 }
 
@@ -51,7 +53,8 @@ fn covered(length: usize, into: usize) -> Vec<Cover> {
     let edge = |index: usize| (index * length) as f64 / into as f64;
     (0..into)
         .map(|index| {
-            let (from, to) = (edge(index), edge(index + 1));
+            let from = edge(index);
+            let to = edge(index + 1);
             Cover { pixels: from.floor() as usize..(to.ceil() as usize).min(length), from, to }
         })
         .collect()

@@ -7,8 +7,9 @@ pub const WIDER: [usize; 2] = [2, 4];
 
 /// The patch of a frame, and wider ones around it.
 ///
-/// A wider patch has 32x32 values too, each the mean of a block of pixels, so it covers a larger part of the view at a coarser
-/// scale. It has the patch's centre, or lies as near to it as the picture allows. Gray levels are not rounded.
+/// A wider patch has 32x32 values too, each the mean of a block of pixels, so it covers a larger part
+/// of the view at a coarser scale. It has the patch's centre, or lies as near to it as the picture
+/// allows. Gray levels are not rounded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// The patch at the picture's own scale: all that the paper's policies see.
@@ -24,28 +25,32 @@ pub struct Square {
     pub x: usize,
     /// Top row.
     pub y: usize,
-    /// Columns, and rows.
+    /// Columns and rows.
     pub side: usize,
 }
 
 impl Square {
-    /// What the patch at `scale` covers whose centre is that of the 32x32 patch at `corner`, moved as little as needed to lie
-    /// inside a picture of `width` x `height` pixels. `None` where the picture is smaller than that.
+    /// The square that the patch at `scale` covers. Its centre is that of the 32x32 patch at
+    /// `corner`, moved as little as needed to lie inside a picture of `width` x `height` pixels.
+    /// `None` where the picture is smaller than the square.
     #[must_use]
     pub fn around(corner: (usize, usize), scale: usize, (width, height): (usize, usize)) -> Option<Self> {
         let side = PATCH_SIDE * scale;
         let margin = (side - PATCH_SIDE) / 2;
+
         let first = |corner: usize, length: usize| {
             let last = length.checked_sub(side)?;
             Some(corner.saturating_sub(margin).min(last))
         };
+
         Some(Self { x: first(corner.0, width)?, y: first(corner.1, height)?, side })
     }
 }
 
 impl View {
-    /// The view around `patch`, which lies at `corner` of a picture of `size` (width and height). `gray` makes the gray levels of
-    /// a square of the picture, row after row; it is called once, with the largest square that is needed, or not at all.
+    /// The view around `patch`, which lies at `corner` of a picture of `size` (width and height).
+    /// `gray` makes the gray levels of a square of the picture, row after row; it is called once, with
+    /// the largest square that is needed, or not at all.
     pub fn around(
         patch: Patch,
         corner: (usize, usize),
@@ -53,6 +58,7 @@ impl View {
         gray: impl FnOnce(Square) -> Vec<f32>,
     ) -> Self {
         let squares = WIDER.map(|scale| Square::around(corner, scale, size));
+
         // A square of a coarser scale holds those of all finer ones.
         let Some(largest) = squares.iter().flatten().next_back().copied() else { return Self::from(patch) };
         let levels = gray(largest);
@@ -62,19 +68,20 @@ impl View {
             let first = (square.y - largest.y) * largest.side + square.x - largest.x;
             Some(block_means(levels.get(first..)?, largest.side, WIDER[index]))
         };
+
         Self { patch, wider: std::array::from_fn(means) }
     }
 }
 
 impl From<Patch> for View {
-    /// A view of nothing but `patch`.
+    /// A view of `patch` alone.
     fn from(patch: Patch) -> Self {
         Self { patch, wider: [None; WIDER.len()] }
     }
 }
 
-/// The patch whose values are the means of blocks of `scale` x `scale` pixels of `levels`, which has `width` pixels a row and
-/// begins with the patch's first block.
+/// The patch whose values are the means of blocks of `scale` x `scale` pixels of `levels`, which has
+/// `width` pixels a row and begins with the patch's first block.
 #[must_use]
 pub fn block_means(levels: &[f32], width: usize, scale: usize) -> Patch {
     let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
@@ -82,8 +89,8 @@ pub fn block_means(levels: &[f32], width: usize, scale: usize) -> Patch {
     patch
 }
 
-/// Fills `out`, `columns` values a row, with the means of blocks of `scale` x `scale` pixels of `levels`, which has `width` pixels a
-/// row and begins with the first block.
+/// Fills `out`, `columns` values a row, with the means of blocks of `scale` x `scale` pixels of
+/// `levels`, which has `width` pixels a row and begins with the first block.
 ///
 /// Scales are those of [`WIDER`]; for another one nothing is filled.
 pub fn fill_block_means(levels: &[f32], width: usize, scale: usize, columns: usize, out: &mut [f32]) {
@@ -103,6 +110,7 @@ fn fill_blocks<const SCALE: usize>(levels: &[f32], width: usize, columns: usize,
         for line in levels.chunks(width).skip(row * SCALE).take(SCALE) {
             sums.iter_mut().zip(line).for_each(|(sum, level)| *sum += level);
         }
+
         for (value, block) in out.iter_mut().zip(sums.as_chunks::<SCALE>().0) {
             *value = share * block.iter().sum::<f32>();
         }

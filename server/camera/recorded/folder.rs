@@ -1,4 +1,4 @@
-//! A recorded scan's folder, read: everything that it says of itself is checked before any of it is used.
+//! Reads a recorded scan's folder, and checks everything the folder says before using any of it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use super::{FORMAT, HEADER, Header, Image, LEAST_SIDE, MOST_POSES, POSES, Pose, 
 use crate::imaging::{DecodeError, GrayImage, PATCH_SIDE, Picture, decode};
 use crate::lens::FocalPower;
 
-/// A recorded scan, of which poses may be missing.
+/// A recorded scan, possibly with poses missing.
 #[derive(Debug, Clone)]
 pub struct ScanFolder {
     path: PathBuf,
@@ -30,7 +30,7 @@ pub struct Damage {
 }
 
 impl ScanFolder {
-    /// Reads what the folder at `path` says of itself; pictures are read when they are asked for.
+    /// Reads the description of the scan in `path`; pictures are read when they are asked for.
     ///
     /// # Errors
     /// When there is no scan, or what describes it cannot be read or makes no sense.
@@ -39,23 +39,28 @@ impl ScanFolder {
         if !file.is_file() {
             return Err(ScanError::NoScan(path.to_owned()));
         }
+
         let text = fs::read_to_string(&file).map_err(ScanError::unreadable(&file))?;
         let header: Header = serde_json::from_str(&text).map_err(|error| ScanError::nonsense(&file, error))?;
         check_header(&header).map_err(|reason| ScanError::nonsense(&file, reason))?;
+
         let mut folder = Self { path: path.to_owned(), header, poses: BTreeMap::new(), whole_bytes: 0 };
         folder.read_poses()?;
         Ok(folder)
     }
 
-    /// Takes in every whole line; a last one without its end was being written when the power went, and does not count.
+    /// Reads every whole line. A last line without its end was being written when the power failed,
+    /// and does not count.
     fn read_poses(&mut self) -> Result<(), ScanError> {
         let file = self.path.join(POSES);
         if !file.exists() {
             return Ok(());
         }
+
         let text = fs::read(&file).map_err(ScanError::unreadable(&file))?;
         let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
         self.whole_bytes = whole as u64;
+
         for (index, line) in text[..whole].split(|&byte| byte == b'\n').enumerate().filter(|(_, line)| !line.is_empty())
         {
             let wrong = |reason: String| ScanError::nonsense(&file, format!("line {}: {reason}", index + 1));
@@ -63,6 +68,7 @@ impl ScanFolder {
             self.check_pose(&pose).map_err(wrong)?;
             self.poses.insert(pose.pose, pose);
         }
+
         Ok(())
     }
 
@@ -74,21 +80,26 @@ impl ScanFolder {
         if self.poses.contains_key(&number) {
             return Err(format!("pose {number} is listed twice"));
         }
+
         if let Some(first) = self.poses.values().next().filter(|first| (first.width, first.height) != (width, height)) {
             return Err(format!(
                 "pose {number} is {width}x{height} pixels, pose {} {}x{}",
                 first.pose, first.width, first.height
             ));
         }
+
         let fits = |corner: usize, length: usize| corner.checked_add(PATCH_SIDE).is_some_and(|end| end <= length);
         if width < LEAST_SIDE || height < LEAST_SIDE || !fits(patch.0, width) || !fits(patch.1, height) {
             return Err(format!("a patch at {patch:?} does not lie in {width}x{height} pixels of at least 64x64"));
         }
+
         let mut powers: Vec<FocalPower> = pose.images.iter().map(|image| image.focal_power).collect();
         powers.sort_by(|a, b| a.get().total_cmp(&b.get()));
         if powers != self.header.focal_powers {
             return Err(format!("pose {number} has not exactly one picture for each focal power"));
         }
+
+        // A scan from elsewhere must not name files outside its folder.
         let inside = |file: &str| Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
         match pose.images.iter().find(|image| image.file.is_empty() || !inside(&image.file)) {
             Some(image) => Err(format!("{:?} is not a file in the scan's folder", image.file)),
@@ -96,13 +107,13 @@ impl ScanFolder {
         }
     }
 
-    /// The folder.
+    /// The scan's folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What was to be recorded.
+    /// The scan's header: what was to be recorded.
     #[must_use]
     pub const fn header(&self) -> &Header {
         &self.header
@@ -139,13 +150,14 @@ impl ScanFolder {
     /// Reads a picture of `pose`: whole gray levels.
     ///
     /// # Errors
-    /// When it cannot be read, or is not the one that was stored.
+    /// When it cannot be read, or is not the picture that was stored.
     pub fn picture(&self, pose: &Pose, image: &Image) -> Result<GrayImage, ScanError> {
         let path = self.path.join(&image.file);
         let bytes = fs::read(&path).map_err(ScanError::unreadable(&path))?;
         if hex::encode(Sha256::digest(&bytes)) != image.sha256 {
             return Err(ScanError::Checksum(path));
         }
+
         match decode(&bytes, false) {
             Ok(Picture::Gray(gray)) if (gray.width, gray.height) == (pose.width, pose.height) => Ok(gray),
             Ok(_) => {
@@ -161,6 +173,7 @@ impl ScanFolder {
     pub fn check(&self, pose: &Pose) -> (u64, Vec<Damage>) {
         let mut bytes = 0;
         let mut damages = Vec::new();
+
         for image in &pose.images {
             let file = image.file.clone();
             match fs::read(self.path.join(&file)) {
@@ -169,6 +182,7 @@ impl ScanFolder {
                 Err(error) => damages.push(Damage { file, reason: format!("it cannot be read: {error}") }),
             }
         }
+
         (bytes, damages)
     }
 }

@@ -1,5 +1,5 @@
-//! Recorded focal-time scans on disk: at each pose of the camera one picture for each of some discrete focal powers. The
-//! format is described for others in `docs/scans.md`.
+//! Recorded focal-time scans on disk: at each pose of the camera one picture for each of some discrete
+//! focal powers. `docs/scans.md` describes the format for others.
 
 mod folder;
 mod player;
@@ -21,9 +21,9 @@ use crate::lens::FocalPower;
 pub const HEADER: &str = "scan.json";
 /// Name of the file that gets a line for every pose once its pictures are stored.
 pub const POSES: &str = "poses.jsonl";
-/// What [`Header::format`] says.
+/// Value of [`Header::format`].
 pub const FORMAT: &str = "parfocal-scan";
-/// What [`Header::version`] says.
+/// Value of [`Header::version`].
 pub const VERSION: u32 = 1;
 /// Most poses of a scan: over an hour at 25 a second.
 pub const MOST_POSES: usize = 100_000;
@@ -48,7 +48,7 @@ pub struct Header {
     pub simulated: bool,
     /// Name and version of the sensor's calibration, if the pictures were made with one.
     pub calibration: Option<String>,
-    /// Seed of whatever was drawn: the order of focal powers, and all of a simulation.
+    /// Seed of everything drawn at random: the order of focal powers, and all of a simulation.
     pub seed: u64,
     /// In which order each pose's focal powers were taken.
     pub order: Order,
@@ -64,7 +64,7 @@ pub struct Header {
 pub enum Order {
     /// That of [`Pose::images`], drawn anew for each pose.
     Random,
-    /// Nobody noted it.
+    /// The order was not noted.
     Unknown,
 }
 
@@ -78,7 +78,8 @@ pub struct Pose {
     pub width: usize,
     /// Height of its pictures, pixels.
     pub height: usize,
-    /// Upper left corner of the 32x32 patch at the centre of the content area, pixels rightwards and downwards.
+    /// Upper left corner of the 32x32 patch at the centre of the content area, pixels rightwards and
+    /// downwards.
     pub patch: (usize, usize),
     /// The focal power of the stack at which the patch has the greatest mean gradient magnitude.
     pub optimum: FocalPower,
@@ -89,7 +90,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Where the patch is.
+    /// The patch's place and size.
     #[must_use]
     pub const fn patch_area(&self) -> PatchArea {
         PatchArea { x: self.patch.0, y: self.patch.1, width: PATCH_SIDE, height: PATCH_SIDE }
@@ -130,7 +131,7 @@ pub enum ScanError {
         /// What is wrong with it.
         reason: String,
     },
-    /// Poses were not recorded yet.
+    /// Poses have not been recorded yet.
     #[error("the scan {} is not complete: {} of {of} {} missing; run the command that began it again to continue",
         path.display(), poses(missing), if missing.len() == 1 { "is" } else { "are" })]
     Missing {
@@ -155,7 +156,7 @@ pub enum ScanError {
     /// The folder holds something else.
     #[error("{} is not empty and is not a scan; choose a new folder", .0.display())]
     Occupied(PathBuf),
-    /// The folder holds a scan that was begun otherwise.
+    /// The folder holds a scan that was begun with other arguments.
     #[error("{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder", path.display())]
     Other {
         /// The folder.
@@ -163,7 +164,7 @@ pub enum ScanError {
         /// What is not the same.
         difference: String,
     },
-    /// Someone else records there.
+    /// Another process records there.
     #[error("another parfocal is recording into {}", .0.display())]
     Busy(PathBuf),
     /// The disk is full.
@@ -205,6 +206,7 @@ pub fn poses(of: &[usize]) -> String {
 /// Numbers for people: `3, 7 to 9, 12`, at most a handful of them.
 fn numbers(of: &[usize]) -> String {
     const MOST: usize = 6;
+
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for &number in of {
         match runs.last_mut() {
@@ -212,14 +214,17 @@ fn numbers(of: &[usize]) -> String {
             _ => runs.push((number, number)),
         }
     }
+
     let name = |&(first, last): &(usize, usize)| match last - first {
         0 => first.to_string(),
         1 => format!("{first}, {last}"),
         _ => format!("{first} to {last}"),
     };
+
     let more = runs.len().saturating_sub(MOST);
     let named: Vec<_> = runs.iter().take(MOST).map(name).collect();
     let rest = if more == 0 { String::new() } else { format!(" and {more} more") };
+
     named.join(", ") + &rest
 }
 

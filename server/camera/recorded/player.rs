@@ -1,4 +1,5 @@
-//! A recorded scan as a camera: plays the poses there and back again, and the lens's focal power picks the picture.
+//! A recorded scan as a camera: plays the poses forwards and backwards, and the lens's focal power
+//! picks the picture.
 
 use std::path::Path;
 use std::time::Duration;
@@ -29,9 +30,11 @@ impl View for ScanFolder {
         let number = there_and_back(time.as_nanos() * RATE / 1_000_000_000, self.poses().len());
         let missing = || ScanError::Missing { path: self.path().to_owned(), missing: vec![number], of: number };
         let pose: &Pose = self.poses().get(&number).ok_or_else(missing)?;
+
         let distance = |power: FocalPower| power.distance(focal_power);
         let nearest = pose.images.iter().min_by(|a, b| distance(a.focal_power).total_cmp(&distance(b.focal_power)));
         let picture = self.picture(pose, nearest.ok_or_else(missing)?)?;
+
         Ok((in_colour(&picture), pose.optimum))
     }
 }

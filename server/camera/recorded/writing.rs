@@ -1,5 +1,6 @@
-//! A recorded scan's folder, written. A pose's pictures appear under their name all at once, when all are stored, and only
-//! then does the pose get its line: whatever ends the recording, what is there is whole and the rest is missing.
+//! Writes a recorded scan's folder. A pose's pictures appear under their name all at once, when all
+//! are stored, and only then does the pose get its line: however the recording ends, what is there is
+//! whole and the rest is missing.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -40,32 +41,37 @@ pub struct Shot {
 }
 
 impl Recording {
-    /// Begins a scan in `path`, a new or empty folder, or goes on with the one there that was begun with the same
-    /// `header` (the software's version aside).
+    /// Begins a scan in `path`, a new or empty folder, or continues the scan there if it was begun with
+    /// the same `header` (apart from the software's version).
     ///
     /// # Errors
     /// When the folder holds anything else, is being recorded into, or cannot be written.
     pub fn open(path: &Path, header: &Header) -> Result<Self, ScanError> {
         fs::create_dir_all(path).map_err(|error| unwritable(path, 0, error))?;
+
         let occupied = || -> io::Result<bool> {
             let mut entries = fs::read_dir(path)?.filter_map(Result::ok);
             Ok(entries.any(|entry| !is_ours(&entry.file_name().to_string_lossy())))
         };
+
         if !path.join(HEADER).exists() {
             if occupied().map_err(|error| unwritable(path, 0, error))? {
                 return Err(ScanError::Occupied(path.to_owned()));
             }
             replace(&path.join(HEADER), &pretty(header)).map_err(|error| unwritable(path, 0, error))?;
         }
+
         let journal = path.join(POSES);
         let journal =
             File::options().create(true).append(true).open(&journal).map_err(|e| unwritable(&journal, 0, e))?;
         if journal.try_lock().is_err() {
             return Err(ScanError::Busy(path.to_owned()));
         }
+
         let folder = ScanFolder::open(path)?;
         same(folder.header(), header)
             .map_err(|difference| ScanError::Other { path: path.to_owned(), difference: difference.to_owned() })?;
+
         let recording = Self { folder, journal };
         recording.tidy_up()?;
         Ok(recording)
@@ -80,14 +86,16 @@ impl Recording {
     /// Stores a pose.
     ///
     /// # Errors
-    /// When it cannot be written; then nothing of it is left.
+    /// When it cannot be written; then no part of it is left.
     pub fn store(&mut self, shot: &Shot) -> Result<(), ScanError> {
         let name = format!("pose{:04}", shot.pose);
         let partial = self.folder.path().join(format!(".{name}.partial"));
         let stored = self.write(shot, &name, &partial);
+
         if stored.is_err() {
             let _ = fs::remove_dir_all(&partial);
         }
+
         let pose = stored.map_err(|error| self.unwritable(error))?;
         self.folder.insert(pose);
         Ok(())
@@ -99,23 +107,30 @@ impl Recording {
         let unlike: BTreeSet<String> = shot.images.iter().map(|(power, _)| rounded(power.get())).collect();
         let write = |(power, picture): &(FocalPower, GrayImage)| -> io::Result<Image> {
             let png = png(picture)?;
-            // All digits of each, where three do not tell them apart.
+
+            // Three digits name the file, or all digits where three do not tell the powers apart.
             let told = if unlike.len() == shot.images.len() { rounded(power.get()) } else { power.get().to_string() };
             let file = format!("{name}_f{told}.png");
+
             write_through(&partial.join(&file), &png)?;
             Ok(Image { focal_power: *power, file: format!("{name}/{file}"), sha256: hex::encode(Sha256::digest(&png)) })
         };
+
         let images = shot.images.par_iter().map(write).collect::<io::Result<Vec<_>>>()?;
         let whole = self.folder.path().join(name);
-        // Of a pose without a line: its line could not be written.
+
+        // A folder under this name belongs to a pose whose line could not be written.
         let _ = fs::remove_dir_all(&whole);
         fs::rename(partial, &whole)?;
+
         let (width, height) = shot.images.first().map_or((0, 0), |(_, picture)| (picture.width, picture.height));
         let Shot { pose, patch, optimum, truth, .. } = *shot;
         let pose = Pose { pose, width, height, patch: (patch.x, patch.y), optimum, truth, images };
+
         self.note(&pose).inspect_err(|_| {
             let _ = fs::remove_dir_all(&whole);
         })?;
+
         Ok(pose)
     }
 
@@ -124,15 +139,18 @@ impl Recording {
         let mut journal = &self.journal;
         let before = journal.metadata()?.len();
         let line = serde_json::to_string(pose)? + "\n";
+
         journal.write_all(line.as_bytes()).and_then(|()| journal.sync_data()).inspect_err(|_| {
+            // Half a line would spoil the next one.
             let _ = journal.set_len(before);
         })
     }
 
-    /// Takes away what a recording that was killed left half done.
+    /// Removes what a killed recording left half done.
     fn tidy_up(&self) -> Result<(), ScanError> {
         let unwritable = |error| self.unwritable(error);
         self.journal.set_len(self.folder.whole_bytes).map_err(unwritable)?;
+
         for entry in fs::read_dir(self.folder.path()).map_err(unwritable)?.filter_map(Result::ok) {
             if is_partial(&entry.file_name().to_string_lossy()) {
                 fs::remove_dir_all(entry.path()).map_err(unwritable)?;
@@ -178,7 +196,7 @@ fn same(stored: &Header, asked: &Header) -> Result<(), &'static str> {
 }
 
 fn pretty(header: &Header) -> Vec<u8> {
-    // Names, numbers and lists of them always are JSON.
+    // Serializing cannot fail: the header holds only names, numbers and lists of them.
     let mut text = serde_json::to_vec_pretty(header).unwrap_or_default();
     text.push(b'\n');
     text
@@ -187,6 +205,7 @@ fn pretty(header: &Header) -> Vec<u8> {
 /// A gray picture as 8-bit PNG; levels are rounded.
 fn png(picture: &GrayImage) -> io::Result<Vec<u8>> {
     let levels: Vec<u8> = picture.data.iter().map(|value| value.round() as u8).collect();
+
     let mut bytes = Vec::with_capacity(levels.len());
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
         .write_image(&levels, picture.width as u32, picture.height as u32, ExtendedColorType::L8)

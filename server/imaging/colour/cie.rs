@@ -58,12 +58,14 @@ impl Spectrum {
     pub(super) fn xyz(&self) -> [f64; 3] {
         let mut sums = [0.0; 3];
         let mut white = 0.0;
+
         for ((observer, power), value) in OBSERVER.iter().zip(D65).zip(self.0.iter().step_by(STEP_NM)) {
             for (sum, sensitivity) in sums.iter_mut().zip(observer) {
                 *sum += sensitivity * power * value;
             }
             white += observer[1] * power;
         }
+
         sums.map(|sum| sum / white)
     }
 }

@@ -1,8 +1,9 @@
 //! Colour: the matrix from 16 white-balanced bands to linear sRGB.
 //!
-//! Nothing above 600 nm is sensed, so the reds shown are inferred: they are those of the reflectances of the fit (smooth
-//! ones and perfused tissue) that agree best with what is sensed from 460 to 600 nm. Colours are shown as under D65,
-//! whatever the light in use, because the white reference takes that light out.
+//! Nothing above 600 nm is sensed, so the reds shown are inferred: they are those of the reflectances
+//! of the fit (smooth ones and perfused tissue) that agree best with what is sensed from 460 to
+//! 600 nm. Colours are shown as under D65, whatever the light in use, because the white reference
+//! takes that light out.
 
 mod cie;
 mod reflectances;
@@ -14,20 +15,22 @@ use super::calibration::{BANDS, Band};
 use cie::Spectrum;
 pub(super) use srgb::Encoder;
 
-/// Standard deviation of a band's noise that the fit reckons with, as a share of white. It keeps the matrix from telling
-/// neighbouring bands apart by their noise: with less, noise in the shown red grows (3.2 times a band's at 0.012, 2.3
-/// times at 0.02); with more, colours of tissue go further from what the eye sees.
+/// Standard deviation of a band's noise that the fit assumes, as a share of white. It keeps the
+/// matrix from telling neighbouring bands apart by their noise: with less, noise in the shown red
+/// grows (3.2 times a band's at 0.012, 2.3 times at 0.02); with more, colours of tissue go further
+/// from what the eye sees.
 const BAND_NOISE: f64 = 0.02;
 
 type BandMatrix = SMatrix<f64, BANDS, BANDS>;
 
 /// Three rows that make linear sRGB red, green and blue from white-balanced bands: least squares over
-/// [`reflectances::reflectances`] of band responses (Gaussians) against XYZ under D65, ridge-regularised by
-/// [`BAND_NOISE`], then scaled so that white bands give white.
+/// [`reflectances::reflectances`] of band responses (Gaussians) against XYZ under D65,
+/// ridge-regularised by [`BAND_NOISE`], then scaled so that white bands give white.
 pub(super) fn linear_srgb_from_bands(bands: &[Band; BANDS]) -> [[f32; BANDS]; 3] {
     let xyz = xyz_from_bands(bands);
     let to_rgb = Matrix3::from_fn(|row, column| srgb::FROM_XYZ[row][column]);
     let rgb = to_rgb * xyz;
+
     // The standard's matrix has four decimals, so its white is off by 1e-4.
     std::array::from_fn(|row| {
         let white = rgb.row(row).sum();
@@ -38,19 +41,23 @@ pub(super) fn linear_srgb_from_bands(bands: &[Band; BANDS]) -> [[f32; BANDS]; 3]
 fn xyz_from_bands(bands: &[Band; BANDS]) -> SMatrix<f64, 3, BANDS> {
     let mut products = SMatrix::<f64, 3, BANDS>::zeros();
     let mut squares = BandMatrix::zeros();
+
     let set = reflectances::reflectances();
     for spectrum in &set {
         let seen = responses(bands, spectrum);
         squares += seen * seen.transpose() + BandMatrix::identity() * BAND_NOISE.powi(2);
         products += Vector3::from(spectrum.xyz()) * seen.transpose();
     }
+
     // Symmetric and, with the noise on its diagonal, positive definite: the inverse exists.
     let inverse = squares.cholesky().map_or_else(BandMatrix::identity, |decomposed| decomposed.inverse());
     let mut fitted = products * inverse;
+
     let white = Spectrum::from_fn(|_| 1.0).xyz();
     for (mut row, white) in fitted.row_iter_mut().zip(white) {
         row *= white / row.sum();
     }
+
     fitted
 }
 

@@ -2,8 +2,9 @@
 
 use super::cie::Spectrum;
 
-/// Molar extinction of oxygenated and of deoxygenated haemoglobin in 1/(cm M), from 400 to 700 nm in steps of 10 nm:
-/// S. Prahl, "Tabulated molar extinction coefficient for hemoglobin in water", Oregon Medical Laser Center, 1998.
+/// Molar extinction of oxygenated and of deoxygenated haemoglobin in 1/(cm M), from 400 to 700 nm in
+/// steps of 10 nm: S. Prahl, "Tabulated molar extinction coefficient for hemoglobin in water", Oregon
+/// Medical Laser Center, 1998.
 #[rustfmt::skip]
 const HAEMOGLOBIN: [[f64; 2]; 31] = [
     [266_232.0, 223_296.0], [466_840.0, 303_956.0], [480_360.0, 407_560.0], [246_072.0, 528_600.0],
@@ -18,9 +19,10 @@ const HAEMOGLOBIN: [[f64; 2]; 31] = [
 /// Haemoglobin in whole blood in mol/l: 150 g/l at 64 500 g/mol (as in the source of [`HAEMOGLOBIN`]).
 const BLOOD_MOLAR: f64 = 150.0 / 64_500.0;
 
-/// Every reflectance of the set.
+/// All reflectances that the fit uses.
 pub(super) fn reflectances() -> Vec<Spectrum> {
     let mut set = vec![Spectrum::from_fn(|_| 1.0)];
+
     for centre in (420..=680).step_by(20).map(f64::from) {
         for width in [8.0, 20.0] {
             set.push(edge(centre, width));
@@ -31,6 +33,7 @@ pub(super) fn reflectances() -> Vec<Spectrum> {
             set.push(Spectrum::from_fn(|nm| 0.9 - 0.8 * hill(nm, centre, width)));
         }
     }
+
     for blood_fraction in [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0] {
         for saturation in [0.3, 0.6, 0.8, 1.0] {
             for scattering in [10.0, 20.0, 40.0] {
@@ -38,6 +41,7 @@ pub(super) fn reflectances() -> Vec<Spectrum> {
             }
         }
     }
+
     set
 }
 
@@ -50,10 +54,10 @@ fn hill(nm: f64, centre: f64, width: f64) -> f64 {
     (-0.5 * ((nm - centre) / width).powi(2)).exp()
 }
 
-/// Diffuse reflectance of thick tissue with blood of `saturation` filling `blood_fraction` of it, and reduced scattering
-/// `scattering` (1/cm) at 500 nm that falls with wavelength to the power 1.6, as in brain (S. Jacques, "Optical properties
-/// of biological tissues: a review", Phys. Med. Biol. 58, R37, 2013). Kubelka-Munk with K = 2 absorption and
-/// S = 3/4 reduced scattering.
+/// Diffuse reflectance of thick tissue with blood of `saturation` filling `blood_fraction` of it, and
+/// reduced scattering `scattering` (1/cm) at 500 nm that falls with wavelength to the power 1.6, as
+/// in brain (S. Jacques, "Optical properties of biological tissues: a review", Phys. Med. Biol. 58,
+/// R37, 2013). Kubelka-Munk with K = 2 absorption and S = 3/4 reduced scattering.
 pub(super) fn tissue(blood_fraction: f64, saturation: f64, scattering: f64) -> Spectrum {
     Spectrum::from_fn(|nm| {
         let [oxygenated, deoxygenated] = extinction(nm);
@@ -66,7 +70,8 @@ pub(super) fn tissue(blood_fraction: f64, saturation: f64, scattering: f64) -> S
 
 fn extinction(nm: f64) -> [f64; 2] {
     let place = ((nm - 400.0) / 10.0).clamp(0.0, 29.999_999);
-    let (index, part) = (place as usize, place.fract());
+    let index = place as usize;
+    let part = place.fract();
     std::array::from_fn(|form| (1.0 - part) * HAEMOGLOBIN[index][form] + part * HAEMOGLOBIN[index + 1][form])
 }
 

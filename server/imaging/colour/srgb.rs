@@ -9,13 +9,13 @@ fn encode(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The transfer function as a table. An entry every 1/4095 is fine enough to be at most one 8-bit step off, also where
-/// it is steepest.
+/// The transfer function as a table. An entry every 1/4095 is fine enough to be at most one 8-bit
+/// step off, even where the function is steepest.
 #[derive(Debug, Clone)]
 pub(crate) struct Encoder(Box<[u8; 1 << 16]>);
 
 impl Encoder {
-    /// What a linear component of 1 is multiplied by to become an index.
+    /// Multiplies a linear component of 0..=1 into an index.
     pub(crate) const SCALE: f32 = 4095.0;
 
     #[allow(clippy::large_stack_arrays, reason = "64 KiB, once, on its way to the heap")]
@@ -27,17 +27,18 @@ impl Encoder {
         Self(table)
     }
 
-    /// The encoded value of a linear component times [`Self::SCALE`], rounded; anything above is as 1. The table has an
-    /// entry for any index, so that none need be checked.
+    /// The encoded value of a linear component times [`Self::SCALE`], rounded; larger ones encode
+    /// as 1. The table has an entry for any index, so no bounds check is needed.
     #[inline(always)]
     pub(crate) fn at(&self, index: u16) -> u8 {
         self.0[usize::from(index)]
     }
 
     /// The index of a linear component times [`Self::SCALE`]; what is out of range is brought into it.
-    #[inline(always)]
+    /// The index of a linear component times [`Self::SCALE`], clamped to the valid range.
     pub(crate) fn index(scaled: f32) -> u16 {
-        // Adding 2^23 leaves the number, rounded, in the lowest bits: cheaper than a cast, which must mind NaN.
+        // Adding 2^23 leaves the number, rounded, in the lowest bits: cheaper than a cast, which must
+        // handle NaN.
         (scaled.clamp(0.0, Self::SCALE) + 8_388_608.0).to_bits() as u16
     }
 }

@@ -10,7 +10,7 @@ use super::edges::Edge;
 /// Triples of candidates that are tried.
 const ATTEMPTS: usize = 32;
 
-/// Fits an attempt makes, each over the inliers of the one before.
+/// Fits per attempt, each over the inliers of the one before.
 const REFINEMENTS: usize = 3;
 
 /// Pixels from the circle up to which a candidate is an inlier.
@@ -31,6 +31,7 @@ pub(super) fn find(edges: &[Edge], valid: impl Fn(&Circle) -> bool) -> Option<(C
     if edges.len() < 3 {
         return None;
     }
+
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     (0..ATTEMPTS)
         .filter_map(|_| {
@@ -49,14 +50,17 @@ fn attempt(edges: &[Edge], mut inliers: Vec<Edge>) -> Option<(Circle, f64)> {
         inliers = edges.iter().copied().filter(|edge| off(edge) < INLIER).collect();
         found = Some((circle, inliers.iter().map(|edge| edge.score).sum()));
     }
+
     found
 }
 
-/// The circle with the least sum of (x^2 + y^2 - 2ax - 2by - c)^2 (Kasa's fit), which goes through all points where there
-/// are three; none for points on a line. About the points' mean, c is the mean of x^2 + y^2 and two unknowns are left.
+/// The circle with the least sum of (x^2 + y^2 - 2ax - 2by - c)^2 (Kasa's fit), which goes through
+/// all points where there are three; `None` for points on a line. About the points' mean, c is the
+/// mean of x^2 + y^2 and two unknowns are left.
 fn fit(points: &[Edge]) -> Option<Circle> {
     let count = points.len() as f64;
     let mean = points.iter().map(|point| Vector2::new(point.x, point.y) / count).sum::<Vector2<f64>>();
+
     let mut scatter = Matrix2::zeros();
     let mut cubes = Vector2::zeros();
     for point in points {
@@ -64,9 +68,12 @@ fn fit(points: &[Edge]) -> Option<Circle> {
         scatter += offset * offset.transpose();
         cubes += offset * offset.norm_squared();
     }
+
+    // Points on a line scatter along one direction only.
     if scatter.determinant() <= 1e-9 * scatter.trace().powi(2) {
         return None;
     }
+
     let centre = scatter.try_inverse()? * cubes / 2.0;
     let radius = (scatter.trace() / count + centre.norm_squared()).sqrt();
     Some(Circle { x: mean.x + centre.x, y: mean.y + centre.y, radius })

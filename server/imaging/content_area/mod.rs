@@ -10,25 +10,28 @@ use super::frame::GrayImage;
 use super::geometry::ContentArea;
 use circle::Circle;
 
-/// Confidence below which a circle is taken for chance.
+/// Confidence below which a circle counts as chance.
 const LEAST_CONFIDENCE: f64 = 0.06;
 
-/// How far the centre may lie from the picture's centre, in widths of the picture.
+/// Largest distance of the centre from the picture's centre, in widths of the picture.
 const CENTRE_WITHIN: f64 = 0.2;
 
-/// What the radius may be, in widths of the picture.
+/// Range of the radius, in widths of the picture.
 const RADIUS: (f64, f64) = (0.2, 0.8);
 
-/// Finds the content area of `gray`; none where there is no circle, or only part of one that is too short to tell.
+/// Finds the content area of `gray`; `None` where there is no circle, or too little of one to tell.
 ///
 /// The same picture always gives the same answer.
 #[must_use]
 pub fn detect(gray: &GrayImage) -> Option<ContentArea> {
-    let (width, height) = (gray.width as f64, gray.height as f64);
+    let width = gray.width as f64;
+    let height = gray.height as f64;
+
     let valid = |circle: &Circle| {
         let off_centre = (circle.x - width / 2.0).hypot(circle.y - height / 2.0);
         off_centre < CENTRE_WITHIN * width && RADIUS.0 * width < circle.radius && circle.radius < RADIUS.1 * width
     };
+
     let (circle, score) = circle::find(&edges::find(gray), valid)?;
     let confidence = score / edges::CANDIDATES;
     let Circle { x, y, radius } = circle;

@@ -19,17 +19,20 @@ use super::mix::Mix;
 use crate::imaging::colour::Encoder;
 use crate::imaging::frame::CELL;
 
-/// Cells that are worked on at once: a 256-bit register holds 16 samples, a row of each.
+/// Cells worked on at once: a 256-bit register holds 16 samples, a row of each.
 pub(super) const CELLS: usize = 4;
 const SAMPLES: usize = CELL * CELLS;
 /// Where the red, green and blue of four cells lie in a vector of all outputs: two cells of each in either half.
 const PIXELS: [usize; 3 * CELLS] = [0, 2, 4, 1, 3, 5, 8, 10, 12, 9, 11, 13];
-/// Largest sum of an output's integer weights, signs left out: with it, rounded, the largest samples' sum still fits 32 bits.
+/// Largest sum of the absolute integer weights of an output: even after rounding, the sum of the
+/// largest samples still fits 32 bits.
 const WEIGHT_SUM: f32 = 32_750.0;
 
-/// A [`Mix`] of red, green, blue and gray in integers, with what turns its sums back.
+/// A [`Mix`] of red, green, blue and gray in integers, with the factors and offsets that turn its
+/// sums back.
 ///
-/// The multiplication takes signed numbers: 2^15 is subtracted from each sample, and the offsets give back what that takes.
+/// The multiplication takes signed numbers: 2^15 is subtracted from each sample, and the offsets
+/// compensate for that.
 #[derive(Debug, Clone)]
 pub(super) struct Kernel {
     weights: [[[i16; SAMPLES]; CELL]; 4],
@@ -39,16 +42,18 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// The integer form of `mix`, where the processor can work with it.
+    /// The integer form of `mix`; `None` where the processor has no AVX2 or FMA.
     pub(super) fn new(mix: &Mix<4>) -> Option<Self> {
         let able = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
         able.then(|| {
             let scales = mix.weights.map(scale);
             let weights: [[i16; CELL * CELL]; 4] =
                 std::array::from_fn(|k| mix.weights[k].map(|weight| (weight * scales[k]).round() as i16));
+
             let pairs = |values: [f32; 4]| {
                 [0, 2].map(|first| std::array::from_fn(|lane| values[first + usize::from(lane % 4 > 1)]))
             };
+
             Self {
                 weights: weights.map(|row| std::array::from_fn(|r| std::array::from_fn(|i| row[CELL * r + i % CELL]))),
                 factors: pairs(scales.map(f32::recip)),
@@ -73,8 +78,8 @@ impl Kernel {
     }
 }
 
-/// What an output's weights are multiplied by to become integers: such that the largest is one exactly, and so are all if they
-/// are equal, as gray's often are.
+/// The factor that turns an output's weights into integers. It makes the largest weight a whole
+/// number exactly, and so all of them where they are equal, as gray's often are.
 fn scale(weights: [f32; CELL * CELL]) -> f32 {
     let largest = weights.iter().fold(1e-30f32, |largest, weight| largest.max(weight.abs()));
     let sum = weights.iter().map(|weight| weight.abs()).sum::<f32>().max(1e-30);
@@ -91,8 +96,10 @@ fn row(
     gray: &mut [[f32; CELLS]],
 ) {
     let weights: [[__m256i; CELL]; 4] = reinterpreted(kernel.weights);
-    let (factors, offsets): ([__m256; 2], [__m256; 2]) = (reinterpreted(kernel.factors), reinterpreted(kernel.offsets));
+    let factors: [__m256; 2] = reinterpreted(kernel.factors);
+    let offsets: [__m256; 2] = reinterpreted(kernel.offsets);
     let to_signed = _mm256_set1_epi16(i16::MIN);
+
     let cells = first.iter().zip(second).zip(third).zip(fourth);
     for ((((first, second), third), fourth), (rgb, gray)) in cells.zip(rgb.iter_mut().zip(gray)) {
         let mut sums = [_mm256_setzero_si256(); 4];
@@ -102,16 +109,20 @@ fn row(
                 *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(samples, weights[r]));
             }
         }
+
         let red_green =
             _mm256_fmadd_ps(_mm256_cvtepi32_ps(_mm256_hadd_epi32(sums[0], sums[1])), factors[0], offsets[0]);
         let blue_gray =
             _mm256_fmadd_ps(_mm256_cvtepi32_ps(_mm256_hadd_epi32(sums[2], sums[3])), factors[1], offsets[1]);
+
         // Below 0 becomes 0, above 65535 that; then, in each half: two cells' red, green, blue, gray.
         let packed = _mm256_packus_epi32(_mm256_cvtps_epi32(red_green), _mm256_cvtps_epi32(blue_gray));
         let indices: [u16; SAMPLES] = reinterpreted(packed);
+
         for (value, at) in rgb.iter_mut().zip(PIXELS) {
             *value = encoder.at(indices[at]);
         }
+
         let grays = _mm256_permute4x64_pd::<0b00_00_11_01>(_mm256_castps_pd(blue_gray));
         let grays = _mm256_castps256_ps128(_mm256_castpd_ps(grays));
         *gray = reinterpreted(_mm_min_ps(_mm_max_ps(grays, _mm_setzero_ps()), _mm_set1_ps(255.0)));
@@ -122,6 +133,6 @@ fn row(
 #[inline(always)]
 fn reinterpreted<A: Copy, B>(from: A) -> B {
     const { assert!(size_of::<A>() == size_of::<B>()) }
-    // SAFETY: of one size; numbers and vectors of numbers have no bits that are not a value.
+    // SAFETY: both have one size, and every bit pattern is a valid number or vector of numbers.
     unsafe { std::mem::transmute_copy(&from) }
 }

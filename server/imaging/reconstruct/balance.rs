@@ -3,15 +3,18 @@
 use crate::imaging::calibration::{BANDS, Calibration, Reference};
 use crate::imaging::frame::{CELL, MosaicFrame};
 
-/// What a sample as dark as the dark reference becomes; above 0, so that noise below dark is kept.
+/// The value of a sample as dark as the dark reference; above 0, so that noise below dark is kept.
 pub(super) const DARK: f32 = 2048.0;
-/// What a sample as bright as the white reference becomes; there is room for highlights three times as bright.
+/// The value of a sample as bright as the white reference; leaves room for highlights three times as
+/// bright.
 pub(super) const WHITE: f32 = DARK + 16_384.0;
 
-/// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper than a cast.
+/// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper
+/// than a cast.
 const LOW_BITS: f32 = 8_388_608.0;
 
-/// A pixel that sees less of white than this share of its band's mean has no balance of its own: it would show noise.
+/// A pixel that sees less of white than this share of its band's mean has no balance of its own,
+/// which would show noise.
 const LEAST_SPAN: f32 = 0.1;
 
 /// Gain and offset of every pixel of the sensor, so that dark becomes [`DARK`] and white [`WHITE`].
@@ -30,23 +33,30 @@ impl PixelBalance {
         if !calibration.fits(width, height) {
             return None;
         }
-        let (mean_dark, mean_white) = (calibration.dark.band_means(), calibration.white.band_means());
+
+        let mean_dark = calibration.dark.band_means();
+        let mean_white = calibration.white.band_means();
         let counts = |reference: &Reference, means: &[f32; BANDS], index: usize| match reference {
             Reference::PerPixel(frame) => f32::from(frame.samples()[index]),
             Reference::PerBand(_) => means[band(index, width)],
         };
+
         let (gains, offsets) = (0..width * height)
             .map(|index| {
                 let dark = counts(&calibration.dark, &mean_dark, index);
                 let white = counts(&calibration.white, &mean_white, index);
-                // A dead pixel, or one outside the content area, sees next to no white: it is balanced as its band is.
+
+                // A dead pixel, or one outside the content area, sees next to no white: it is balanced like
+                // its band.
                 let band = band(index, width);
                 let of_band = mean_white[band] - mean_dark[band];
                 let span = if white - dark > LEAST_SPAN * of_band { white - dark } else { of_band };
+
                 let gain = (WHITE - DARK) / span;
                 (gain, DARK - dark * gain)
             })
             .unzip();
+
         Some(Self { width, height, gains, offsets })
     }
 
@@ -55,15 +65,17 @@ impl PixelBalance {
         (mosaic.width(), mosaic.height()) == (self.width, self.height)
     }
 
-    /// White-balances the samples from column `x` on of the row of cells `y` into `balanced`, which is four rows one
-    /// after another.
+    /// White-balances the samples from column `x` on of the row of cells `y` into `balanced`, which is
+    /// four rows one after another.
     #[inline(always)]
     pub(super) fn apply(&self, rows: [&[u16]; CELL], x: usize, y: usize, balanced: &mut [u16]) {
         let length = rows[0].len();
+
         for (row, (samples, balanced)) in rows.into_iter().zip(balanced.chunks_exact_mut(length)).enumerate() {
             let start = (CELL * y + row) * self.width + x;
             let places = start..start + length;
             let correction = self.gains[places.clone()].iter().zip(&self.offsets[places]);
+
             for ((balanced, &sample), (gain, offset)) in balanced.iter_mut().zip(samples).zip(correction) {
                 *balanced = ((f32::from(sample) * gain + offset).clamp(0.0, 65_535.0) + LOW_BITS).to_bits() as u16;
             }

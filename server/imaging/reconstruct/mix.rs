@@ -3,7 +3,7 @@
 use crate::imaging::calibration::BANDS;
 use crate::imaging::frame::CELL;
 
-/// Cells that are worked on at once: a 256-bit register holds a value of each.
+/// Cells worked on at once: a 256-bit register holds a value of each.
 const LANES: usize = 8;
 
 /// Makes `K` values from the 16 samples of a cell: a weighted sum each, plus an offset.
@@ -14,8 +14,8 @@ pub(super) struct Mix<const K: usize> {
 }
 
 impl<const K: usize> Mix<K> {
-    /// Sums weighted by the rows of `weights` where samples are 0 for dark and 1 for white, from samples that are `dark`
-    /// and `white`.
+    /// Sums weighted by the rows of `weights`, which are for samples that are 0 for dark and 1 for
+    /// white; the samples given later are `dark` and `white` there.
     pub(super) fn new(weights: [[f32; BANDS]; K], dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
         let weights = weights.map(|row| std::array::from_fn(|band| row[band] / (white[band] - dark[band])));
         let offsets =
@@ -29,6 +29,7 @@ impl<const K: usize> Mix<K> {
         let cells = rows.map(|row| row.as_chunks::<CELL>().0);
         let count = cells[0].len();
         let whole = count - count % LANES;
+
         for first in (0..whole).step_by(LANES) {
             self.block::<LANES>(cells, first, &mut mixed);
         }
@@ -41,6 +42,7 @@ impl<const K: usize> Mix<K> {
     #[inline(always)]
     fn block<const L: usize>(&self, cells: [&[[u16; CELL]]; CELL], first: usize, mixed: &mut [&mut [f32]; K]) {
         let mut sums = self.offsets.map(|offset| [offset; L]);
+
         for (row, cells) in cells.iter().enumerate() {
             let cells = &cells[first..first + L];
             for column in 0..CELL {
@@ -53,6 +55,7 @@ impl<const K: usize> Mix<K> {
                 }
             }
         }
+
         for (mixed, sums) in mixed.iter_mut().zip(sums) {
             mixed[first..first + L].copy_from_slice(&sums);
         }
