@@ -1,4 +1,5 @@
-//! From a mosaic to pictures: RGB for people, gray for the content area, and the gray patch for policies.
+//! From a mosaic to pictures: RGB for people, gray for the content area, and the gray patch for
+//! policies.
 
 mod avx2;
 mod balance;
@@ -19,18 +20,19 @@ use mix::Mix;
 
 /// Makes pictures of one value a mosaic cell from mosaics, by one calibration. Keep one and reuse it.
 ///
-/// Colour is made from the spectrally corrected bands. Gray is the mean of the white-balanced bands before that
-/// correction, which subtracts bands from one another and so would add noise to the focus metrics.
+/// Colour is made from the spectrally corrected bands. Gray is the mean of the white-balanced bands
+/// before that correction, which subtracts bands from one another and so would add noise to the focus
+/// metrics.
 #[derive(Debug, Clone)]
 pub struct Reconstructor {
     of_counts: Mixes,
-    /// Where references are per pixel: the balance, and what is then mixed of balanced samples.
+    /// For references per pixel: the balance, and the mixes for the balanced samples.
     of_balanced: Option<(PixelBalance, Mixes)>,
     encoder: Encoder,
     lines: Lines,
 }
 
-/// What is made of the 16 samples of a cell.
+/// The weighted sums over the 16 samples of a cell.
 #[derive(Debug, Clone)]
 struct Mixes {
     /// Red, green and blue, each as an index of an [`Encoder`], and gray.
@@ -42,14 +44,15 @@ struct Mixes {
 }
 
 impl Mixes {
-    /// Sums weighted by `weights` where samples are 0 for dark and 1 for white, from samples that are `dark` and `white`.
+    /// Sums weighted by `weights`, which are for samples that are 0 for dark and 1 for white; the
+    /// samples given later are `dark` and `white` there.
     fn new(weights: [[f32; BANDS]; 4], dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
         let picture = Mix::new(weights, dark, white);
         Self { kernel: Kernel::new(&picture), picture, gray: Mix::new([weights[3]], dark, white) }
     }
 }
 
-/// Memory for one row of cells on its way.
+/// Working memory for one row of cells.
 #[derive(Debug, Clone, Default)]
 struct Lines {
     /// Four rows of white-balanced samples.
@@ -59,13 +62,14 @@ struct Lines {
 }
 
 impl Reconstructor {
-    /// A reconstructor for mosaics of the sensor that `calibration` belongs to. Fits the colour matrix, which takes some
-    /// milliseconds.
+    /// A reconstructor for mosaics of the sensor that `calibration` belongs to. Fits the colour matrix,
+    /// which takes some milliseconds.
     #[must_use]
     pub fn new(calibration: &Calibration) -> Self {
         let weights = weights(calibration);
         let mixes = |dark, white| Mixes::new(weights, dark, white);
         let balanced = |balance| (balance, mixes(&[balance::DARK; BANDS], &[balance::WHITE; BANDS]));
+
         Self {
             of_counts: mixes(&calibration.dark.band_means(), &calibration.white.band_means()),
             of_balanced: PixelBalance::new(calibration).map(balanced),
@@ -74,16 +78,22 @@ impl Reconstructor {
         }
     }
 
-    /// Makes `rgb` (sRGB) and `gray` (0..=255) from `mosaic`, one pixel a cell; both are resized as needed.
+    /// Makes `rgb` (sRGB) and `gray` (0..=255) from `mosaic`, one pixel a cell; resizes both as needed.
     ///
-    /// References per pixel hold for mosaics of their own size (see [`Calibration::fits`]); one of another size is made
-    /// with the means of their bands.
+    /// References per pixel apply to mosaics of their own size (see [`Calibration::fits`]); for a
+    /// mosaic of another size the means of their bands are used.
     pub fn reconstruct(&mut self, mosaic: &MosaicFrame, rgb: &mut RgbImage, gray: &mut GrayImage) {
-        let (width, height) = (mosaic.band_width(), mosaic.band_height());
-        (rgb.width, rgb.height, gray.width, gray.height) = (width, height, width, height);
+        let width = mosaic.band_width();
+        let height = mosaic.band_height();
+
+        rgb.width = width;
+        rgb.height = height;
+        gray.width = width;
+        gray.height = height;
         rgb.data.resize(3 * width * height, 0);
         gray.data.resize(width * height, 0.0);
         self.lines.colours.iter_mut().for_each(|line| line.resize(width, 0.0));
+
         let lines = &mut self.lines;
         match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
             None => picture_of_counts(&self.of_counts, mosaic, &self.encoder, lines, rgb, gray),
@@ -94,8 +104,8 @@ impl Reconstructor {
         }
     }
 
-    /// The patch of the gray picture at `area` (in cells), computing just those cells; black where `area` leaves the
-    /// picture.
+    /// The patch of the gray picture at `area` (in cells), computing just those cells; black where
+    /// `area` leaves the picture.
     #[must_use]
     pub fn gray_patch(&self, mosaic: &MosaicFrame, area: PatchArea) -> Patch {
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
@@ -118,11 +128,13 @@ impl Reconstructor {
         gray
     }
 
-    /// Fills `gray` with the gray picture within `square` (in cells), row after row; leaves what lies outside the picture as it is.
+    /// Fills `gray` with the gray picture within `square` (in cells), row after row; leaves values
+    /// outside the picture as they are.
     fn fill_gray(&self, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
         if square.x >= mosaic.band_width() {
             return;
         }
+
         match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
             None => square_of_counts(&self.of_counts, mosaic, square, gray),
             Some((balance, mixes)) => square_of_balanced(balance, mixes, mosaic, square, gray),
@@ -138,6 +150,7 @@ fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
             Encoder::SCALE * through.sum::<f32>()
         })
     };
+
     let [red, green, blue] = linear_srgb_from_bands(&calibration.bands).map(corrected);
     [red, green, blue, [255.0 / 16.0; BANDS]]
 }
@@ -179,6 +192,7 @@ fn picture_of_balanced(
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn square_of_counts(mixes: &Mixes, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
     let cells = square.side.min(mosaic.band_width() - square.x);
+
     for (y, gray) in (square.y..mosaic.band_height()).zip(gray.chunks_exact_mut(square.side)) {
         let gray = &mut gray[..cells];
         mixes.gray.apply(cell_row(mosaic, square.x, y, cells), [gray]);
@@ -190,6 +204,7 @@ fn square_of_counts(mixes: &Mixes, mosaic: &MosaicFrame, square: Square, gray: &
 fn square_of_balanced(balance: &PixelBalance, mixes: &Mixes, mosaic: &MosaicFrame, square: Square, gray: &mut [f32]) {
     let cells = square.side.min(mosaic.band_width() - square.x);
     let mut balanced = vec![0; CELL * CELL * cells];
+
     for (y, gray) in (square.y..mosaic.band_height()).zip(gray.chunks_exact_mut(square.side)) {
         let gray = &mut gray[..cells];
         balance.apply(cell_row(mosaic, square.x, y, cells), CELL * square.x, y, &mut balanced);
@@ -208,7 +223,8 @@ fn quarters(values: &[u16]) -> [&[u16]; CELL] {
     std::array::from_fn(|row| &values[row * length..][..length])
 }
 
-/// Makes one row of pixels and of gray values from four rows of samples: in integers as far as whole vectors go.
+/// Makes one row of pixels and of gray values from four rows of samples: in integers as far as whole
+/// vectors go, in floating point for the rest.
 #[inline(always)]
 fn picture_row(
     mixes: &Mixes,
@@ -227,13 +243,17 @@ fn picture_row(
     if done == gray.len() {
         return;
     }
-    let (rgb, gray) = (&mut rgb[3 * done..], &mut gray[done..]);
+
+    let rgb = &mut rgb[3 * done..];
+    let gray = &mut gray[done..];
     let [red, green, blue] = colours.each_mut().map(|line| &mut line[done..]);
     mixes.picture.apply(rows.map(|row| &row[CELL * done..]), [red, green, blue, gray]);
+
     let pixels = rgb.as_chunks_mut::<3>().0;
     for (((pixel, &mut red), &mut green), &mut blue) in pixels.iter_mut().zip(red).zip(green).zip(blue) {
         *pixel = [red, green, blue].map(|colour| encoder.at(Encoder::index(colour)));
     }
+
     clamp_gray(gray);
 }
 

@@ -8,7 +8,7 @@ use rand::{Rng, RngExt};
 use super::field::{Field, Spline, knots};
 use crate::simulation::normal::standard_normal;
 
-/// Texels between two knots of the fields that are made coarse.
+/// Texels between two knots of the fields that are made at a coarse scale.
 const CELL: usize = 8;
 
 /// The surface's shape.
@@ -18,7 +18,7 @@ pub(super) struct Cortex {
     /// Light that reaches the surface past its walls, 0..1.
     pub(super) open: Field,
     /// Share of dura and bone (1) against brain (0).
-    pub(super) rim: Field,
+    /// Closeness to a crown: 0 in a sulcus, about 1 on a crown.
     /// How far from the next sulcus, 0 in it, about 1 on a crown.
     pub(super) crown: Field,
 }
@@ -39,9 +39,11 @@ impl Cortex {
         let depth = Spline::noise(side, 64, rng);
         let fissure = Spline::new(&fissure(side, rng), side, CELL);
         let opening = Spline::new(&opening(side, rng), side, CELL);
+
         let mut lines = [(); 3].map(|()| vec![0.0; side]);
         let blank = || Field::filled(side, 0.0);
         let mut cortex = Self { height: blank(), open: blank(), rim: blank(), crown: blank() };
+
         for y in 0..side {
             for (spline, line) in [&depth, &fissure, &opening].into_iter().zip(&mut lines) {
                 spline.row_into(y, line);
@@ -83,30 +85,42 @@ fn shape_row(shape: &Shape<'_>, out: [&mut [f32]; 4]) {
     let [height, open, rim, crown] = out;
     let side = height.len();
     let [above, here, below] = shape.waves.map(|row| &row[..side]);
-    let (depth, fissure, opening) = (&shape.depth[..side], &shape.fissure[..side], &shape.opening[..side]);
-    let (open, rim, crown) = (&mut open[..side], &mut rim[..side], &mut crown[..side]);
+    let depth = &shape.depth[..side];
+    let fissure = &shape.fissure[..side];
+    let opening = &shape.opening[..side];
+    let open = &mut open[..side];
+    let rim = &mut rim[..side];
+    let crown = &mut crown[..side];
+
     let flattest = 1.2 / shape.gyrus;
     for x in 1..side - 1 {
         let across = 0.5 * (here[x + 1] - here[x - 1]);
         let down = 0.5 * (below[x] - above[x]);
+        // A wave's value over its slope is about the distance to its nearest zero, the sulcus.
         let distance = here[x].abs() / (across * across + down * down).sqrt().max(flattest);
+
         let strength = (0.75 + 0.3 * depth[x]).clamp(0.15, 1.0);
         let broad = falloff(distance / (0.2 * shape.gyrus));
         let narrow = strength * falloff((distance / 3.0).powi(2));
+
         let cleft = falloff((fissure[x] / 7.0).powi(2));
         let shoulder = falloff(fissure[x] / 30.0);
         let outside = (0.5 + opening[x] / 5.0).clamp(0.0, 1.0);
         let outside = outside * outside * (3.0 - 2.0 * outside);
+
         let brain = -strength * (7.0 * broad + 9.0 * narrow) - 26.0 * cleft - 8.0 * shoulder;
         let bone = 14.0 + 5.0 * (1.0 - falloff((opening[x] - 6.0).max(0.0) / 12.0));
         height[x] = brain + outside * (bone - brain);
+
         let lit =
             (1.0 - 0.2 * strength * broad) * (1.0 - 0.4 * narrow) * (1.0 - 0.55 * cleft) * (1.0 - 0.15 * shoulder);
         let shade = 1.0 - 0.45 * falloff(opening[x] / 9.0) * (1.0 - outside);
+
         open[x] = (lit + outside * (1.0 - lit)) * shade;
         rim[x] = outside;
         crown[x] = (1.0 - strength * broad) * (1.0 - cleft);
     }
+
     for field in [height, open, rim, crown] {
         field[0] = field[1];
         field[side - 1] = field[side - 2];
@@ -124,13 +138,16 @@ fn folds(side: usize, folding: Folding, rng: &mut impl Rng) -> Field {
     const WAVES: usize = 28;
     let mut sum = Field::filled(knots(side, CELL), 0.0);
     let preferred = PI * rng.random::<f32>();
+
     for _ in 0..WAVES {
         let free = PI * (rng.random::<f32>() - 0.5);
         let direction = preferred + free * (1.0 - folding.alignment);
+
         let length = 2.0 * folding.gyrus * (1.0 + 0.22 * standard_normal(rng) as f32).clamp(0.55, 1.8);
         let number = TAU * CELL as f32 / length;
         let phase = TAU * rng.random::<f32>();
         let (sin, cos) = direction.sin_cos();
+
         add_wave(&mut sum, [number * cos, number * sin], phase, (2.0 / WAVES as f32).sqrt());
     }
     sum
@@ -141,6 +158,7 @@ fn add_wave(field: &mut Field, number: [f32; 2], phase: f32, amplitude: f32) {
     let (turn_sin, turn_cos) = number[0].sin_cos();
     for (y, row) in field.data.chunks_exact_mut(field.side).enumerate() {
         let (mut sin, mut cos) = (phase + number[1] * y as f32).sin_cos();
+
         for value in row {
             *value += amplitude * cos;
             (sin, cos) = (sin * turn_cos + cos * turn_sin, cos * turn_cos - sin * turn_sin);
@@ -148,15 +166,17 @@ fn add_wave(field: &mut Field, number: [f32; 2], phase: f32, amplitude: f32) {
     }
 }
 
-/// Distance to the fissure's line, in texels, as knots: a line through the field that meanders.
+/// Distance to the line of the fissure, in texels, as knots. The line meanders through the field.
 fn fissure(side: usize, rng: &mut impl Rng) -> Field {
     let middle = 0.5 * side as f32;
     let direction = PI * rng.random::<f32>();
     let offset = 0.16 * side as f32 * if rng.random::<bool>() { 1.0 } else { -1.0 } * (0.5 + rng.random::<f32>());
     let phases: [f32; 3] = std::array::from_fn(|_| TAU * rng.random::<f32>());
     let (sin, cos) = direction.sin_cos();
+
     Field::from_fn(knots(side, CELL), |x, y| {
-        let (x, y) = (place(x) - middle, place(y) - middle);
+        let x = place(x) - middle;
+        let y = place(y) - middle;
         let along = (x * cos + y * sin) * TAU / side as f32;
         let meander = 26.0 * (1.3 * along + phases[0]).sin() + 11.0 * (3.1 * along + phases[1]).sin();
         (y * cos - x * sin - offset - meander - 4.0 * (7.7 * along + phases[2]).sin()).abs()
@@ -167,12 +187,15 @@ fn fissure(side: usize, rng: &mut impl Rng) -> Field {
 fn opening(side: usize, rng: &mut impl Rng) -> Field {
     let middle = 0.5 * side as f32;
     let phases: [f32; 3] = std::array::from_fn(|_| TAU * rng.random::<f32>());
+
     Field::from_fn(knots(side, CELL), |x, y| {
-        let (x, y) = (place(x) - middle, place(y) - middle);
+        let x = place(x) - middle;
+        let y = place(y) - middle;
         let angle = y.atan2(x);
         let wobble = 0.05 * (2.0 * angle + phases[0]).sin()
             + 0.03 * (3.0 * angle + phases[1]).sin()
             + 0.006 * (11.0 * angle + phases[2]).sin();
+
         x.hypot(y) - 0.41 * side as f32 * (1.0 + wobble)
     })
 }

@@ -1,14 +1,15 @@
-//! Defocus: the surface as seen through discs of confusion of rising radius, ready to be looked up per pixel.
+//! Defocus: the surface as seen through discs of confusion of rising radius, ready for look-up per
+//! pixel.
 
 use multiversion::multiversion;
 
 use super::spectra::ENDMEMBERS;
 
-/// What one texel is made of: abundances of the endmembers, in units of 1/8191.
+/// The composition of one texel: abundances of the endmembers, in units of 1/8191.
 pub(super) type Texel = [u16; ENDMEMBERS];
 
-/// Radius of each level's disc in texels, and the step at which that level is kept: a wide disc leaves no detail that a
-/// coarser grid would lose.
+/// Radius of each level's disc in texels, and the step at which that level is kept: a wide disc leaves
+/// no detail that a coarser grid would lose.
 const LEVELS: [(f32, usize); 9] =
     [(0.0, 1), (1.0, 1), (2.0, 1), (3.0, 1), (4.5, 2), (6.5, 2), (9.0, 4), (12.5, 4), (17.0, 4)];
 
@@ -38,43 +39,48 @@ impl Stack {
             .iter()
             .map(|&(radius, step)| {
                 let coarse = shrink(&sharp, side, step);
-                // Averaging boxes of n texels blurs by a second moment of (n^2 - 1) / 12, and giving each coarse texel
-                // the part of the disc that it covers, by n^2 / 12. A disc has r^2 / 4.
+                // Averaging boxes of n texels blurs by a second moment of (n^2 - 1) / 12, and giving each
+                // coarse texel the part of the disc that it covers, by n^2 / 12. A disc has r^2 / 4.
                 let boxes = (2 * step * step - 1) as f32 / 3.0;
                 let rest = (radius * radius - boxes).sqrt() / step as f32;
                 Level::new(radius, step, side / step, blur(&coarse, side / step, &Disc::new(rest)))
             })
             .collect();
+
         levels.insert(0, Level::new(0.0, 1, side, sharp));
         for index in 0..levels.len() - 1 {
             levels[index].per_square = 1.0 / (levels[index + 1].square - levels[index].square);
         }
+
         let last = (LEVELS[LEVELS.len() - 1].0.powi(2) / SQUARE_STEP) as usize;
         let below = (0..=last).map(|step| level_below(step as f32 * SQUARE_STEP)).collect();
         Self { levels, below }
     }
 
-    /// The surface at a place (in texels), through a disc of the given squared radius: between the two nearest levels
-    /// such that the second moment is exact.
+    /// The surface at a place (in texels), through a disc of the given squared radius: interpolated
+    /// between the two nearest levels such that the second moment is exact.
     #[inline(always)]
     pub(super) fn at(&self, u: f32, v: f32, square: f32) -> [f32; ENDMEMBERS] {
         let index = ((square * (1.0 / SQUARE_STEP)) as usize).min(self.below.len() - 1);
         let below = usize::from(self.below[index]);
         let low = &self.levels[below];
         let part = (square - low.square) * low.per_square;
+
         let sharper = low.at(u, v);
         if part <= 0.0 {
             return sharper;
         }
+
         let softer = self.levels[below + 1].at(u, v);
         let mut between = sharper;
         for (value, softer) in between.iter_mut().zip(softer) {
             *value += part * (softer - *value);
         }
+
         between
     }
 
-    /// Bytes held.
+    /// Memory held, in bytes.
     #[cfg(test)]
     pub(super) fn bytes(&self) -> usize {
         self.levels.iter().map(|level| size_of_val(&level.texels[..])).sum()
@@ -91,24 +97,29 @@ impl Level {
         Self { side, scale: 1.0 / step as f32, square: radius * radius, per_square: 0.0, texels }
     }
 
-    /// Bilinear look-up; the border's value beyond it.
+    /// Bilinear look-up; outside the surface, the border's value.
     #[inline(always)]
     fn at(&self, u: f32, v: f32) -> [f32; ENDMEMBERS] {
         let last = (self.side - 1) as f32 - 0.001;
         let x = ((u + 0.5) * self.scale - 0.5).clamp(0.0, last);
         let y = ((v + 0.5) * self.scale - 0.5).clamp(0.0, last);
-        let (left, top) = (x as u32, y as u32);
-        let (x, y) = (x - left as f32, y - top as f32);
+        let left = x as u32;
+        let top = y as u32;
+        let x = x - left as f32;
+        let y = y - top as f32;
+
         let start = top as usize * self.side + left as usize;
         let upper = &self.texels[start..][..2];
         let lower = &self.texels[start + self.side..][..2];
         let weights = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
+
         let mut sum = [0.0; ENDMEMBERS];
         for (texel, weight) in [upper[0], upper[1], lower[0], lower[1]].into_iter().zip(weights) {
             for (sum, value) in sum.iter_mut().zip(texel) {
                 *sum += weight * f32::from(value);
             }
         }
+
         sum
     }
 }
@@ -117,6 +128,7 @@ impl Level {
 fn shrink(sharp: &[Texel], side: usize, step: usize) -> Vec<[f32; ENDMEMBERS]> {
     let small = side / step;
     let mut out = vec![[0.0; ENDMEMBERS]; small * small];
+
     for (y, row) in sharp.chunks_exact(side).enumerate().take(small * step) {
         let out = &mut out[y / step * small..][..small];
         for (out, texels) in out.iter_mut().zip(row.chunks_exact(step)) {
@@ -125,9 +137,11 @@ fn shrink(sharp: &[Texel], side: usize, step: usize) -> Vec<[f32; ENDMEMBERS]> {
             }
         }
     }
+
     for sum in out.iter_mut().flatten() {
         *sum /= (step * step) as f32;
     }
+
     out
 }
 
@@ -139,32 +153,39 @@ struct Disc {
 }
 
 impl Disc {
-    /// The disc of `radius` texels; a texel's weight is the part of it that the disc covers, from 16 x 16 points.
+    /// The disc of `radius` texels. A texel's weight is the part of it that the disc covers, estimated
+    /// from 16 x 16 points.
     fn new(radius: f32) -> Self {
         const POINTS: usize = 16;
         let reach = (radius - 0.5).ceil().max(0.0) as usize;
         let width = 2 * reach + 1;
+
         let inside = |index: usize| {
             let corner =
                 |i: usize, point: usize| (i as f32 - reach as f32) - 0.5 + (point as f32 + 0.5) / POINTS as f32;
             let points = (0..POINTS * POINTS).filter(|point| {
-                let (x, y) = (corner(index % width, point % POINTS), corner(index / width, point / POINTS));
+                let x = corner(index % width, point % POINTS);
+                let y = corner(index / width, point / POINTS);
                 x * x + y * y <= radius * radius
             });
             points.count() as f32
         };
+
         let mut weights: Vec<f32> = (0..width * width).map(inside).collect();
         let sum: f32 = weights.iter().sum();
         for weight in &mut weights {
             *weight /= sum;
         }
+
         Self { reach, weights }
     }
 }
 
-/// Convolves with a disc; beyond the border the border's texels go on.
+/// Convolves with a disc; outside, the border's texels are repeated.
 fn blur(sharp: &[[f32; ENDMEMBERS]], side: usize, disc: &Disc) -> Vec<Texel> {
-    let (reach, width) = (disc.reach, 2 * disc.reach + 1);
+    let reach = disc.reach;
+    let width = 2 * disc.reach + 1;
+
     let padded_side = side + 2 * reach;
     let mut padded = vec![0.0; padded_side * padded_side * ENDMEMBERS];
     for (y, row) in padded.chunks_exact_mut(padded_side * ENDMEMBERS).enumerate() {
@@ -173,9 +194,12 @@ fn blur(sharp: &[[f32; ENDMEMBERS]], side: usize, disc: &Disc) -> Vec<Texel> {
             texel.copy_from_slice(&source[x.saturating_sub(reach).min(side - 1)]);
         }
     }
+
     let mut sum = vec![0.0; side * ENDMEMBERS];
     let mut out = Vec::with_capacity(side * side);
+
     for y in 0..side {
+        // Half a unit to begin with, so that the conversion to whole numbers below rounds.
         sum.fill(0.5);
         for (row, weights) in disc.weights.chunks_exact(width).enumerate() {
             let row = &padded[(y + row) * padded_side * ENDMEMBERS..][..padded_side * ENDMEMBERS];
@@ -183,6 +207,7 @@ fn blur(sharp: &[[f32; ENDMEMBERS]], side: usize, disc: &Disc) -> Vec<Texel> {
         }
         out.extend(sum.as_chunks::<ENDMEMBERS>().0.iter().map(|sum| sum.map(|value| value as u16)));
     }
+
     out
 }
 

@@ -3,7 +3,8 @@
 use multiversion::multiversion;
 use rand::{Rng, RngExt};
 
-/// Side of the phantom's square surface in texels; one texel is about one pixel of a band at the usual working distance.
+/// Side of the phantom's square surface in texels; one texel is about one pixel of a band at the usual
+/// working distance.
 pub const SIDE: usize = 1024;
 
 /// Value of a texel's abundance that stands for 1: headroom for mirrored lamps of 8 times white.
@@ -33,14 +34,15 @@ impl Field {
         &self.data[y * self.side..][..self.side]
     }
 
-    /// Value nearest to a place; the border's beyond it.
+    /// The value nearest to a place; outside the field, that of the border.
     pub(super) fn near(&self, x: f32, y: f32) -> f32 {
         let last = (self.side - 1) as f32;
         self.data[y.clamp(0.0, last) as usize * self.side + x.clamp(0.0, last) as usize]
     }
 }
 
-/// A smooth field given by coarse knots: a cubic B-spline with a knot every `cell` places, made row by row as needed.
+/// A smooth field given by coarse knots: a cubic B-spline with a knot every `cell` places, made row by
+/// row as needed.
 pub(super) struct Spline {
     side: usize,
     /// The knots' rows, already at full width.
@@ -60,8 +62,10 @@ impl Spline {
     /// The spline over `side` places through a field of [`knots`]`(side, cell)` knots a side.
     pub(super) fn new(coarse: &Field, side: usize, cell: usize) -> Self {
         debug_assert_eq!(coarse.side, knots(side, cell));
+
         let weights: Vec<[f32; 4]> = (0..cell).map(|phase| spline(phase as f32 / cell as f32)).collect();
         let mut wide = vec![0.0; coarse.side * side];
+
         for (knots, wide) in coarse.data.chunks_exact(coarse.side).zip(wide.chunks_exact_mut(side)) {
             for (taps, wide) in knots.windows(4).zip(wide.chunks_mut(cell)) {
                 for (out, weights) in wide.iter_mut().zip(&weights) {
@@ -69,6 +73,7 @@ impl Spline {
                 }
             }
         }
+
         Self { side, wide, weights }
     }
 
@@ -111,6 +116,7 @@ fn blend(out: &mut [f32], rows: &[f32], weights: [f32; 4]) {
     let (first, rest) = rows.split_at(side);
     let (second, rest) = rest.split_at(side);
     let (third, fourth) = rest.split_at(side);
+
     let taps = first.iter().zip(second).zip(third).zip(fourth);
     for (out, (((a, b), c), d)) in out.iter_mut().zip(taps) {
         *out = a * weights[0] + b * weights[1] + c * weights[2] + d * weights[3];

@@ -8,10 +8,10 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::simulation::path::{Habit, Path};
 
-/// Steps a second at which the hand's walks advance.
+/// Rate of the hand's walks, steps a second.
 const RATE: f64 = 100.0;
 
-/// Where the camera is.
+/// The camera's place and direction.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose {
     /// Place on the surface that the camera points at, in texels from the scene's middle.
@@ -24,7 +24,7 @@ pub struct Pose {
     pub focus: f64,
 }
 
-/// Place (twice), roll, tilt (twice), focus.
+/// Habits of the place (twice), roll, tilt (twice) and focus.
 const HABITS: [Habit; 6] = [
     Habit { range: (-215.0, 215.0), speed: 16.0, memory: 1.6 },
     Habit { range: (-215.0, 215.0), speed: 16.0, memory: 1.6 },
@@ -34,7 +34,7 @@ const HABITS: [Habit; 6] = [
     Habit { range: (0.03, 0.97), speed: 0.16, memory: 1.5 },
 ];
 
-/// How fast a hand moves, against one that inspects calmly.
+/// Speed of a hand, relative to one that inspects calmly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Haste {
     /// Factor of the speeds along the surface, of turning and of leaning.
@@ -52,7 +52,7 @@ impl Default for Haste {
 /// Physiological tremor: frequency, 1/s, and amplitude, texels. A hand trembles at 8 to 12 Hz.
 const TREMORS: [(f64, f64); 3] = [(8.3, 0.35), (9.7, 0.3), (11.6, 0.2)];
 
-/// A hand's path: a function of its seed and of time alone, as long as time does not run backwards.
+/// A hand's path. It depends on its seed and on time alone, as long as time does not run backwards.
 #[derive(Debug, Clone)]
 pub struct Hand {
     path: Path<6>,
@@ -66,19 +66,21 @@ impl Hand {
         Self::moving(seed, Haste::default())
     }
 
-    /// A hand that moves with another haste.
+    /// The hand of a seed that moves with `haste`.
     #[must_use]
     pub fn moving(seed: u64, haste: Haste) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(4);
         let phases = [(); 2].map(|()| [(); 3].map(|()| TAU * rng.random::<f64>()));
+
         let mut habits = HABITS;
         let factors = [haste.sideways; 5].into_iter().chain([haste.focus]);
         habits.iter_mut().zip(factors).for_each(|(habit, factor)| habit.speed *= factor);
+
         Self { path: Path::new(seed, RATE, habits), phases }
     }
 
-    /// Where the camera is at `time` after the start; asked for in rising order.
+    /// The camera's pose at `time` after the start; times must be asked for in rising order.
     pub fn pose_at(&mut self, time: Duration) -> Pose {
         let [x, y, roll, lean_x, lean_y, focus] = self.path.at(time);
         let [shake_x, shake_y] = self.phases.map(|phases| tremor(phases, time.as_secs_f64()));

@@ -1,4 +1,5 @@
-//! From abundances on the grid of mosaic cells to expected counts of each sample, at its own place within the cell.
+//! From abundances on the grid of mosaic cells to expected counts of each sample, at its own place
+//! within the cell.
 
 use multiversion::multiversion;
 
@@ -32,22 +33,25 @@ impl Bands {
         self.0.map(|band| band.iter().zip(light).map(|(response, light)| response * light).sum())
     }
 
-    /// Expected counts of sensor row `row` (0..4) of a cell row, for the cells in `columns`, into `out` (4 a cell).
-    /// `lines` are the cell rows above, here and below.
+    /// Expected counts of sensor row `row` (0..4) of a cell row, for the cells in `columns`, into `out`
+    /// (4 a cell). `lines` are the cell rows above, here and below.
     pub(super) fn expose(&self, out: &mut [f32], lines: [&Line; 3], row: usize, columns: (usize, usize), gain: f32) {
         let (vertical, neighbour) = shift(row);
         let next = if neighbour < 0 { lines[0] } else { lines[2] };
+
         let weights: [[f32; ENDMEMBERS]; CELL] =
             std::array::from_fn(|column| self.0[CELL * row + column].map(|response| gain * response));
+
         let mut between = [[0.0; WIDTH + 2]; ENDMEMBERS];
         for ((between, here), next) in between.iter_mut().zip(lines[1]).zip(next) {
             lerp(between, here, next, vertical);
         }
+
         mix(&mut out[..(columns.1 - columns.0) * CELL], &between, columns.0, &weights);
     }
 }
 
-/// How far sample `index` of a cell lies off the cell's centre, in cells, and on which side.
+/// Distance of sample `index` of a cell from the cell's centre, in cells, and on which side.
 fn shift(index: usize) -> (f32, i32) {
     [(0.375, -1), (0.125, -1), (0.125, 1), (0.375, 1)][index]
 }
@@ -65,10 +69,14 @@ fn mix(out: &mut [f32], planes: &[[f32; WIDTH + 2]; ENDMEMBERS], first: usize, w
     let cells = out.len() / CELL;
     // Planes have one column of darkness on the left.
     let [left, here, right] = [0, 1, 2].map(|shift| planes.each_ref().map(|plane| &plane[first + shift..][..cells]));
+
     for (x, out) in out.as_chunks_mut::<CELL>().0.iter_mut().enumerate() {
         let mut counts = [0.0; CELL];
         for k in 0..ENDMEMBERS {
-            let (left, here, right) = (left[k][x], here[k][x], right[k][x]);
+            let left = left[k][x];
+            let here = here[k][x];
+            let right = right[k][x];
+
             counts[0] += weights[0][k] * (here + 0.375 * (left - here));
             counts[1] += weights[1][k] * (here + 0.125 * (left - here));
             counts[2] += weights[2][k] * (here + 0.125 * (right - here));

@@ -1,4 +1,5 @@
-//! A brain's surface in a craniotomy, generated from a seed: what it is made of at each texel, and its relief.
+//! A brain's surface in a craniotomy, generated from a seed: the tissues at each texel, and the
+//! relief.
 
 use multiversion::multiversion;
 use rand::{Rng, RngExt, SeedableRng};
@@ -20,7 +21,7 @@ pub struct Scene {
     pub(super) relief: Field,
 }
 
-/// What makes one brain look other than the next.
+/// The traits in which brains differ.
 #[derive(Debug, Clone, Copy)]
 struct Character {
     folding: Folding,
@@ -36,14 +37,17 @@ struct Character {
 impl Character {
     fn draw(rng: &mut impl Rng) -> Self {
         let mut between = |low: f32, high: f32| low + (high - low) * rng.random::<f32>();
+
         let folding = Folding { gyrus: between(62.0, 118.0), alignment: between(0.0, 0.55) };
         let density = Density {
             arteries: between(5.0, 11.0) as usize,
             veins: between(3.0, 7.0) as usize,
             fine: between(450.0, 1000.0) as usize,
         };
+
         let angle = between(0.0, std::f32::consts::TAU);
         let tilt = between(0.1, 0.3);
+
         Self {
             folding,
             density,
@@ -58,33 +62,41 @@ impl Character {
 }
 
 impl Scene {
-    /// The scene of a seed: the same seed gives the same scene, another one another brain.
+    /// The scene of a seed. The same seed gives the same scene; another seed gives another brain.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let character = Character::draw(&mut rng);
+
         let mut cortex = Cortex::fold(SIDE, character.folding, &mut rng);
         let vessels = Vessels::grow(SIDE, character.density, &cortex.crown, &mut rng);
+
+        // The relief that focus follows is taken before roughening: fine bumps only catch the light.
         let relief = Field::from_fn(SIDE / 2, |x, y| cortex.height.data[2 * y * SIDE + 2 * x]);
         roughen(&mut cortex.height, &vessels.bulge, 0.3 * character.roughness, &mut rng);
         Self { texels: paint(&cortex, &vessels, &character, &mut rng), relief }
     }
 
-    /// The middle of the scene as the gray picture a perfect lens would give: `width` x `height` texels (at most
-    /// [`SIDE`] each; more is cut), linear in light, on the 0..255 scale, exposed so that 1 pixel in 50 is above 200.
+    /// The middle of the scene as the gray picture a perfect lens would give: `width` x `height` texels
+    /// (at most [`SIDE`] each; more is cut), linear in light, on the 0..255 scale, exposed so that 1
+    /// pixel in 50 is above 200.
     #[must_use]
     pub fn sharp_gray(&self, width: usize, height: usize) -> GrayImage {
         let weights = Bands::new(&Calibration::default()).gray();
         let mut picture = self.middle(width, height, |texel| mix(texel, weights));
+
         let scale = 200.0 / percentile_98(&picture.data).max(1e-6);
         picture.data.iter_mut().for_each(|value| *value = (*value * scale).min(255.0));
         picture
     }
 
-    /// The middle of the scene, each texel through `value`.
+    /// The middle of the scene, with `value` applied to each texel.
     fn middle(&self, width: usize, height: usize, value: impl Fn(Texel) -> f32) -> GrayImage {
-        let (width, height) = (width.min(SIDE), height.min(SIDE));
-        let (left, top) = ((SIDE - width) / 2, (SIDE - height) / 2);
+        let width = width.min(SIDE);
+        let height = height.min(SIDE);
+        let left = (SIDE - width) / 2;
+        let top = (SIDE - height) / 2;
+
         let rows = self.texels.chunks_exact(SIDE).skip(top).take(height);
         let data = rows.flat_map(|row| row[left..left + width].iter().map(|&texel| value(texel))).collect();
         GrayImage { width, height, data }
@@ -95,6 +107,7 @@ impl Scene {
 fn roughen(surface: &mut Field, bulge: &Field, share: f32, rng: &mut impl Rng) {
     let roughness = Spline::noise(SIDE, 7, rng);
     let mut rough = vec![0.0; SIDE];
+
     for (y, row) in surface.data.chunks_exact_mut(SIDE).enumerate() {
         roughness.row_into(y, &mut rough);
         for ((height, bulge), rough) in row.iter_mut().zip(bulge.row(y)).zip(&rough) {
@@ -108,10 +121,12 @@ fn paint(cortex: &Cortex, vessels: &Vessels, character: &Character, rng: &mut im
     let noises = [90, 40, 17, 4].map(|cell| Spline::noise(SIDE, cell, rng));
     let mut lines = [(); 4].map(|()| vec![0.0; SIDE]);
     let mut texels = vec![Texel::default(); SIDE * SIDE];
+
     for (y, out) in texels.chunks_exact_mut(SIDE).enumerate() {
         for (noise, line) in noises.iter().zip(&mut lines) {
             noise.row_into(y, line);
         }
+
         let rows = Rows {
             surface: [y.saturating_sub(1), y, (y + 1).min(SIDE - 1)].map(|y| cortex.height.row(y)),
             open: cortex.open.row(y),
@@ -123,10 +138,11 @@ fn paint(cortex: &Cortex, vessels: &Vessels, character: &Character, rng: &mut im
         };
         paint_row(out, &rows, character);
     }
+
     texels
 }
 
-/// One row of everything a texel's look follows from.
+/// One row of everything that a texel's look depends on.
 struct Rows<'a> {
     surface: [&'a [f32]; 3],
     open: &'a [f32],
@@ -143,25 +159,33 @@ struct Rows<'a> {
 fn paint_row(out: &mut [Texel], rows: &Rows<'_>, character: &Character) {
     let side = out.len();
     let [above, here, below] = rows.surface.map(|row| &row[..side]);
-    let (open, rim, crown) = (&rows.open[..side], &rows.rim[..side], &rows.crown[..side]);
-    let (arteries, veins) = (&rows.arteries[..side], &rows.veins[..side]);
+    let open = &rows.open[..side];
+    let rim = &rows.rim[..side];
+    let crown = &rows.crown[..side];
+    let arteries = &rows.arteries[..side];
+    let veins = &rows.veins[..side];
     let [tint, patches, coarse, fine] = rows.noises.map(|row| &row[..side]);
+
     for x in 1..side - 1 {
         let slope = [0.5 * (here[x + 1] - here[x - 1]), 0.5 * (below[x] - above[x])];
         let steepness = slope[0] * slope[0] + slope[1] * slope[1];
         let light = open[x] * (0.35 + 0.65 / (1.0 + steepness).sqrt());
+
         let mottling = character.mottling * (0.05 * coarse[x] + 0.045 * fine[x] + 0.035 * patches[x]);
         let brain = (character.blood * (1.9 - 0.95 * crown[x]) + mottling).clamp(0.02, 0.9);
         let dura = (0.06 + 0.5 * mottling).clamp(0.0, 0.5);
         let blood = brain + rim[x] * (dura - brain);
         let saturation = (character.saturation + 0.05 * tint[x]).clamp(0.3, 0.97);
-        let (artery, vein) = (arteries[x] * (1.0 - 0.7 * rim[x]), veins[x] * (1.0 - 0.7 * rim[x]));
+        let artery = arteries[x] * (1.0 - 0.7 * rim[x]);
+        let vein = veins[x] * (1.0 - 0.7 * rim[x]);
         let tissue = (1.0 - artery) * (1.0 - vein);
+
         let toward = [slope[0] - character.lamp[0], slope[1] - character.lamp[1]];
         let miss = toward[0] * toward[0] + toward[1] * toward[1];
         let wet = character.wetness * (0.4 + 0.55 * patches[x]).clamp(0.0, 1.6) * (1.0 - 0.9 * rim[x]) * open[x];
         let sharp = 1.0 / (1.0 + 45.0 * miss);
         let sheen = 1.0 / (1.0 + 5.0 * miss);
+
         let mut texel = [0.0; ENDMEMBERS];
         // Light that bounces between the walls of a sulcus takes on the colour of blood.
         let direct = light * open[x];
@@ -170,8 +194,10 @@ fn paint_row(out: &mut [Texel], rows: &Rows<'_>, character: &Character) {
             light * (tissue * blood * saturation + artery * (1.0 - vein)) + 0.7 * (light - direct) * tissue;
         texel[VENOUS] = light * (tissue * blood * (1.0 - saturation) + vein);
         texel[LAMP] = wet * (1.7 * sharp * sharp * sharp * sharp + 0.03 * sheen * sheen);
+
         out[x] = texel.map(|value| (value * UNIT) as i32 as u16);
     }
+
     out[0] = out[1];
     out[side - 1] = out[side - 2];
 }

@@ -1,4 +1,5 @@
-//! The sensor that the phantom is seen with: shot noise, read noise, unequal pixels, saturation, and auto-exposure.
+//! The sensor of the phantom's camera: shot noise, read noise, unequal pixels, saturation, and
+//! auto-exposure.
 
 use multiversion::multiversion;
 use rand::{Rng, RngExt, SeedableRng};
@@ -22,7 +23,7 @@ const TABLE: usize = 1 << 16;
 pub(super) struct Sensor {
     /// Normal deviates.
     normal: Vec<f32>,
-    /// The same as counts without light.
+    /// The counts of these deviates without light.
     dark: Vec<u16>,
     /// Where each row's fixed pattern starts among the deviates.
     pattern: Vec<u32>,
@@ -35,8 +36,10 @@ impl Sensor {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(2);
         let normal: Vec<f32> = (0..TABLE + width).map(|_| standard_normal(&mut rng) as f32).collect();
+
         let mut dark = vec![0; normal.len()];
         develop(&mut dark, &vec![0.0; normal.len()], &normal, &normal);
+
         let pattern = (0..height).map(|_| rng.random_range(0..TABLE as u32)).collect();
         Self { normal, dark, pattern, rng }
     }
@@ -55,6 +58,7 @@ impl Sensor {
     pub(super) fn read_row(&self, out: &mut [u16], y: usize, left: usize, expected: &[f32], noise: u32) {
         let noise = noise as usize;
         out.copy_from_slice(&self.dark[noise..noise + out.len()]);
+
         let span = left..left + expected.len();
         let pattern = &self.normal[self.pattern[y] as usize..][span.clone()];
         develop(&mut out[span.clone()], expected, pattern, &self.normal[noise..][span]);
@@ -65,13 +69,15 @@ fn noise(rows: usize, rng: &mut impl Rng) -> Vec<u32> {
     (0..rows).map(|_| rng.random_range(0..TABLE as u32)).collect()
 }
 
-/// Turns expected counts into noisy ones: in electrons, variance = signal + read noise squared (photon transfer).
+/// Turns expected counts into noisy ones: in electrons, variance = signal + read noise squared (photon
+/// transfer).
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn develop(out: &mut [u16], expected: &[f32], pattern: &[f32], noise: &[f32]) {
     const COUNTS_PER_ELECTRON: f32 = FULL_SCALE / FULL_WELL;
     const READ_VARIANCE: f32 = READ_NOISE * READ_NOISE * COUNTS_PER_ELECTRON * COUNTS_PER_ELECTRON;
     // Adding 2^23 leaves the nearest integer in an f32's lowest bits: a rounding that vectorises.
     const ROUND: f32 = 8_388_608.0;
+
     let samples = out.iter_mut().zip(expected).zip(pattern.iter().zip(noise));
     for ((out, &expected), (&pattern, &noise)) in samples {
         let signal = expected * (1.0 + UNEVENNESS * pattern);
@@ -93,7 +99,7 @@ const BRIGHT: f32 = 0.8 * FULL_SCALE;
 const BRIGHT_SHARE: usize = 40;
 /// Part of the way, in stops, that one frame goes.
 const SPEED: f32 = 0.15;
-/// Least and greatest gain: an exposure time cannot be changed without limit.
+/// Least and greatest gain: a camera cannot change its exposure time without limit either.
 const GAINS: (f32, f32) = (0.1, 10.0);
 
 impl AutoExposure {
@@ -101,22 +107,23 @@ impl AutoExposure {
         Self { gain: 1.5 }
     }
 
-    /// The gain at which it comes to rest over a scene that would give `counts` at gain 1.
+    /// The gain at which auto-exposure settles over a scene that would give `counts` at gain 1.
     pub(super) fn settled(mut counts: Vec<f32>) -> f32 {
         if counts.is_empty() {
             return Self::new().gain;
         }
+
         let index = counts.len() - 1 - counts.len() / BRIGHT_SHARE;
         let (_, bright, _) = counts.select_nth_unstable_by(index, f32::total_cmp);
         (BRIGHT / bright.max(1e-3)).clamp(GAINS.0, GAINS.1)
     }
 
-    /// Light gathered, in units of what brings a white target to full scale.
+    /// Light gathered, relative to the light that brings a white target to full scale.
     pub(super) const fn gain(&self) -> f32 {
         self.gain
     }
 
-    /// Learns from some of an exposure's samples.
+    /// Moves the gain towards what some of an exposure's samples call for.
     pub(super) fn adjust(&mut self, samples: impl Iterator<Item = u16>) {
         let mut histogram = [0_usize; 1024];
         let mut total = 0;
@@ -124,12 +131,14 @@ impl AutoExposure {
             histogram[usize::from(sample.min(1023))] += 1;
             total += 1;
         }
+
         let mut left = total / BRIGHT_SHARE;
         let bright = histogram.iter().rposition(|&count| {
             let here = count > left;
             left = left.saturating_sub(count);
             here
         });
+
         let Some(bright) = bright else { return };
         let ratio = (BRIGHT / (bright as f32).max(1.0)).clamp(0.25, 4.0);
         self.gain = (self.gain * ratio.powf(SPEED)).clamp(GAINS.0, GAINS.1);

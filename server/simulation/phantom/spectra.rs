@@ -1,9 +1,10 @@
 //! Spectra of what the phantom is made of: tissue as scatterer and haemoglobin, seen through the sensor's bands.
 //!
-//! Extinction: S. Prahl's compilation, "Tabulated molar extinction coefficient for hemoglobin in water", Oregon Medical
-//! Laser Center. Scattering and the blood fraction's meaning: S. L. Jacques, "Optical properties of biological tissues: a
-//! review", Phys. Med. Biol. 58 (2013) R37, doi 10.1088/0031-9155/58/11/R37. Diffuse reflectance: S. T. Flock et al.,
-//! "Monte Carlo modeling of light propagation in highly scattering tissues", IEEE Trans. Biomed. Eng. 36 (1989) 1162.
+//! Extinction: S. Prahl's compilation, "Tabulated molar extinction coefficient for hemoglobin in
+//! water", Oregon Medical Laser Center. Scattering and the blood fraction's meaning: S. L. Jacques,
+//! "Optical properties of biological tissues: a review", Phys. Med. Biol. 58 (2013) R37, doi
+//! 10.1088/0031-9155/58/11/R37. Diffuse reflectance: S. T. Flock et al., "Monte Carlo modeling of
+//! light propagation in highly scattering tissues", IEEE Trans. Biomed. Eng. 36 (1989) 1162.
 
 /// Number of endmembers that the phantom's surface is mixed of.
 pub const ENDMEMBERS: usize = 4;
@@ -21,7 +22,8 @@ pub const LAMP: usize = 3;
 const FIRST_NM: f64 = 440.0;
 /// Step of [`EXTINCTION`], nm.
 const STEP_NM: f64 = 4.0;
-/// Molar extinction of oxygenated and deoxygenated haemoglobin, 1/(cm mol/l), from 440 nm in steps of 4 nm (Prahl).
+/// Molar extinction of oxygenated and deoxygenated haemoglobin, 1/(cm mol/l), from 440 nm in steps of
+/// 4 nm (Prahl).
 const EXTINCTION: [[f64; 2]; 46] = [
     [102_580.0, 413_280.0],
     [81_444.0, 282_724.0],
@@ -89,33 +91,40 @@ const TISSUES: [Tissue; 3] = [
 
 /// Diffuse reflectance, 0..1, of `tissue` at `nanometres` (440..=620; the ends hold beyond).
 ///
-/// Scattering is that of brain, 24.2 (lambda / 500 nm)^-1.611 per cm (Jacques 2013, table 2); absorption is
-/// 2.303 * extinction * blood * 150 g/l / 64 500 g/mol (Prahl); the reflectance of the half-space follows from the
-/// reduced albedo by diffusion theory at a matched boundary, as wet tissue nearly is (Flock 1989).
+/// Scattering is that of brain, 24.2 (lambda / 500 nm)^-1.611 per cm (Jacques 2013, table 2);
+/// absorption is 2.303 * extinction * blood * 150 g/l / 64 500 g/mol (Prahl); the reflectance of the
+/// half-space follows from the reduced albedo by diffusion theory at a matched boundary, as wet tissue
+/// nearly is (Flock 1989).
 #[must_use]
 pub fn reflectance(tissue: Tissue, nanometres: f64) -> f64 {
     let [oxygenated, deoxygenated] = extinction(nanometres);
     let molar = tissue.saturation * oxygenated + (1.0 - tissue.saturation) * deoxygenated;
     let absorption = std::f64::consts::LN_10 * molar * tissue.blood * 150.0 / 64_500.0;
+
     let scattering = 24.2 * (nanometres / 500.0).powf(-1.611);
     let albedo = scattering / (scattering + absorption);
     albedo / (1.0 + 2.0 * (1.0 - albedo) + (5.0 / 3.0) * (3.0 * (1.0 - albedo)).sqrt())
 }
 
-/// Reflectance of each endmember in a band of Gaussian response around `centre` nm, `fwhm` nm wide at half height.
+/// Reflectance of each endmember in a band of Gaussian response around `centre` nm, `fwhm` nm wide at
+/// half height.
 #[must_use]
 pub fn endmembers_in_band(centre: f64, fwhm: f64) -> [f64; ENDMEMBERS] {
     let sigma = fwhm / (8.0 * std::f64::consts::LN_2).sqrt();
     let mut sum = [0.0; ENDMEMBERS];
     let mut weights = 0.0;
+
     for step in -30..=30 {
         let offset = f64::from(step) / 10.0;
         let weight = (-0.5 * offset * offset).exp();
         weights += weight;
+
         for (sum, tissue) in sum.iter_mut().zip(TISSUES) {
             *sum += weight * reflectance(tissue, centre + offset * sigma);
         }
     }
+
+    // The mirrored lamp is white: it reflects all light in every band.
     sum[LAMP] = weights;
     sum.map(|value| value / weights)
 }
@@ -126,7 +135,9 @@ fn extinction(nanometres: f64) -> [f64; 2] {
     let place = ((nanometres - FIRST_NM) / STEP_NM).clamp(0.0, last);
     let index = (place as usize).min(EXTINCTION.len() - 2);
     let part = place - index as f64;
-    let (low, high) = (EXTINCTION[index], EXTINCTION[index + 1]);
+
+    let low = EXTINCTION[index];
+    let high = EXTINCTION[index + 1];
     [low[0] + part * (high[0] - low[0]), low[1] + part * (high[1] - low[1])]
 }
 

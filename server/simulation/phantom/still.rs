@@ -1,5 +1,5 @@
-//! Poses held still: a hand-held trajectory over the phantom stopped at each of its poses, for as many exposures as are
-//! wanted, as an arm that replays a trajectory does.
+//! Poses held still: a hand-held trajectory over the phantom, stopped at each of its poses for as many
+//! exposures as are wanted, as an arm that replays a trajectory does.
 
 use std::time::Duration;
 
@@ -12,13 +12,13 @@ use super::{Hand, Haste, Phantom, Pose};
 use crate::imaging::{PATCH_SIDE, PatchArea, Square, WIDER};
 use crate::lens::FocalPower;
 
-/// Seed of the first brain that recorded scans are made over: none that training or its benchmark sees.
+/// Seed of the first brain for recorded scans. Training and its benchmark use none of these brains.
 const FIRST_BRAIN: u64 = 3 << 32;
 /// Streams of the random source from here on belong to exposures of still poses.
 const FIRST_STREAM: u64 = 1 << 32;
 /// Time between two poses: 25 a second.
 pub const INTERVAL: Duration = Duration::from_millis(40);
-/// Cells between two that the exposure is metered at, in both directions.
+/// Cells between two points of metering, in both directions.
 const METERED: usize = 7;
 
 /// A phantom and the poses of a hand over it, evenly spaced in time.
@@ -29,18 +29,20 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Where the hand of `seed`, moving with `haste`, is at `poses` moments [`INTERVAL`] apart. Takes about a fifth of a
-    /// second.
+    /// The poses of the hand of `seed`, moving with `haste`, at `poses` moments [`INTERVAL`] apart.
+    /// Takes about a fifth of a second.
     #[must_use]
     pub fn new(seed: u64, poses: usize, haste: Haste) -> Self {
         let brain = FIRST_BRAIN.wrapping_add(seed);
         let mut hand = Hand::moving(brain, haste);
         let mut time = Duration::ZERO;
+
         let poses = (0..poses).map(|_| {
             let pose = hand.pose_at(time);
             time += INTERVAL;
             pose
         });
+
         Self { poses: poses.collect(), phantom: Phantom::new(brain), seed: brain }
     }
 
@@ -66,8 +68,8 @@ impl Trajectory {
     }
 }
 
-/// One pose held still. The light gathered is what auto-exposure comes to rest at there, and the same in all exposures;
-/// each has noise of its own, which depends on its number alone.
+/// One pose held still. All its exposures gather the same light, that at which auto-exposure settles
+/// there; each has noise of its own, which depends on its number alone.
 pub struct Still<'a> {
     phantom: &'a Phantom,
     pose: &'a Pose,
@@ -84,11 +86,11 @@ impl Still<'_> {
         self.best
     }
 
-    /// Where the patch is, in pixels of a band.
+    /// The patch's place, in pixels of a band.
     #[must_use]
     pub fn patch(&self) -> PatchArea {
         let area = self.phantom.content_area();
-        // The sensor is larger than a patch.
+        // The fallback is never used: the sensor is larger than a patch.
         PatchArea::central(view::WIDTH, view::HEIGHT, Some(&area)).unwrap_or(PatchArea {
             x: 0,
             y: 0,
@@ -102,16 +104,16 @@ impl Still<'_> {
         self.render(number, focal_power, &Region::WHOLE, samples);
     }
 
-    /// What the widest patch that policies see covers, in pixels of a band.
+    /// The square that the widest patch of the policies covers, in pixels of a band.
     #[must_use]
     pub fn seen(&self) -> Square {
         let PatchArea { x, y, width, .. } = self.patch();
         let widest = WIDER[WIDER.len() - 1];
-        // The sensor is larger than the widest patch too.
+        // The fallback is never used: the sensor is larger than the widest patch too.
         Square::around((x, y), widest, (view::WIDTH, view::HEIGHT)).unwrap_or(Square { x, y, side: width })
     }
 
-    /// The same exposure, of which only the samples of [`Still::seen`] are made.
+    /// Makes the same exposure, but only the samples of [`Still::seen`].
     pub fn expose_view(&self, number: u16, focal_power: FocalPower, samples: &mut [u16]) {
         let Square { x, y, side } = self.seen();
         self.render(number, focal_power, &Region { columns: x..x + side, rows: y..y + side }, samples);
@@ -120,17 +122,20 @@ impl Still<'_> {
     fn render(&self, number: u16, focal_power: FocalPower, region: &Region, samples: &mut [u16]) {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(FIRST_STREAM + (self.index << 16) + u64::from(number));
+
         let noise = self.phantom.sensor.noise_of(&mut rng);
         self.phantom.render((self.pose, focal_power), self.gain, &noise, region, samples);
     }
 }
 
 impl Phantom {
-    /// The gain at which auto-exposure comes to rest at a pose, metered without noise at every [`METERED`]th cell.
+    /// The gain at which auto-exposure settles at a pose, metered without noise at every [`METERED`]th
+    /// cell.
     fn settled_gain(&self, pose: &Pose, focal_power: FocalPower) -> f32 {
         let mapping = Mapping::new(&self.optics, pose);
         let surface = (&self.stack, &self.relief);
         let mut counts = Vec::new();
+
         for y in (0..view::HEIGHT).step_by(METERED) {
             let (first, last) = self.optics.span(y);
             for x in (first..=last).step_by(METERED) {
@@ -138,6 +143,7 @@ impl Phantom {
                 counts.extend(self.bands.counts(light));
             }
         }
+
         AutoExposure::settled(counts)
     }
 }

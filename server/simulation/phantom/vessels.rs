@@ -9,7 +9,7 @@ use super::field::Field;
 /// Radius in texels below which a vessel is too fine to draw.
 const THINNEST: f32 = 0.55;
 
-/// What the vessels cover, 0..1 each, and how far they stand out, in texels.
+/// The places that vessels cover, 0..1 each, and how far the vessels stand out, in texels.
 pub(super) struct Vessels {
     pub(super) arteries: Field,
     pub(super) veins: Field,
@@ -33,7 +33,7 @@ enum Kind {
     Vein,
 }
 
-/// The growing tip of a vessel.
+/// The growing end of a vessel.
 #[derive(Debug, Clone, Copy)]
 struct Tip {
     x: f32,
@@ -51,6 +51,7 @@ impl Vessels {
     pub(super) fn grow(side: usize, density: Density, valleys: &Field, rng: &mut impl Rng) -> Self {
         let blank = || Field::filled(side, 0.0);
         let mut vessels = Self { arteries: blank(), veins: blank(), bulge: blank() };
+
         let mut tips = Vec::new();
         for _ in 0..density.arteries {
             tips.push(tip_at_rim(side as f32, 2.5 + 2.0 * rng.random::<f32>(), Kind::Artery, rng));
@@ -61,9 +62,11 @@ impl Vessels {
         for _ in 0..density.fine {
             tips.push(tip_inside(side as f32, rng));
         }
+
         while let Some(tip) = tips.pop() {
             vessels.follow(tip, valleys, &mut tips, rng);
         }
+
         vessels
     }
 
@@ -76,9 +79,11 @@ impl Vessels {
             let stride = (0.6 * tip.radius).max(0.9);
             tip.advance(stride, valleys, rng);
             let margin = -12.0..side + 12.0;
+
             if !margin.contains(&tip.x) || !margin.contains(&tip.y) {
                 return;
             }
+
             until_branch -= stride;
             if until_branch <= 0.0 {
                 tips.push(tip.branch(rng));
@@ -95,6 +100,7 @@ impl Vessels {
             let low = (centre - reach).ceil().max(0.0) as usize;
             low..(((centre + reach).floor() + 1.0).max(0.0) as usize).min(side)
         };
+
         let opacity = tip.radius / (tip.radius + 0.7);
         // Fine vessels lie within the pia, large ones on it.
         let standing = 0.5 * (0.4 * (tip.radius - 0.6)).clamp(0.1, 1.0);
@@ -102,12 +108,14 @@ impl Vessels {
             Kind::Artery => &mut self.arteries,
             Kind::Vein => &mut self.veins,
         };
+
         for y in span(tip.y) {
             for x in span(tip.x) {
                 let square = (x as f32 - tip.x).powi(2) + (y as f32 - tip.y).powi(2);
                 let index = y * side + x;
                 let covered = opacity * (tip.radius + 0.5 - square.sqrt()).clamp(0.0, 1.0);
                 cover.data[index] = cover.data[index].max(covered);
+
                 let height = standing * (tip.radius * tip.radius - square).max(0.0).sqrt();
                 self.bulge.data[index] = self.bulge.data[index].max(height);
             }
@@ -116,17 +124,20 @@ impl Vessels {
 }
 
 impl Tip {
-    /// Goes on by `stride`, wandering, thinning, and for a vein drawn into the valleys.
+    /// Moves on by `stride`: the tip wanders and thins, and a vein is drawn into the valleys.
     fn advance(&mut self, stride: f32, valleys: &Field, rng: &mut impl Rng) {
         let kick = 0.013 * swing(rng) / self.radius.sqrt();
         self.turn = 0.9 * self.turn - 0.006 * (self.heading - self.course) / self.radius + kick;
         self.course += 0.006 * swing(rng);
+
         let (sin, cos) = self.heading.sin_cos();
+
         if self.kind == Kind::Vein && self.radius > 1.5 {
             let left = valleys.near(self.x + 9.0 * cos + 6.0 * sin, self.y + 9.0 * sin - 6.0 * cos);
             let right = valleys.near(self.x + 9.0 * cos - 6.0 * sin, self.y + 9.0 * sin + 6.0 * cos);
             self.heading += 0.08 * (left - right) * stride / self.radius;
         }
+
         self.heading += self.turn * stride;
         self.x += cos * stride;
         self.y += sin * stride;
@@ -139,14 +150,17 @@ impl Tip {
         let side = if rng.random::<bool>() { 1.0 } else { -1.0 };
         let angle = side * (0.4 + 0.8 * rng.random::<f32>());
         let radius = self.radius * share.cbrt();
+
         let child = Self { heading: self.heading + angle, course: self.course + angle, turn: 0.0, radius, ..*self };
         self.radius *= (1.0 - share).cbrt();
         self.course -= 0.3 * share * angle;
+
         child
     }
 }
 
-/// A centred draw of variance 1, uniform: cheaper than a normal one, and a vessel's many steps add up all the same.
+/// A centred uniform draw of variance 1: cheaper than a normal one, and over a vessel's many steps the
+/// sum is nearly normal all the same.
 fn swing(rng: &mut impl Rng) -> f32 {
     3.46 * (rng.random::<f32>() - 0.5)
 }
@@ -159,7 +173,8 @@ fn branch_distance(radius: f32, rng: &mut impl Rng) -> f32 {
 fn tip_at_rim(side: f32, radius: f32, kind: Kind, rng: &mut impl Rng) -> Tip {
     let (sin, cos) = (TAU * rng.random::<f32>()).sin_cos();
     let heading = (-sin).atan2(-cos) + (rng.random::<f32>() - 0.5) * 1.8;
-    let (x, y) = (side * (0.5 + 0.45 * cos), side * (0.5 + 0.45 * sin));
+    let x = side * (0.5 + 0.45 * cos);
+    let y = side * (0.5 + 0.45 * sin);
     Tip { x, y, heading, course: heading, turn: 0.0, radius, kind }
 }
 
@@ -168,9 +183,10 @@ fn tip_inside(side: f32, rng: &mut impl Rng) -> Tip {
     let kind = if rng.random::<f32>() < 0.6 { Kind::Artery } else { Kind::Vein };
     let (sin, cos) = (TAU * rng.random::<f32>()).sin_cos();
     let reach = 0.45 * side * rng.random::<f32>().sqrt();
-    let (x, y) = (0.5 * side + reach * cos, 0.5 * side + reach * sin);
+    let x = 0.5 * side + reach * cos;
+    let y = 0.5 * side + reach * sin;
     let heading = TAU * rng.random::<f32>();
-    // Most are barely there.
+    // Most fine vessels are barely visible.
     let radius = 0.6 + 0.85 * rng.random::<f32>().powi(2);
     Tip { x, y, heading, course: heading, turn: 0.0, radius, kind }
 }

@@ -1,4 +1,5 @@
-//! The camera's view: which place of the surface each mosaic cell sees, how far out of focus, and in what light.
+//! The camera's view: which place of the surface each mosaic cell sees, how far out of focus, and in
+//! what light.
 
 use std::ops::Range;
 
@@ -19,8 +20,9 @@ pub(super) const HEIGHT: usize = 272;
 
 /// Radius of the content area, pixels of a band: cut a little by the sensor's upper and lower edge.
 const RADIUS: f32 = 150.0;
-/// Radius of the disc of confusion, pixels of a band, when focal power is off by the whole range. Its second moment is
-/// that of a Gaussian of half as many pixels: within the 2 to 8 of simulated focal-time scans.
+/// Radius of the disc of confusion, pixels of a band, when focal power is off by the whole range. Its
+/// second moment is that of a Gaussian of half as many pixels: within the 2 to 8 of simulated
+/// focal-time scans.
 const BLUR: f32 = 12.0;
 
 /// Working distances in focus at focal power 0 and 1, metres; focal power is linear in 1 / distance.
@@ -30,7 +32,7 @@ const TEXEL_DISTANCE: f64 = 0.32;
 /// Size of a texel on the brain, metres: a field of view of about 48 mm at [`TEXEL_DISTANCE`].
 const TEXEL: f64 = 0.16e-3;
 
-/// What the camera's optics fix once and for all.
+/// The fixed properties of the camera's optics.
 pub(super) struct Optics {
     centre: [f32; 2],
     /// Light that reaches each pixel, 0..1: falls off to the rim of the content area and is 0 outside.
@@ -39,7 +41,7 @@ pub(super) struct Optics {
     spans: Vec<(usize, usize)>,
 }
 
-/// A part of the picture, in cells: what need not be seen is not computed.
+/// A part of the picture, in cells; only light within it is computed.
 #[derive(Debug, Clone)]
 pub(super) struct Region {
     pub(super) columns: Range<usize>,
@@ -56,7 +58,8 @@ impl Region {
     }
 }
 
-/// One cell row of the picture: abundances times light, by endmember, one column of darkness on either side.
+/// One cell row of the picture: abundances times light, by endmember, with one column of darkness on
+/// either side.
 pub(super) type Line = [Vec<f32>; ENDMEMBERS];
 
 /// A blank [`Line`].
@@ -64,7 +67,7 @@ pub(super) fn blank_line() -> Line {
     [(); ENDMEMBERS].map(|()| vec![0.0; WIDTH + 2])
 }
 
-/// Takes all light off a line.
+/// Sets a line to darkness.
 pub(super) fn darken(line: &mut Line) {
     for plane in line {
         plane.fill(0.0);
@@ -76,20 +79,24 @@ impl Optics {
     pub(super) fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(3);
+
         let mut centre = |middle: usize| middle as f32 / 2.0 + 10.0 * (rng.random::<f32>() - 0.5);
         let centre = [centre(WIDTH), centre(HEIGHT)];
+
         let light: Vec<f32> = (0..WIDTH * HEIGHT)
             .map(|index| {
-                let (x, y) = ((index % WIDTH) as f32 - centre[0], (index / WIDTH) as f32 - centre[1]);
+                let x = (index % WIDTH) as f32 - centre[0];
+                let y = (index / WIDTH) as f32 - centre[1];
                 let distance = x.hypot(y);
                 (RADIUS + 0.5 - distance).clamp(0.0, 1.0) * (1.0 - 0.35 * (distance / RADIUS).powi(2))
             })
             .collect();
+
         let spans = light.chunks_exact(WIDTH).map(lit_span).collect();
         Self { centre, light, spans }
     }
 
-    /// Where the content area is, in pixels of a band.
+    /// The content area's place and size, in pixels of a band.
     pub(super) fn content_area(&self) -> ContentArea {
         let [x, y] = self.centre.map(f64::from);
         ContentArea { x, y, radius: f64::from(RADIUS), confidence: 1.0 }
@@ -118,9 +125,11 @@ pub(super) struct Mapping {
     centre: [f32; 2],
     /// Place on the surface under the content area's centre, texels from the scene's corner.
     origin: [f32; 2],
-    /// Texels rightwards and downwards on the surface for one pixel rightwards; downwards it is turned by 90 degrees.
+    /// Texels rightwards and downwards on the surface for one pixel rightwards; for one pixel downwards
+    /// the same turned by 90 degrees.
     across: [f32; 2],
-    /// Focal power that is sharp on the flat surface at the centre, and its change for one pixel right and down.
+    /// Focal power that is sharp on the flat surface at the centre, and its change for one pixel right
+    /// and down.
     focus: [f32; 3],
     /// Change of that focal power for one texel of height.
     per_height: f32,
@@ -134,9 +143,11 @@ impl Mapping {
         let distance = (far + pose.focus * (near - far)).recip();
         let texels = distance / TEXEL_DISTANCE;
         let (sin, cos) = pose.roll.sin_cos();
+
         // d(1 / distance) = height / distance^2, in units of the lens's whole range.
         let per_height = TEXEL / (distance * distance * (near - far));
         let lean = pose.tilt.map(|tilt| texels * tilt.tan() * per_height);
+
         let middle = SIDE as f64 / 2.0;
         Self {
             centre: optics.centre,
@@ -151,15 +162,18 @@ impl Mapping {
     /// Place on the surface that a pixel sees, texels.
     #[inline(always)]
     pub(super) fn place(&self, x: f32, y: f32) -> (f32, f32) {
-        let (x, y) = (x - self.centre[0], y - self.centre[1]);
+        let x = x - self.centre[0];
+        let y = y - self.centre[1];
         let [cos, sin] = self.across;
         (self.origin[0] + cos * x - sin * y, self.origin[1] + sin * x + cos * y)
     }
 
-    /// Focal power that would be sharp at a pixel that sees a place of this height; may lie outside 0..=1.
+    /// Focal power that would be sharp at a pixel that sees a place of this height; may lie outside
+    /// 0..=1.
     #[inline(always)]
     pub(super) fn sharp_at(&self, x: f32, y: f32, height: f32) -> f32 {
-        let (x, y) = (x - self.centre[0], y - self.centre[1]);
+        let x = x - self.centre[0];
+        let y = y - self.centre[1];
         self.focus[0] + self.focus[1] * x + self.focus[2] * y + self.per_height * height
     }
 }
@@ -168,11 +182,12 @@ impl Mapping {
 #[inline(always)]
 pub(super) fn height_at(relief: &Field, u: f32, v: f32) -> f32 {
     let last = (relief.side - 1) as f32;
-    let (x, y) = ((0.5 * u).clamp(0.0, last) as u32, (0.5 * v).clamp(0.0, last) as u32);
+    let x = (0.5 * u).clamp(0.0, last) as u32;
+    let y = (0.5 * v).clamp(0.0, last) as u32;
     relief.data[y as usize * relief.side + x as usize]
 }
 
-/// What the surface looks like along one cell row at `focal_power`, into `line`, in `columns` and the ones beside them.
+/// Writes what one cell row sees at `focal_power` into `line`, in `columns` and the ones beside them.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub(super) fn look(
     line: &mut Line,
@@ -184,6 +199,7 @@ pub(super) fn look(
     columns: &Range<usize>,
 ) {
     darken(line);
+
     let (first, last) = optics.spans[y];
     for x in first.max(columns.start.saturating_sub(1))..(last + 1).min(columns.end + 1) {
         let cell = look_at(x, y, optics, mapping, surface, focal_power);
@@ -203,7 +219,8 @@ pub(super) fn look_at(
     (stack, relief): (&Stack, &Field),
     focal_power: f32,
 ) -> [f32; ENDMEMBERS] {
-    let (column, row) = (x as f32, y as f32);
+    let column = x as f32;
+    let row = y as f32;
     let (u, v) = mapping.place(column, row);
     let miss = focal_power - mapping.sharp_at(column, row, height_at(relief, u, v));
     let light = optics.light[y * WIDTH + x];
