@@ -5,21 +5,25 @@ use multiversion::multiversion;
 use super::gaussian::half_kernel;
 use crate::imaging::GrayImage;
 
-/// Standard deviations after which the kernel is cut.
+/// Distance at which the kernel is cut, in standard deviations.
 const CUT: f64 = 4.0;
 
-/// Blurs `image` with a Gaussian of standard deviation `sigma` pixels: separable, kernel cut at 4 sigma and normalised
-/// to sum 1, border pixels repeated outwards. A `sigma` that is not positive and finite leaves the picture as it is.
+/// Blurs `image` with a Gaussian of standard deviation `sigma` pixels: separable, kernel cut at 4
+/// sigma and normalised to sum 1, border pixels repeated outwards. A `sigma` that is not positive and
+/// finite leaves the picture as it is.
 #[must_use]
 pub fn gaussian_blur(image: &GrayImage, sigma: f64) -> GrayImage {
     let kernel = gaussian_kernel(sigma);
     if kernel.len() == 1 || image.data.is_empty() {
         return image.clone();
     }
+
     let mut across = vec![0.0; image.data.len()];
     blur_rows(&image.data, image.width, &kernel, &mut across);
+
     let mut data = vec![0.0; image.data.len()];
     blur_columns(&across, image.width, &kernel, &mut data);
+
     GrayImage { width: image.width, height: image.height, data }
 }
 
@@ -36,13 +40,16 @@ fn gaussian_kernel(sigma: f64) -> Vec<f32> {
 fn blur_rows(data: &[f32], width: usize, kernel: &[f32], blurred: &mut [f32]) {
     let radius = kernel.len() - 1;
     let mut padded = vec![0.0; width + 2 * radius];
+
     for (row, out) in data.chunks_exact(width).zip(blurred.chunks_exact_mut(width)) {
         padded[..radius].fill(row[0]);
         padded[radius..radius + width].copy_from_slice(row);
         padded[radius + width..].fill(row[width - 1]);
+
         for (out, &value) in out.iter_mut().zip(row) {
             *out = kernel[0] * value;
         }
+
         for (tap, &weight) in kernel.iter().enumerate().skip(1) {
             add_pair(out, &padded[radius - tap..], &padded[radius + tap..], weight);
         }
@@ -53,6 +60,7 @@ fn blur_rows(data: &[f32], width: usize, kernel: &[f32], blurred: &mut [f32]) {
 fn blur_columns(data: &[f32], width: usize, kernel: &[f32], blurred: &mut [f32]) {
     let height = data.len() / width;
     let row = |y: usize| &data[y * width..][..width];
+
     for (y, out) in blurred.chunks_exact_mut(width).enumerate() {
         for (out, &value) in out.iter_mut().zip(row(y)) {
             *out = kernel[0] * value;

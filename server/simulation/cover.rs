@@ -1,19 +1,20 @@
-//! What now and then covers the view in training: a glove, an instrument, glare; nothing can be seen to focus on.
+//! Covers the view now and then in training, as a glove, an instrument or glare does; then there is
+//! nothing to focus on.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Something that covers the view for a while, and then for a while does not.
+/// Something that covers the view from time to time.
 #[derive(Debug, Clone)]
 pub struct Cover {
     course: ChaCha8Rng,
-    /// The share of its contrast that is left of the picture, while it is covered.
+    /// The share of the picture's contrast that is left while the view is covered.
     detail: Option<f64>,
     frames_left: i32,
 }
 
 impl Cover {
-    /// A cover whose comings and goings are drawn from `seed`; nothing is covered yet.
+    /// A cover that comes and goes as drawn from `seed`; at first nothing is covered.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut course = ChaCha8Rng::seed_from_u64(seed);
@@ -21,21 +22,23 @@ impl Cover {
         Self { course, detail: None, frames_left }
     }
 
-    /// The share of its contrast that is left of the picture at this frame.
+    /// The share of the picture's contrast that is left at this frame.
     #[must_use]
     pub fn detail(&self) -> f64 {
         self.detail.unwrap_or(1.0)
     }
 
-    /// Goes on to the next frame.
+    /// Moves on to the next frame.
     pub fn advance(&mut self) {
         if self.frames_left > 0 {
             self.frames_left -= 1;
             return;
         }
+
         let covers = self.detail.is_none();
         self.detail = covers.then(|| self.course.random_range(0.0..0.04));
-        // As often for a moment as for long.
+
+        // Log-uniform: short covers are as frequent as long ones.
         let frames =
             if covers { self.course.random_range(1.0f64..5.0).exp() } else { self.course.random_range(20.0..150.0) };
         self.frames_left = frames as i32;

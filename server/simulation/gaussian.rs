@@ -1,11 +1,12 @@
 //! The Gaussian at whole pixels: kernels of blurs, and smoothing of series.
 
-/// Samples of a Gaussian of standard deviation `sigma` at 0, 1, ... `reach`, where 0 has 1.
+/// Samples of a Gaussian of standard deviation `sigma` at 0, 1, ... `reach`; the one at 0 is 1.
 fn samples(sigma: f64, reach: usize) -> Vec<f64> {
     (0..=reach).map(|at| (-0.5 * (at as f64 / sigma).powi(2)).exp()).collect()
 }
 
-/// A Gaussian of standard deviation `sigma` from its middle to `reach` pixels away. With its mirror image it sums to 1.
+/// A Gaussian of standard deviation `sigma` from its middle to `reach` pixels away. With its mirror
+/// image it sums to 1.
 #[must_use]
 pub fn half_kernel(sigma: f64, reach: usize) -> Vec<f64> {
     let samples = samples(sigma, reach);
@@ -13,7 +14,8 @@ pub fn half_kernel(sigma: f64, reach: usize) -> Vec<f64> {
     samples.into_iter().map(|sample| sample / sum).collect()
 }
 
-/// A Gaussian of standard deviation `sigma` up to `reach` pixels either way, `2 * reach + 1` values that sum to 1.
+/// A Gaussian of standard deviation `sigma` up to `reach` pixels either way, `2 * reach + 1` values
+/// that sum to 1.
 #[must_use]
 pub fn kernel(sigma: f64, reach: usize) -> Vec<f64> {
     let half = samples(sigma, reach);
@@ -22,7 +24,8 @@ pub fn kernel(sigma: f64, reach: usize) -> Vec<f64> {
     both.into_iter().map(|sample| sample / sum).collect()
 }
 
-/// `values` smoothed by a Gaussian of `sigma` places, cut at four of them. Beyond both ends the values are mirrored.
+/// `values` smoothed by a Gaussian of `sigma` places, cut at four of them. Beyond both ends the values
+/// are mirrored.
 #[must_use]
 pub fn smoothed(values: &[f64], sigma: f64) -> Vec<f64> {
     let reach = (4.0 * sigma).round() as usize;

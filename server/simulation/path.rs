@@ -10,7 +10,7 @@ use super::walk::{Motion, Walk};
 /// How one coordinate moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Habit {
-    /// It stays within this range.
+    /// The coordinate stays within this range.
     pub range: (f64, f64),
     /// Standard deviation of its speed, per second.
     pub speed: f64,
@@ -18,8 +18,8 @@ pub struct Habit {
     pub memory: f64,
 }
 
-/// `N` walks that advance at a fixed rate; between two steps they move evenly. The same seed and habits give the same
-/// path, as long as it is asked for in rising order of time.
+/// `N` walks that advance at a fixed rate; between two steps they move evenly. The same seed and habits
+/// give the same path, as long as times are asked for in rising order.
 #[derive(Debug, Clone)]
 pub struct Path<const N: usize> {
     rng: ChaCha8Rng,
@@ -35,14 +35,16 @@ impl<const N: usize> Path<N> {
     pub fn new(seed: u64, rate: f64, habits: [Habit; N]) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(1);
+
         let walks = habits.map(|habit| {
             let motion = Motion { speed: habit.speed / rate, memory: habit.memory * rate };
             Walk::new(habit.range, motion, &mut rng)
         });
+
         Self { before: std::array::from_fn(|i| walks[i].position()), rng, rate, walks, steps: 0 }
     }
 
-    /// Where it is at `time` after the start.
+    /// The coordinates at `time` after the start.
     pub fn at(&mut self, time: Duration) -> [f64; N] {
         let place = time.as_secs_f64() * self.rate;
         while self.steps as f64 <= place {
@@ -52,6 +54,7 @@ impl<const N: usize> Path<N> {
             }
             self.steps += 1;
         }
+
         let part = (place - (self.steps - 1) as f64).clamp(0.0, 1.0);
         std::array::from_fn(|i| self.before[i] + part * (self.walks[i].position() - self.before[i]))
     }

@@ -1,4 +1,5 @@
-//! Blur of whole pictures by the spots that lenses make of a point: a Gaussian, a disc, a disc with a brighter rim or core.
+//! Blurs whole pictures by the spots that lenses make of a point: a Gaussian, a disc, a disc with a
+//! brighter rim or core.
 
 use multiversion::multiversion;
 
@@ -13,17 +14,17 @@ const CORE: f32 = 0.7;
 pub enum LensSpot {
     /// A Gaussian, as in the paper.
     Gaussian,
-    /// A disc, as a round aperture makes it; its rim, the outer three tenths of its radius, is brighter than its core by the
-    /// factor `1 + rim`, darker where `rim` is below 0. Spherical aberration brightens the rim on one side of focus and the core
-    /// on the other.
+    /// A disc, as a round aperture makes it; its rim, the outer three tenths of its radius, is brighter
+    /// than its core by the factor `1 + rim`, darker where `rim` is below 0. Spherical aberration
+    /// brightens the rim on one side of focus and the core on the other.
     Disc {
         /// Above -1.
         rim: f32,
     },
 }
 
-/// `picture` blurred by `spot`, a plain disc of which would have a standard deviation of `sigma` pixels along each axis: its radius
-/// is twice that. Border pixels go on outside.
+/// `picture` blurred by `spot`. A plain disc would have a standard deviation of `sigma` pixels along
+/// each axis: its radius is twice that. Outside the picture its border pixels are repeated.
 #[must_use]
 pub fn blurred(picture: &GrayImage, sigma: f64, spot: LensSpot) -> GrayImage {
     match spot {
@@ -33,28 +34,32 @@ pub fn blurred(picture: &GrayImage, sigma: f64, spot: LensSpot) -> GrayImage {
             let radius = 2.0 * sigma as f32;
             let mut sums = disc_sums(picture, radius);
             let mut total = disc_area(radius);
+
             if rim != 0.0 {
-                // The whole disc at the rim's brightness, less what the core has too much.
+                // The whole disc at the rim's brightness, minus the excess within the core.
                 let core = disc_sums(picture, CORE * radius);
                 for (whole, core) in sums.iter_mut().zip(core) {
                     *whole = (1.0 + rim) * *whole - rim * core;
                 }
                 total = (1.0 + rim) * total - rim * disc_area(CORE * radius);
             }
+
             for sum in &mut sums {
                 *sum /= total;
             }
+
             GrayImage { width: picture.width, height: picture.height, data: sums }
         }
     }
 }
 
-/// Half the width of a disc of `radius` at `offset` rows from its middle: pixels whose rows lie outside have none.
+/// Half the width of a disc of `radius` at `offset` rows from its middle; 0 outside the disc.
 fn half_width(radius: f32, offset: i32) -> f32 {
     (radius * radius - (offset * offset) as f32).max(0.0).sqrt()
 }
 
-/// Least half width, so that a disc smaller than a pixel still covers the pixel itself.
+/// The rows of a disc and its half width in each, so that a disc smaller than a pixel still covers the
+/// pixel itself.
 fn spans(radius: f32) -> impl Iterator<Item = (i32, f32)> {
     let reach = radius as i32;
     (-reach..=reach).map(move |offset| {
@@ -67,16 +72,18 @@ fn disc_area(radius: f32) -> f32 {
     spans(radius).map(|(_, half)| 2.0 * half).sum()
 }
 
-/// The sum of `picture` over a disc of `radius` pixels around each pixel; in each row the disc's ends count by cover.
+/// The sum of `picture` over a disc of `radius` pixels around each pixel; in each row the disc's ends
+/// count by the part of a pixel that they cover.
 fn disc_sums(picture: &GrayImage, radius: f32) -> Vec<f32> {
-    let (width, height) = (picture.width, picture.height);
+    let width = picture.width;
+    let height = picture.height;
     let margin = radius as usize + 2;
 
-    // Running sums along each row, with its border pixels going on: a span's sum is a difference of two.
+    // Running sums along each row, with its border pixels repeated: a span's sum is a difference of two.
     let stride = width + 2 * margin + 1;
     let mut running = vec![0.0f32; stride * height];
     for (line, sums) in picture.data.chunks_exact(width).zip(running.chunks_exact_mut(stride)) {
-        // About the row's mean, so that sums stay small and exact.
+        // Relative to mid-gray, so that sums stay small and exact.
         let mut sum = 0.0;
         for (index, after) in sums[1..].iter_mut().enumerate() {
             sum += line[index.saturating_sub(margin).min(width - 1)] - 128.0;
@@ -92,17 +99,24 @@ fn disc_sums(picture: &GrayImage, radius: f32) -> Vec<f32> {
             add_span(&running[row * stride..][..stride], middle - half, middle + half, out);
         }
     }
+
     out
 }
 
 /// Adds to each pixel of `out` the sum from `low` to `high` pixels on from it, by running sums.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn add_span(running: &[f32], low: f32, high: f32, out: &mut [f32]) {
-    let (below, above) = (low as usize, high as usize);
-    let (low_part, high_part) = (low - below as f32, high - above as f32);
+    let below = low as usize;
+    let above = high as usize;
+    let low_part = low - below as f32;
+    let high_part = high - above as f32;
+
     let width = out.len();
-    let (low_near, low_far) = (&running[below..below + width], &running[below + 1..below + 1 + width]);
-    let (high_near, high_far) = (&running[above..above + width], &running[above + 1..above + 1 + width]);
+    let low_near = &running[below..below + width];
+    let low_far = &running[below + 1..below + 1 + width];
+    let high_near = &running[above..above + width];
+    let high_far = &running[above + 1..above + 1 + width];
+
     for x in 0..width {
         let upto = high_near[x] + high_part * (high_far[x] - high_near[x]);
         let before = low_near[x] + low_part * (low_far[x] - low_near[x]);

@@ -1,5 +1,6 @@
-//! Sharp pictures out of nothing, of many kinds, for policies to train on: overlapping discs ("dead leaves", whose
-//! statistics are those of natural pictures: Lee, Mumford and Huang 2001), fractal noise, vessels, highlights.
+//! Sharp synthetic pictures of many kinds, for policies to train on: overlapping discs ("dead leaves",
+//! whose statistics are those of natural pictures: Lee, Mumford and Huang 2001), fractal noise,
+//! vessels, highlights.
 
 use std::ops::Range;
 
@@ -14,6 +15,7 @@ use crate::imaging::GrayImage;
 pub fn texture(seed: u64, side: usize) -> GrayImage {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut canvas = Canvas::blank(side);
+
     match rng.random_range(0..4) {
         0 => canvas.add_noise(&mut rng, 1.0),
         1 => canvas.add_leaves(&mut rng),
@@ -23,29 +25,37 @@ pub fn texture(seed: u64, side: usize) -> GrayImage {
         }
         _ => canvas.add_noise(&mut rng, 0.5),
     }
+
     if rng.random_bool(0.5) {
         canvas.add_vessels(&mut rng);
     }
+
     canvas.expose(&mut rng);
     if rng.random_bool(0.3) {
         canvas.add_highlights(&mut rng);
     }
+
     canvas.soften(rng.random_range(0.0..0.6));
+
     GrayImage { width: side, height: side, data: canvas.data }
 }
 
-/// Makes the contrast of `picture` vary from place to place, as tissue, smoke and wetness do: what differs from the mean
-/// around it is scaled by the exponential of smooth noise of standard deviation about `strength`.
+/// Makes the contrast of `picture` vary from place to place, as tissue, smoke and wetness do: scales
+/// each difference from the surrounding mean by the exponential of smooth noise of standard deviation
+/// about `strength`.
 pub fn vary_contrast(picture: &mut GrayImage, strength: f32, seed: u64) {
     const AROUND: f64 = 12.0;
+
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let side = picture.width.max(picture.height);
     let mut field = Canvas::blank(side);
     field.add_octave(&mut rng, 70.0, 1.6);
     field.add_octave(&mut rng, 30.0, 1.6);
+
     let around = gaussian_blur(picture, AROUND);
     for (index, (value, mean)) in picture.data.iter_mut().zip(&around.data).enumerate() {
-        let (x, y) = (index % picture.width, index / picture.width);
+        let x = index % picture.width;
+        let y = index / picture.width;
         let scale = (strength * field.data[y * side + x]).exp();
         *value = (mean + scale * (*value - mean)).clamp(0.0, 255.0);
     }
@@ -69,6 +79,7 @@ impl Canvas {
         let mut cell = rng.random_range(24.0f32..80.0);
         let finest = rng.random_range(1.2f32..4.0);
         let mut weight = amplitude;
+
         while cell > finest {
             self.add_octave(rng, cell, weight);
             cell *= 0.5;
@@ -87,6 +98,7 @@ impl Canvas {
                 (place as usize, fraction * fraction * (3.0 - 2.0 * fraction))
             })
             .collect();
+
         for (row, line) in self.data.chunks_exact_mut(self.side).enumerate() {
             let (top, down) = weights[row];
             for (pixel, &(left, right)) in line.iter_mut().zip(&weights) {
@@ -98,17 +110,21 @@ impl Canvas {
         }
     }
 
-    /// Discs that hide one another, radii by a power law, until most of the picture is covered.
+    /// Discs that hide one another, with radii drawn from a power law, until most of the picture is
+    /// covered.
     fn add_leaves(&mut self, rng: &mut impl Rng) {
-        let (least, most) = (rng.random_range(1.5f32..5.0), rng.random_range(15.0f32..50.0));
+        let least = rng.random_range(1.5f32..5.0);
+        let most = rng.random_range(15.0f32..50.0);
         let mut covered = 0.0;
         while covered < 2.5 * (self.side * self.side) as f32 {
-            // Density falling with the third power of the radius: all scales weigh the same.
+            // A density that falls with the third power of the radius gives all scales equal weight.
             let u: f32 = rng.random();
             let radius = 1.0 / (1.0 / (least * least) * (1.0 - u) + u / (most * most)).sqrt();
             covered += std::f32::consts::PI * radius * radius;
+
             let centre = (self.place(rng), self.place(rng));
-            let (shade, stretch) = (rng.random_range(-1.0f32..1.0), rng.random_range(0.5f32..2.0));
+            let shade = rng.random_range(-1.0f32..1.0);
+            let stretch = rng.random_range(0.5f32..2.0);
             self.add_leaf(centre, radius, stretch, shade);
         }
     }
@@ -117,9 +133,12 @@ impl Canvas {
         rng.random_range(0.0..self.side as f32)
     }
 
-    /// An ellipse of the area of a disc of `radius`, `stretch` times as wide as high, in the place of what is there.
+    /// Replaces what is there by an ellipse of the area of a disc of `radius`, `stretch` times as wide
+    /// as high.
     pub fn add_leaf(&mut self, (cx, cy): (f32, f32), radius: f32, stretch: f32, shade: f32) {
-        let (rx, ry) = (radius * stretch.sqrt(), radius / stretch.sqrt());
+        let rx = radius * stretch.sqrt();
+        let ry = radius / stretch.sqrt();
+
         for y in self.span(cy, ry) {
             let dy = (y as f32 - cy) / ry;
             for x in self.span(cx, rx) {
@@ -143,7 +162,8 @@ impl Canvas {
         }
     }
 
-    /// Winding, thinning lines of `value`: as many as drawn from `count`, their first radius from `radii`.
+    /// Winding, thinning lines of `value`: their number is drawn from `count`, their first radius from
+    /// `radii`.
     pub fn add_winding_lines(&mut self, rng: &mut impl Rng, count: Range<usize>, radii: Range<f32>, value: f32) {
         for _ in 0..rng.random_range(count) {
             self.add_winding_line(rng, radii.clone(), |_| value);
@@ -151,10 +171,12 @@ impl Canvas {
     }
 
     fn add_winding_line<R: Rng>(&mut self, rng: &mut R, radii: Range<f32>, shade: impl Fn(&mut R) -> f32) {
-        let (mut x, mut y) = (self.place(rng), self.place(rng));
+        let mut x = self.place(rng);
+        let mut y = self.place(rng);
         let mut heading = rng.random_range(0.0..std::f32::consts::TAU);
         let mut radius = rng.random_range(radii);
         let shade = shade(rng);
+
         for _ in 0..rng.random_range(60..300) {
             self.add_leaf((x, y), radius, 1.0, shade);
             heading += rng.random_range(-0.25f32..0.25);
@@ -169,11 +191,16 @@ impl Canvas {
         let count = self.data.len() as f32;
         let mean = self.data.iter().sum::<f32>() / count;
         let spread = (self.data.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / count).sqrt().max(1e-6);
-        let (brightness, contrast) = (rng.random_range(50.0f32..190.0), rng.random_range(2.3f32..4.0).exp());
-        let (across, down) = (rng.random_range(-0.3f32..0.3), rng.random_range(-0.3f32..0.3));
+
+        let brightness = rng.random_range(50.0f32..190.0);
+        let contrast = rng.random_range(2.3f32..4.0).exp();
+        let across = rng.random_range(-0.3f32..0.3);
+        let down = rng.random_range(-0.3f32..0.3);
+
         let middle = self.side as f32 / 2.0;
         for (index, value) in self.data.iter_mut().enumerate() {
-            let (x, y) = ((index % self.side) as f32 / middle - 1.0, (index / self.side) as f32 / middle - 1.0);
+            let x = (index % self.side) as f32 / middle - 1.0;
+            let y = (index / self.side) as f32 / middle - 1.0;
             let light = 1.0 + across * x + down * y;
             *value = (light * (brightness + contrast * (*value - mean) / spread)).clamp(0.0, 255.0);
         }
@@ -183,12 +210,14 @@ impl Canvas {
     fn add_highlights(&mut self, rng: &mut impl Rng) {
         for _ in 0..rng.random_range(5..60) {
             let centre = (self.place(rng), self.place(rng));
-            let (radius, stretch) = (rng.random_range(0.7f32..4.0), rng.random_range(0.4f32..2.5));
+            let radius = rng.random_range(0.7f32..4.0);
+            let stretch = rng.random_range(0.4f32..2.5);
             self.add_leaf(centre, radius, stretch, 255.0);
         }
     }
 
-    /// What a real camera's optics and demosaicing leave of sharpness: neighbours mixed by `share` along both axes.
+    /// Softens the picture as a camera's optics and demosaicing do: mixes neighbours by `share` along
+    /// both axes.
     fn soften(&mut self, share: f32) {
         let side = self.side;
         for stride in [1, side] {

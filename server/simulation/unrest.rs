@@ -1,5 +1,6 @@
-//! A scene that does not keep still under the crop: it stretches, turns and shears, and its contrast comes and goes from
-//! place to place. Between two frames of tissue much the same is seen, but never quite the same.
+//! A scene that does not keep still under the crop: it stretches, turns and shears, and its contrast
+//! rises and falls from place to place. Two frames of tissue show much the same, but never quite the
+//! same.
 
 use multiversion::multiversion;
 use rand::Rng;
@@ -11,7 +12,7 @@ use crate::imaging::{GrayImage, PATCH_SIDE};
 
 /// Knots of the contrast's field along each axis; beyond them it repeats.
 const KNOTS: usize = 32;
-/// Most that lengths and angles differ from the picture's own.
+/// Largest strain: the difference of lengths and angles from the picture's own.
 const MOST_STRAIN: f64 = 0.15;
 
 /// How restless a scene is.
@@ -21,16 +22,16 @@ pub struct Restlessness {
     pub strain: f64,
     /// Standard deviation of the logarithm of the contrast from place to place.
     pub contrast: f64,
-    /// Pixels from place to place.
+    /// Size of the field of contrast's cells, pixels.
     pub cell: f64,
     /// How fast the contrast's field moves over the scene, in cells a frame.
     pub drift: f64,
 }
 
-/// What is the matter with a scene at a frame.
+/// The deformation and the contrast of a scene at a frame.
 #[derive(Debug, Clone)]
 pub struct Unrest {
-    /// What is added to the unit matrix that takes a place in the patch to one in the picture, row after row.
+    /// Added to the unit matrix that maps a place in the patch to one in the picture, row by row.
     strain: [Walk; 4],
     drift: [Walk; 2],
     cell: f32,
@@ -39,57 +40,69 @@ pub struct Unrest {
 }
 
 impl Unrest {
-    /// An unrest of `restlessness`, its course drawn from `rng`.
+    /// An unrest of `restlessness`, with its course drawn from `rng`.
     pub fn new(restlessness: Restlessness, rng: &mut impl Rng) -> Self {
         let motion = |speed| Motion { speed, memory: 6.0 };
         let strain = [(); 4].map(|()| Walk::new((-MOST_STRAIN, MOST_STRAIN), motion(restlessness.strain), rng));
         let knots = KNOTS as f64;
+
         let drift = [(); 2].map(|()| Walk::new((0.0, 8.0 * knots), motion(restlessness.drift), rng));
+
         let gain = |_| (restlessness.contrast * standard_normal(rng)).exp() as f32;
         let gains = (0..KNOTS * KNOTS).map(gain).collect();
+
         Self { strain, drift, cell: restlessness.cell as f32, gains }
     }
 
-    /// Goes on to the next frame.
+    /// Moves on to the next frame.
     pub fn advance(&mut self, rng: &mut impl Rng) {
         self.strain.iter_mut().chain(&mut self.drift).for_each(|walk| walk.advance(rng));
     }
 
-    /// Fills `out`, `side` pixels a row, with what is seen of `image` around a patch whose top left pixel lies at `corner`.
-    /// Outside the image its border pixels go on. The image has at least 2x2 pixels, `side` is at most [`MAX_SIDE`].
+    /// Fills `out`, `side` pixels a row, with the part of `image` around a patch whose top left pixel
+    /// lies at `corner`. Outside the image its border pixels are repeated. The image has at least 2x2
+    /// pixels, `side` is at most [`MAX_SIDE`].
     pub fn gather(&self, image: &GrayImage, corner: (f64, f64), side: usize, out: &mut [f32]) {
         let centre = [corner.0, corner.1].map(|at| at as f32 + 0.5 * PATCH_SIDE as f32);
         self.fill(image, centre, self.cell, None, side, out);
     }
 
-    /// The same around a square of `width` pixels whose top left pixel lies at `corner`, where `image` holds means of 2x2 pixels.
+    /// The same around a square of `width` pixels whose top left pixel lies at `corner`, where `image`
+    /// holds means of 2x2 pixels.
     pub fn gather_coarsely(&self, image: &GrayImage, corner: (f64, f64), width: usize, side: usize, out: &mut [f32]) {
         let centre = [corner.0, corner.1].map(|at| 0.5 * (at as f32 + 0.5 * width as f32));
         let cell = 0.5 * self.cell;
-        // A value wider than the cells of the contrast's field has a mean of it, which differs less from place to place.
+
+        // A value wider than the cells of the contrast's field is a mean over several of them, and means
+        // differ less from place to place.
         let depth = (0.7 * cell).min(1.0);
         self.fill(image, centre, cell, Some(depth), side, out);
     }
 
-    /// Fills `out` around `centre`, with the contrast's field at knots `cell` pixels apart, its differences from 1 scaled by `depth` if
-    /// there is one.
+    /// Fills `out` around `centre`, with the contrast's field at knots `cell` pixels apart. `depth`, if
+    /// given, scales the field's differences from 1.
     fn fill(&self, image: &GrayImage, centre: [f32; 2], cell: f32, depth: Option<f32>, side: usize, out: &mut [f32]) {
         let middle = 0.5 * side as f32;
         let strain = self.strain.each_ref().map(|walk| walk.position() as f32);
         let drift = self.drift.each_ref().map(|walk| walk.position() as f32);
         let along = (1.0 + strain[0], strain[2]);
+
         for (row, line) in out.chunks_exact_mut(side).take(side).enumerate() {
             let y = row as f32 - middle;
             let start =
                 (centre[0] - middle * along.0 + strain[1] * y, centre[1] - middle * along.1 + (1.0 + strain[3]) * y);
             sample(image, start, along, line);
         }
+
+        // The contrast scales differences from the mean of what is seen.
         let out = &mut out[..side * side];
         let mean = out.iter().sum::<f32>() / out.len() as f32;
+
         let knots = |axis: usize| {
             let place = move |index| (centre[axis] + index as f32 - middle) / cell + drift[axis];
             (0..side).map(move |index| Knots::around(place(index)))
         };
+
         let columns: Vec<Knots> = knots(0).collect();
         for (row, line) in knots(1).zip(out.chunks_exact_mut(side)) {
             let gains = self.gains_along(&row);
@@ -103,7 +116,8 @@ impl Unrest {
 
     /// The contrast at the knots along a row.
     fn gains_along(&self, row: &Knots) -> [f32; KNOTS] {
-        let (upper, lower) = (&self.gains[row.before * KNOTS..][..KNOTS], &self.gains[row.after * KNOTS..][..KNOTS]);
+        let upper = &self.gains[row.before * KNOTS..][..KNOTS];
+        let lower = &self.gains[row.after * KNOTS..][..KNOTS];
         std::array::from_fn(|knot| mix(upper[knot], lower[knot], row.part))
     }
 }
@@ -125,23 +139,29 @@ impl Knots {
     }
 }
 
-/// Fills `line` with the values of `image` at places between its pixels' middles, from `start` on with a step of `along`.
+/// Fills `line` with the values of `image` at places between its pixels' middles, from `start` on with
+/// a step of `along`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn sample(image: &GrayImage, start: (f32, f32), along: (f32, f32), line: &mut [f32]) {
     let most = [image.width, image.height].map(|pixels| (pixels - 2) as i32);
     let width = image.width as i32;
-    // Where to look first and then looking: the former goes many pixels at a time.
-    let (mut corners, mut parts) = ([0u32; MAX_SIDE], [(0.0f32, 0.0f32); MAX_SIDE]);
+
+    // First all places, then all look-ups: the first loop vectorises, the second cannot.
+    let mut corners = [0u32; MAX_SIDE];
+    let mut parts = [(0.0f32, 0.0f32); MAX_SIDE];
     for (column, (corner, part)) in corners.iter_mut().zip(&mut parts).enumerate().take(line.len()) {
         let x = (start.0 + column as f32 * along.0).clamp(0.0, (most[0] + 1) as f32);
         let y = (start.1 + column as f32 * along.1).clamp(0.0, (most[1] + 1) as f32);
-        let (left, top) = ((x as i32).min(most[0]), (y as i32).min(most[1]));
+        let left = (x as i32).min(most[0]);
+        let top = (y as i32).min(most[1]);
         *corner = (top * width + left) as u32;
         *part = (x - left as f32, y - top as f32);
     }
+
     for ((value, &corner), &(right, down)) in line.iter_mut().zip(&corners).zip(&parts) {
         let from = corner as usize;
-        let (upper, lower) = (&image.data[from..from + 2], &image.data[from + image.width..from + image.width + 2]);
+        let upper = &image.data[from..from + 2];
+        let lower = &image.data[from + image.width..from + image.width + 2];
         *value = mix(mix(upper[0], upper[1], right), mix(lower[0], lower[1], right), down);
     }
 }

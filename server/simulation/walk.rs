@@ -23,7 +23,8 @@ pub struct Motion {
 }
 
 impl Walk {
-    /// A walk within `low..=high` from a uniformly drawn place, at a velocity from the stationary distribution.
+    /// A walk within `low..=high` from a uniformly drawn place, at a velocity from the stationary
+    /// distribution.
     pub fn new(range: (f64, f64), motion: Motion, rng: &mut impl Rng) -> Self {
         let position = range.0 + (range.1 - range.0) * rng.random::<f64>();
         Self::starting(position, range, motion, rng)
@@ -34,19 +35,21 @@ impl Walk {
         Self { position, velocity: motion.speed * standard_normal(rng), range, motion }
     }
 
-    /// Where it is.
+    /// The current position.
     #[must_use]
     pub const fn position(&self) -> f64 {
         self.position
     }
 
-    /// Goes on by one frame.
+    /// Moves on by one frame.
     pub fn advance(&mut self, rng: &mut impl Rng) {
         let kept = (-1.0 / self.motion.memory).exp();
         let fresh = self.motion.speed * (1.0 - kept * kept).sqrt();
         self.velocity = kept * self.velocity + fresh * standard_normal(rng);
         self.position += self.velocity;
+
         let (low, high) = self.range;
+
         if self.position < low {
             self.position = (2.0 * low - self.position).min(high);
             self.velocity = -self.velocity;

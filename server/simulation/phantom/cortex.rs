@@ -48,7 +48,9 @@ impl Cortex {
             for (spline, line) in [&depth, &fissure, &opening].into_iter().zip(&mut lines) {
                 spline.row_into(y, line);
             }
-            let (above, below) = (y.saturating_sub(1), (y + 1).min(side - 1));
+
+            let above = y.saturating_sub(1);
+            let below = (y + 1).min(side - 1);
             let span = y * side..(y + 1) * side;
             shape_row(
                 &Shape {
@@ -66,11 +68,12 @@ impl Cortex {
                 ],
             );
         }
+
         cortex
     }
 }
 
-/// One row of what shapes the surface.
+/// One row of the fields that shape the surface.
 struct Shape<'a> {
     waves: [&'a [f32]; 3],
     depth: &'a [f32],
