@@ -1,4 +1,4 @@
-//! A lens's dynamics as they were measured, kept in a file.
+//! A lens's measured dynamics, kept in a file.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::LensDynamics;
 
-/// What `parfocal lens measure` found of a lens (`dynamics.toml`).
+/// The results of `parfocal lens measure` (`dynamics.toml`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredDynamics {
@@ -14,7 +14,7 @@ pub struct MeasuredDynamics {
     pub driver: String,
     /// Serial number of the lens; a file of another lens is refused.
     pub serial: String,
-    /// When, UTC.
+    /// Date of the measurement, UTC.
     pub date: String,
     /// Milliseconds from the command to the first movement.
     pub delay_ms: f64,
@@ -25,13 +25,13 @@ pub struct MeasuredDynamics {
 }
 
 impl MeasuredDynamics {
-    /// Longest delay or settling time that is believed: ten seconds.
+    /// Longest delay or settling time that is plausible: ten seconds.
     const LONGEST_MS: f64 = 10_000.0;
 
     /// Reads the file's `text`.
     ///
     /// # Errors
-    /// When it is no such file; in words.
+    /// When the text is not such a file; says in words what is wrong.
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let read: Self = toml::from_str(text).map_err(|error| error.message().to_owned())?;
         let believed = |value: f64| (0.0..=Self::LONGEST_MS).contains(&value);
@@ -49,7 +49,7 @@ impl MeasuredDynamics {
         toml::to_string(self)
     }
 
-    /// As the control loop takes them.
+    /// The dynamics in the control loop's form.
     #[must_use]
     pub fn dynamics(&self) -> LensDynamics {
         let millis = |value: f64| Duration::from_secs_f64(value.clamp(0.0, Self::LONGEST_MS) / 1000.0);

@@ -1,8 +1,10 @@
-//! The Optotune driver on an emulated unit in the same process: everything of a bench's lens but the glass.
+//! The Optotune driver on an emulated unit in the same process: everything of a bench's lens except the
+//! glass.
 //!
-//! The simulated camera looks through the emulated glass itself, not through what the driver supposes of it, as it must
-//! with a unit in another process (`parfocal lens emulate`). So a measurement sees what a real one would: the way through
-//! thread, wire and firmware, and dynamics that the driver does not know.
+//! The simulated camera looks through the emulated glass itself. With a unit in another process
+//! (`parfocal lens emulate`) it must look through the driver's model of the glass instead. So a
+//! measurement sees what a real one would: the way through thread, wire and firmware, and dynamics
+//! that the driver does not know.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,15 +15,15 @@ use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Opt
 use crate::clock::Clock;
 use crate::options::Options;
 
-/// Driver and unit; the driver goes first, and leaves the unit at rest.
+/// Driver and unit. The driver is dropped first, and leaves the unit at rest.
 pub struct EmulatedLens {
     lens: OptotuneLens,
     emulator: Emulator,
 }
 
 impl EmulatedLens {
-    /// The lens of a specification's `options`: `latency`, `delay` and `settling`, milliseconds, `hysteresis` in dioptres,
-    /// `temperature` in °C, and `fault`, what befalls it once it is connected.
+    /// The lens of a specification's `options`: `latency`, `delay` and `settling`, milliseconds,
+    /// `hysteresis` in dioptres, `temperature` in °C, and `fault`, which sets in once it is connected.
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let usual = Model::default();
         let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
@@ -34,13 +36,16 @@ impl EmulatedLens {
         let temperature: Option<f64> = options.take("temperature")?;
         let fault: Option<Fault> = options.take("fault")?;
         options.finish()?;
+
         let system = |error: std::io::Error| LensError::Gone(format!("the system is out of resources: {error}"));
         let emulator = Emulator::start(Model { latency, glass, play, ..usual }, clock.clone()).map_err(system)?;
         if let Some(celsius) = temperature {
             emulator.set_temperature(celsius);
         }
+
         let lens = OptotuneLens::connect(emulator.path(), Settings::default(), clock)?;
         emulator.set_fault(fault.unwrap_or_default());
+
         Ok(Self { lens, emulator })
     }
 }
@@ -74,7 +79,7 @@ impl Lens for EmulatedLens {
         self.lens.dynamics()
     }
 
-    /// The emulated glass; the driver uses the whole of its range, so both count alike.
+    /// The emulated glass. The driver uses the whole of its range, so both scales are the same.
     fn optics(&self) -> Arc<dyn Optics> {
         self.emulator.glass()
     }

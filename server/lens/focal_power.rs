@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "f64", into = "f64")]
 pub struct FocalPower(f64);
 
-/// A number that is no focal power.
+/// A number that is not a focal power.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("focal power must be a number from 0 to 1, not {0}")]
 pub struct OutOfRange(pub f64);
@@ -23,12 +23,12 @@ impl FocalPower {
     /// `value` as a focal power.
     ///
     /// # Errors
-    /// When `value` is outside 0..=1 or no number.
+    /// When `value` is outside 0..=1 or NaN.
     pub fn new(value: f64) -> Result<Self, OutOfRange> {
         if (0.0..=1.0).contains(&value) { Ok(Self(value)) } else { Err(OutOfRange(value)) }
     }
 
-    /// The focal power nearest to `value`; the middle where `value` is no number.
+    /// The focal power nearest to `value`; the middle where `value` is NaN.
     #[must_use]
     pub const fn nearest(value: f64) -> Self {
         if value.is_nan() { Self::MIDDLE } else { Self(value.clamp(0.0, 1.0)) }

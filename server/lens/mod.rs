@@ -1,4 +1,4 @@
-//! Lenses: focal power, and what drives it. Knows no image.
+//! Lenses: focal power, and the devices that set it. This room knows nothing of images.
 
 mod dynamics;
 mod emulated;
@@ -26,24 +26,24 @@ use crate::options::BadOptions;
 
 /// A focus-tunable lens.
 ///
-/// An implementation guarantees that [`Lens::set`], [`Lens::measured`] and [`Lens::health`] return within a
-/// millisecond whatever the device does: a driver that talks to a port does so on a thread of its own. A lens that
-/// failed goes on trying to come back by itself; the caller just keeps setting.
+/// An implementation guarantees that [`Lens::set`], [`Lens::measured`] and [`Lens::health`] return
+/// within a millisecond whatever the device does: a driver that talks to a port does so on a thread
+/// of its own. A lens that failed keeps trying to recover by itself; the caller just keeps setting.
 pub trait Lens: Send {
     /// Asks the lens to go to `target`; returns without waiting for it to get there.
     ///
     /// # Errors
-    /// When the lens is gone, did not follow the commands before, or takes them too slowly. It stays where it was until it is well again; it
-    /// may go to the latest target then.
+    /// When the lens is gone, did not follow the commands before, or takes them too slowly. It stays
+    /// where it was until it recovers; then it may go to the latest target.
     fn set(&mut self, target: FocalPower) -> Result<(), LensError>;
 
-    /// The focal power last known to be real (read back, or modelled from what was asked), if any is known.
+    /// The focal power last known to be real (read back, or modelled from the commands), if known.
     fn measured(&self) -> Option<FocalPower>;
 
-    /// How the lens is, in words for the operator.
+    /// The lens's state, in words for the operator.
     fn health(&self) -> LensHealth;
 
-    /// What the device is: may talk to it, and block for up to a second.
+    /// Describes the device. May talk to it, and block for up to a second.
     ///
     /// # Errors
     /// When the device does not answer.
@@ -52,11 +52,12 @@ pub trait Lens: Send {
     /// Dead time and settling time, for attributing a frame to the focal power that it was exposed at.
     fn dynamics(&self) -> LensDynamics;
 
-    /// What a simulated camera looks through: the true focal power of the glass over time. Real lenses, whose glass
-    /// cannot be known, answer with a model fed by what was asked.
+    /// The glass that a simulated camera looks through: its true focal power over time. Real lenses,
+    /// whose glass cannot be known, return a model fed with the commands.
     fn optics(&self) -> Arc<dyn Optics>;
 
-    /// The focal power as the device itself tells it now: may talk to it, and block for up to a second.
+    /// The focal power as the device itself reports it now. May talk to the device, and block for up to
+    /// a second.
     ///
     /// # Errors
     /// When the device does not answer.
@@ -81,19 +82,19 @@ pub trait Optics: Send + Sync {
 pub struct LensHealth {
     /// Name for people, for example `simulated lens`.
     pub name: Arc<str>,
-    /// Whether no real glass moves: said on every page.
+    /// Whether no real glass moves; every page says so.
     pub simulated: bool,
     /// Whether commands are being taken.
     pub working: bool,
-    /// Whether it works, but not as it should: the message says why, and the operator is to be warned.
+    /// Whether the lens works, but not properly: the message says why, and the operator must be warned.
     pub caution: bool,
-    /// One sentence: what is the case and, if it is bad, what to do.
+    /// One sentence: the state and, if it is bad, what to do.
     pub message: Arc<str>,
     /// Errors on its line since it was opened: replies that were damaged, late or missing, and noise.
     pub line_errors: u64,
 }
 
-/// What a lens says of itself (`parfocal lens info --json`; see docs/scripting.md).
+/// A lens's description of itself (`parfocal lens info --json`; see docs/scripting.md).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LensInfo {
     /// Driver's name, for example `Optotune Lens Driver 4` or `simulated`.
@@ -102,7 +103,7 @@ pub struct LensInfo {
     pub firmware: String,
     /// Serial number.
     pub serial: String,
-    /// Least dioptres that can be asked for; focal power 0.
+    /// Least dioptres; focal power 0.
     pub min_dioptre: f64,
     /// Most dioptres; focal power 1.
     pub max_dioptre: f64,
@@ -116,7 +117,7 @@ pub struct LensInfo {
     pub line_errors: u64,
 }
 
-/// How a lens answers a step.
+/// How a lens responds to a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LensDynamics {
     /// From command to first movement.
@@ -131,16 +132,16 @@ impl From<BadOptions> for LensError {
     }
 }
 
-/// Why a lens did not do as it was told.
+/// Why a lens did not follow a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LensError {
     /// No device, or it went away.
     #[error("the lens does not answer: {0}")]
     Gone(String),
-    /// It is there, but commands wait to be carried out.
+    /// The device is there, but commands wait to be carried out.
     #[error("the lens does not accept commands: {0}")]
     Stalled(String),
-    /// The device said no.
+    /// The device refused.
     #[error("the lens refused: {0}")]
     Refused(String),
     /// The specification given on the command line makes no sense.

@@ -6,20 +6,22 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::{FocalPower, LensDynamics, Optics};
 use crate::clock::Moment;
 
-/// Moves remembered: five seconds of commands at 50 a second, so that a camera may look back at a long exposure.
+/// Moves remembered: five seconds of commands at 50 a second, so that a camera may look back at a long
+/// exposure.
 const REMEMBERED: usize = 256;
 
 /// The glass of a lens as a function of time, fed with commands.
 ///
-/// A command takes effect after the dead time. Then play of half-width `play` (in focal power) swallows the first
-/// `2 * play` of every reversal, which is the simplest loop with the two branches that a tunable lens shows; and what
-/// is left is approached as `1 - exp(-t / tau)` with `tau = settling / ln 20`, so that 5 % of a step remain after the
-/// settling time. The approach never overshoots: focal power stays within 0..=1.
+/// A command takes effect after the dead time. Then play of half-width `play` (in focal power) swallows
+/// the first `2 * play` of every reversal, which is the simplest loop with the two branches that a
+/// tunable lens shows. The glass approaches the rest as `1 - exp(-t / tau)` with `tau = settling /
+/// ln 20`, so that 5 % of a step remain after the settling time. The approach never overshoots: focal
+/// power stays within 0..=1.
 #[derive(Debug)]
 pub struct Response {
     dynamics: LensDynamics,
     play: f64,
-    /// Never empty; in order of `starts`. Held for a few instructions only.
+    /// Never empty; in order of `starts`. Locked for a few instructions only.
     moves: Mutex<VecDeque<Move>>,
 }
 
@@ -39,16 +41,20 @@ impl Response {
         Self { dynamics, play, moves: Mutex::new(VecDeque::from([rest])) }
     }
 
-    /// Sends the glass to `target`, the command being given at `now`.
+    /// Sends the glass to `target` by a command given at `now`.
     pub fn command(&self, now: Moment, target: FocalPower) {
         let mut moves = self.moves();
         let Some(&last) = moves.back() else { return };
+
+        // A command never overtakes the one before it.
         let starts = (now + self.dynamics.delay).max(last.starts);
         let to = last.to.clamp(target.get() - self.play, target.get() + self.play);
         let from = self.position(&last, starts);
+
         if moves.len() == REMEMBERED {
             moves.pop_front();
         }
+
         moves.push_back(Move { starts, from, to });
     }
 
@@ -77,6 +83,7 @@ impl Optics for Response {
             Some(current) => self.position(current, moment),
             None => moves.front().map_or(0.5, |oldest| oldest.from),
         };
+
         FocalPower::nearest(position)
     }
 }

@@ -1,4 +1,5 @@
-//! The simulated lens: behaves like a tunable lens, deterministically by the clock, and fails on request.
+//! The simulated lens: behaves like a tunable lens, deterministically by the clock, and fails on
+//! request.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -12,8 +13,8 @@ use super::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Opt
 use crate::clock::Clock;
 use crate::options::Options;
 
-/// A step of a tunable liquid lens settles in about 15 ms (Optics Express 27, 2085, 2019); 2 ms is what a command takes
-/// over USB and through the driver.
+/// A step of a tunable liquid lens settles in about 15 ms (Optics Express 27, 2085, 2019); a command
+/// takes 2 ms over USB and through the driver.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
 /// Half-width of the hysteresis, as a share of the range: 0.02 of 5 dioptres.
@@ -22,13 +23,13 @@ const PLAY: f64 = 0.004;
 /// Dioptres at focal power 0 and 1: a lens without an offset lens.
 const DIOPTRES: (f64, f64) = (5.0, 10.0);
 
-/// A lens that is not there.
+/// A lens without hardware.
 pub struct SimulatedLens {
     clock: Arc<dyn Clock>,
     dynamics: LensDynamics,
-    /// What the light sees.
+    /// The glass as the light sees it.
     glass: Arc<Response>,
-    /// What a driver can know: it cannot sense the glass, so hysteresis is not in it.
+    /// The glass as a driver can know it: a driver cannot sense hysteresis, so this model has none.
     known: Response,
     faults: SimulatedFaults,
     name: Arc<str>,
@@ -38,16 +39,16 @@ pub struct SimulatedLens {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulatedFault {
-    /// Nothing.
+    /// No fault.
     #[default]
     None,
-    /// Commands are taken and lost on the way.
+    /// Commands are accepted, but get lost on the way.
     Drops,
-    /// Commands pile up before the driver: none is taken.
+    /// Commands pile up before the driver: it accepts none.
     Stalls,
     /// The driver answers every command with an error.
     Refuses,
-    /// Nothing answers.
+    /// The device does not answer.
     Gone,
 }
 
@@ -79,17 +80,17 @@ impl FromStr for SimulatedFault {
     }
 }
 
-/// A switch for a simulated lens's faults; clone it, and turn it from any thread at any time.
+/// A switch for a simulated lens's faults. Clone it to set faults from any thread at any time.
 #[derive(Debug, Clone, Default)]
 pub struct SimulatedFaults(Arc<AtomicU8>);
 
 impl SimulatedFaults {
-    /// Switches to `fault`, from the next call on the lens on.
+    /// Switches to `fault`, from the next call of the lens on.
     pub fn set(&self, fault: SimulatedFault) {
         self.0.store(fault as u8, Ordering::Relaxed);
     }
 
-    /// The fault that is on.
+    /// The current fault.
     #[must_use]
     pub fn get(&self) -> SimulatedFault {
         SimulatedFault::ALL.get(usize::from(self.0.load(Ordering::Relaxed))).copied().unwrap_or_default()
@@ -116,15 +117,18 @@ impl SimulatedLens {
         }
     }
 
-    /// The lens of a specification's `options`: `fault`, the fault it starts with; `delay` and `settling`, milliseconds.
+    /// The lens of a specification's `options`: `fault`, the fault it starts with; `delay` and
+    /// `settling`, milliseconds.
     pub(super) fn open(mut options: Options, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let fault = options.take::<SimulatedFault>("fault")?;
         let millis = |given: Option<u32>, usual| given.map_or(usual, |millis| Duration::from_millis(millis.into()));
+
         let dynamics = LensDynamics {
             delay: millis(options.take("delay")?, DYNAMICS.delay),
             settling: millis(options.take("settling")?, DYNAMICS.settling),
         };
         options.finish()?;
+
         let lens = Self::moving(dynamics, clock);
         lens.faults.set(fault.unwrap_or_default());
         Ok(lens)
@@ -166,7 +170,9 @@ impl Lens for SimulatedLens {
             (None, SimulatedFault::Drops) => "commands get lost on the way (simulated fault)".into(),
             (None, _) => "follows commands; no real glass moves".into(),
         };
-        let (name, working) = (self.name.clone(), failure.is_none());
+
+        let name = self.name.clone();
+        let working = failure.is_none();
         LensHealth { name, simulated: true, working, caution: false, message: message.into(), line_errors: 0 }
     }
 

@@ -1,4 +1,5 @@
-//! Lens specifications, as given on the command line: `KIND`, `KIND:DEVICE`, each with `?NAME=VALUE&…` behind it.
+//! Lens specifications, as given on the command line: `KIND` or `KIND:DEVICE`, optionally followed by
+//! `?NAME=VALUE&…`.
 
 use std::sync::Arc;
 
@@ -9,18 +10,20 @@ use super::{Lens, LensError};
 use crate::clock::Clock;
 use crate::options::Options;
 
-/// Opens the lens that `spec` names: `simulated` (options `fault`, see [`super::SimulatedFault`], `delay` and
-/// `settling`, milliseconds), `emulated` (options `latency`, `delay`, `settling`, `hysteresis`, `temperature`, `fault`: see
-/// [`super::emulator::Model`]), `optotune:auto` or `optotune:/dev/...` (options `min` and `max`, the dioptres to use, `low`
-/// and `high`, the temperature limits in °C).
+/// Opens the lens that `spec` names: `simulated` (options `fault`, see [`super::SimulatedFault`],
+/// `delay` and `settling`, milliseconds), `emulated` (options `latency`, `delay`, `settling`,
+/// `hysteresis`, `temperature`, `fault`: see [`super::emulator::Model`]), `optotune:auto` or
+/// `optotune:/dev/...` (options `min` and `max`, the dioptres to use, `low` and `high`, the temperature
+/// limits in °C).
 ///
 /// # Errors
-/// When the specification makes no sense, or its device cannot be used; says what to do.
+/// When the specification is invalid, or its device cannot be used; says what to do.
 pub fn open(spec: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Lens>, LensError> {
     opened(spec, false, clock)
 }
 
-/// The same for moving a lens by hand: it is taken as it stands, and stays where it was put once it is dropped.
+/// The same for moving a lens by hand: the lens keeps its state when it is opened, and its focal power
+/// when it is dropped.
 ///
 /// # Errors
 /// As of [`open`].

@@ -9,18 +9,19 @@ use super::wire::{REQUESTS, checksum_of, framed};
 use crate::clock::Moment;
 use crate::lens::{FocalPower, Response};
 
-/// Temperature limits up to which the whole range is held, in °C; a wider span costs a little at both ends.
+/// Span of the temperature limits, in °C, up to which the whole range is held; a wider span costs a
+/// little at both ends.
 const FULL_RANGE_SPAN: f64 = 20.0;
-/// Dioptres that a degree more costs, at each end.
+/// Dioptres that each further degree costs, at each end.
 const NARROWING: f64 = 0.02;
 const IMAX_HUNDREDTHS: u16 = 29_284;
-/// A request whose rest does not come within this time is forgotten.
+/// A request whose rest does not come within this time is dropped.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// Focal power commands remembered for whoever wants to look.
+/// Focal power commands remembered for inspection.
 const REMEMBERED: usize = 8192;
-/// How much later than usual a [`Glitch::Late`] reply comes: later than a driver waits.
+/// Additional delay of a [`Glitch::Late`] reply: longer than a driver waits.
 const LATE: Duration = Duration::from_millis(200);
-/// What [`Glitch::Noise`] puts before a reply.
+/// Bytes that [`Glitch::Noise`] puts before a reply.
 const NOISE: [u8; 3] = [0xFF, 0x00, 0x7E];
 
 /// A reply on its way.
@@ -28,11 +29,11 @@ const NOISE: [u8; 3] = [0xFF, 0x00, 0x7E];
 pub struct Answer {
     /// What goes over the wire.
     pub bytes: Vec<u8>,
-    /// Time that it takes.
+    /// Time until they go out.
     pub takes: Duration,
 }
 
-/// Something that the driver was told to do.
+/// An order that the driver received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
     /// Control by current.
@@ -47,21 +48,21 @@ pub enum Order {
 
 /// A driver with its lens.
 pub struct Firmware {
-    /// The unit.
+    /// Properties of the unit.
     pub model: Model,
-    /// What is wrong.
+    /// The current fault.
     pub fault: Fault,
-    /// Of the lens, in °C.
+    /// Temperature of the lens, °C.
     pub temperature: f64,
     /// Whether a lens is plugged into the driver.
     pub lens_present: bool,
     /// Focal power commands carried out, in the driver's units, and when they were read.
     pub commands: VecDeque<(Moment, i16)>,
-    /// Everything that the driver was told to do, carried out or not.
+    /// Every order that the driver received, carried out or not.
     pub orders: VecDeque<Order>,
     /// Whole requests that have arrived.
     pub requests: u64,
-    /// What befalls the next replies, one by one.
+    /// Glitches of the next replies, in their order.
     pub glitches: VecDeque<Option<Glitch>>,
     /// Replies made on a [`Fault::NoisyLine`].
     noisy_replies: usize,
@@ -77,7 +78,7 @@ pub struct Firmware {
 }
 
 impl Firmware {
-    /// A unit that has just got power.
+    /// A unit that has just been switched on.
     pub fn new(model: Model) -> Self {
         Self {
             glass: Arc::new(Response::new(model.glass, model.play, FocalPower::MIN)),
@@ -100,15 +101,18 @@ impl Firmware {
         }
     }
 
-    /// Loses everything that it does not hold in its memory: mode, limits, focal power.
+    /// Loses everything that is not in permanent memory: mode, limits, focal power.
     pub fn power_cycle(&mut self, now: Moment) {
-        (self.mode, self.limits, self.focal_power, self.current) = (1, None, 0, 0);
+        self.mode = 1;
+        self.limits = None;
+        self.focal_power = 0;
+        self.current = 0;
         self.unreachable = false;
         self.buffer.clear();
         self.glass.command(now, FocalPower::MIN);
     }
 
-    /// The glass, 0..=1 standing for the whole of what the lens can do.
+    /// The glass; 0..=1 stands for the whole range of the lens.
     pub fn glass(&self) -> Arc<Response> {
         self.glass.clone()
     }
@@ -123,9 +127,12 @@ impl Firmware {
         if now.since(self.last_byte) > PATIENCE {
             self.buffer.clear();
         }
+
         self.last_byte = now;
         self.buffer.extend(bytes);
+
         let mut answers = Vec::new();
+
         match self.fault {
             Fault::Silent => self.buffer.clear(),
             Fault::Stranger => {
@@ -141,10 +148,12 @@ impl Firmware {
                 }
             }
         }
+
         answers
     }
 
-    /// The answer to the first request in the buffer, empty where it gets none; nothing while it is incomplete.
+    /// The answer to the first request in the buffer, empty where it gets none; `None` while it is
+    /// incomplete.
     fn next(&mut self, now: Moment) -> Option<Vec<u8>> {
         if self.buffer.is_empty() {
             return None;
@@ -153,6 +162,7 @@ impl Firmware {
             self.buffer.drain(..5);
             return Some(b"Ready\r\n".to_vec());
         }
+
         let Some(&(name, values)) = REQUESTS.iter().find(|(name, _)| self.buffer.starts_with(name)) else {
             let mut names = REQUESTS.iter().map(|(name, _)| *name).chain([&b"Start"[..]]);
             if names.any(|name| name.starts_with(&self.buffer)) {
@@ -161,18 +171,22 @@ impl Firmware {
             self.buffer.clear();
             return Some(self.error(3));
         };
+
         let length = name.len() + values;
         if self.buffer.len() < length + 2 {
             return None;
         }
+
         let request: Vec<u8> = self.buffer.drain(..length + 2).collect();
         let (payload, checksum) = request.split_at(length);
         if checksum != checksum_of(payload) {
             return Some(if self.model.old { b"N\r\n".to_vec() } else { self.error(1) });
         }
+
         if self.fault == Fault::Errors {
             return Some(self.error(3));
         }
+
         Some(self.answer(name, payload.get(name.len()..).unwrap_or_default(), now))
     }
 
@@ -188,6 +202,7 @@ impl Firmware {
             Some(&[high, low]) => i16::from_be_bytes([high, low]),
             _ => 0,
         };
+
         let order = match name {
             b"Aw" => Some(Order::Current(value(0))),
             b"MwDA" => Some(Order::CurrentMode),
@@ -244,7 +259,8 @@ impl Firmware {
         framed(&[name, &[self.status()], &max.to_be_bytes(), &min.to_be_bytes()].concat())
     }
 
-    /// Least and greatest focal power within the temperature limits, in the driver's units; nothing without limits.
+    /// Least and greatest focal power within the temperature limits, in the driver's units; zeros without
+    /// limits.
     fn range(&self) -> (i16, i16) {
         let Some((high, low)) = self.limits else { return (0, 0) };
         let lost = (f64::from(high - low) / 16.0 - FULL_RANGE_SPAN).max(0.0) * NARROWING;
@@ -261,9 +277,12 @@ impl Firmware {
             let (min, max) = self.range();
             self.focal_power = wanted.clamp(min.min(max), max);
             self.unreachable = self.focal_power != wanted;
-            let (least, most) = (self.units(LENS_DIOPTRES.0), self.units(LENS_DIOPTRES.1));
+
+            let least = self.units(LENS_DIOPTRES.0);
+            let most = self.units(LENS_DIOPTRES.1);
             let share = f64::from(self.focal_power - least) / f64::from(most - least);
             self.glass.command(now, FocalPower::nearest(share));
+
             if self.commands.len() == REMEMBERED {
                 self.commands.pop_front();
             }
@@ -294,20 +313,22 @@ impl Firmware {
         framed(&[b'E', if self.model.ascii_errors { b'0' + number } else { number }])
     }
 
-    /// `answer` as it goes over the wire.
+    /// `answer` as it goes over the wire, with the next glitch applied.
     fn sent(&mut self, answer: Vec<u8>) -> Answer {
         let mut sent = Answer { bytes: self.damaged(answer), takes: self.model.latency };
         let glitch = self.glitches.pop_front().unwrap_or_else(|| self.noise_of_the_line());
+
         match glitch {
             Some(Glitch::Noise) => sent.bytes.splice(..0, NOISE).for_each(drop),
             Some(Glitch::Checksum) => spoil_checksum(&mut sent.bytes),
             Some(Glitch::Late) => sent.takes += LATE,
             None => {}
         }
+
         sent
     }
 
-    /// What befalls the next reply for the line's sake.
+    /// The glitch of the next reply on a noisy line.
     fn noise_of_the_line(&mut self) -> Option<Glitch> {
         if self.fault != Fault::NoisyLine {
             return None;
@@ -320,7 +341,7 @@ impl Firmware {
     fn damaged(&self, mut answer: Vec<u8>) -> Vec<u8> {
         match self.fault {
             Fault::Garbage => answer.iter_mut().for_each(|byte| *byte = byte.wrapping_mul(31) ^ 0x5A),
-            // The greeting has none.
+            // The greeting has no checksum.
             Fault::WrongChecksum if answer != b"Ready\r\n" => spoil_checksum(&mut answer),
             Fault::WrongReadBack if answer.starts_with(b"PD") => spoil_checksum(&mut answer),
             _ => {}

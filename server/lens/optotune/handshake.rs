@@ -1,4 +1,4 @@
-//! What is said before the first command: who are you, temperature limits, focal power mode.
+//! The exchange before the first command: identification, temperature limits, focal power mode.
 
 use std::path::Path;
 
@@ -13,14 +13,15 @@ use crate::lens::LensError;
 /// How the lens is to be used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Least dioptres to use, if not the device's.
+    /// Least dioptres to use, unless the device's own.
     pub min_dioptre: Option<f64>,
     /// Most dioptres to use.
     pub max_dioptre: Option<f64>,
-    /// Lens temperatures, in °C, between which focal power is to be held. A wider span narrows the dioptre range.
+    /// Lens temperatures, in °C, between which focal power must be held. A wider span narrows the
+    /// dioptre range.
     pub temperatures: (f64, f64),
-    /// Whether the lens is taken as it stands and left where it is put, instead of being without current before and
-    /// after.
+    /// Whether the lens keeps its state when opened and stays where it was put, instead of being without
+    /// current before and after.
     pub keep: bool,
 }
 
@@ -37,25 +38,31 @@ pub fn perform(link: &mut Link, settings: &Settings, path: &Path) -> Result<Devi
     if !settings.keep && !link.is_known() {
         let_go_first(link)?;
     }
+
     let Reply::FirmwareType(letter) = link.ask(Request::FirmwareType)? else { return Err(confused()) };
     let version = match link.ask(Request::FirmwareVersion)? {
         Reply::FirmwareVersion(major, minor, build, revision) => format!("{major}.{minor}.{build}.{revision}"),
         _ => return Err(confused()),
     };
     let Reply::Serial(serial) = link.ask(Request::Serial)? else { return Err(confused()) };
+
     let Reply::Status(status) = link.ask(Request::Status)? else { return Err(confused()) };
     check_lens(Status(status))?;
+
     let limits = control_focal_power(link, settings)?;
     let scale = Scale::of_firmware(letter);
     let range = Range::new(scale, limits, settings.min_dioptre, settings.max_dioptre)?;
+
     let Reply::Mode(mode) = link.ask(Request::Mode)? else { return Err(confused()) };
     if mode != FOCAL_POWER_MODE {
         let mode = mode_name(mode);
         return Err(LensError::Refused(format!("it stays in {mode} mode instead of focal power mode")).into());
     }
+
     let Reply::Status(status) = link.ask(Request::Status)? else { return Err(confused()) };
     let Reply::Temperature(sixteenths) = link.ask(Request::Temperature)? else { return Err(confused()) };
     let Reply::FocalPower(read_back) = link.ask(Request::FocalPower)? else { return Err(confused()) };
+
     Ok(Device {
         firmware: format!("type {}, version {version}", char::from(letter)),
         serial: String::from_utf8_lossy(&serial).trim_matches(['\0', ' ']).to_owned(),
@@ -87,8 +94,8 @@ fn greet(link: &mut Link, path: &Path) -> Result<(), Trouble> {
     }
 }
 
-/// A process that was killed may have left the lens under current. What the driver says to this is no matter: if it
-/// cannot be used, what follows finds out why.
+/// Lets the lens go first, because a process that was killed may have left it under current. The
+/// driver's answer does not matter: if it cannot be used, the next steps find out why.
 fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
     match link.relax() {
         Err(error @ (LinkError::Stopped | LinkError::Port(_))) => Err(error.into()),
@@ -100,11 +107,13 @@ fn let_go_first(link: &mut Link) -> Result<(), Trouble> {
     }
 }
 
-/// Temperature limits first: without them the driver refuses focal power mode. The range is that of the last reply.
+/// Sets the temperature limits first: without them the driver refuses focal power mode. The last reply
+/// gives the range.
 fn control_focal_power(link: &mut Link, settings: &Settings) -> Result<Limits, Trouble> {
     let (low, high) = settings.temperatures;
     let request = Request::TemperatureLimits { high: sixteenths(high), low: sixteenths(low) };
     let Reply::TemperatureLimits(_) = link.ask(request).map_err(explain_incompatible)? else { return Err(confused()) };
+
     match link.ask(Request::FocalPowerMode).map_err(explain_incompatible)? {
         Reply::FocalPowerMode(limits) => Ok(limits),
         _ => Err(confused()),

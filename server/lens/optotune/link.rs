@@ -1,4 +1,5 @@
-//! One connection to the driver: commands from the slot go out at once, also while a reply is awaited.
+//! One connection to the driver. Commands from the slot are sent at once, even while a reply is
+//! awaited.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::Duration;
@@ -13,13 +14,13 @@ use crate::clock::Moment;
 
 /// A driver answers within a few milliseconds; USB hubs add some.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(150);
-/// A command's ten bytes take so long over the wire. One that is sent sooner after another waits in the port, where a later
-/// one cannot overtake it.
+/// Time that a command's ten bytes take over the wire. A command sent sooner after another waits in the
+/// port, where a later one cannot overtake it.
 const ON_THE_WIRE: Duration = Duration::from_millis(1);
-/// Times that a request is made before its failure counts. Every request that gets a reply may be repeated: it only
-/// asks, or sets what is set already.
+/// Times that a request is made before its failure counts. Every request that gets a reply may be
+/// repeated: it only asks, or sets what is set already.
 const ATTEMPTS: u32 = 3;
-/// A line that has been quiet for so long has nothing more to say about an earlier request.
+/// A line that has been quiet for so long will not send more about an earlier request.
 const QUIET: Duration = Duration::from_millis(10);
 /// Longest wait for a line that never gets quiet.
 const DRAINING: Duration = Duration::from_millis(200);
@@ -27,13 +28,13 @@ const DRAINING: Duration = Duration::from_millis(200);
 /// A port with a lens driver behind it.
 pub struct Link<'a> {
     port: Port,
-    shared: &'a Shared,
+    /// Set once known; from then on commands are taken from the slot.
     /// Once known, commands are taken from the slot.
     range: Option<Range>,
     sent: Option<Sent>,
-    /// Whether a reply is owed: it may still come.
+    /// Whether a reply to an earlier request may still come.
     awaiting: bool,
-    /// Whether the lens is being let go: nothing stops that.
+    /// Whether the lens is being let go, which nothing may interrupt.
     closing: bool,
     outgoing: Vec<u8>,
     incoming: Vec<u8>,
@@ -44,11 +45,11 @@ pub struct Link<'a> {
 pub struct Sent {
     /// In the driver's own units.
     pub raw: i16,
-    /// When.
+    /// Time at which it was sent.
     pub at: Moment,
 }
 
-/// Why the driver could not be talked to.
+/// Why communication with the driver failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// The port failed or vanished.
@@ -57,7 +58,7 @@ pub enum LinkError {
     /// Nothing came back in time.
     #[error("it is silent: check its power and cable")]
     Silent,
-    /// What came back is no reply.
+    /// The bytes that came back are not a reply.
     #[error(transparent)]
     Wire(#[from] WireError),
     /// The thread is to end.
@@ -66,8 +67,8 @@ pub enum LinkError {
 }
 
 impl LinkError {
-    /// Whether the line may be at fault, so that the same request may well succeed. A driver that knows no such request
-    /// may have got it damaged.
+    /// Whether the line may be at fault, so that the same request may well succeed. A driver that does
+    /// not know a request may have received it damaged.
     const fn is_of_the_line(&self) -> bool {
         match self {
             Self::Silent | Self::Wire(WireError::Checksum | WireError::Garbage) => true,
@@ -92,7 +93,7 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// From now on takes commands from the slot and sends them within `range`.
+    /// From now on, takes commands from the slot and sends them within `range`.
     pub const fn follow_commands(&mut self, range: Range) {
         self.range = Some(range);
     }
@@ -115,8 +116,8 @@ impl<'a> Link<'a> {
         self.sent = Some(Sent { raw, at: now });
     }
 
-    /// Greets the driver, three times at most: the first greeting may end a request that someone else left half sent.
-    /// Whether it greeted back as a lens driver does.
+    /// Greets the driver, three times at most: the first greeting may end a request that another program
+    /// left half sent. Returns whether the reply was a lens driver's greeting.
     pub fn greet(&mut self) -> Result<bool, LinkError> {
         let mut heard = false;
         for _ in 0..ATTEMPTS {
@@ -125,16 +126,19 @@ impl<'a> Link<'a> {
                 self.shared.state().greeted = true;
                 return Ok(true);
             }
+
             heard |= !self.incoming.is_empty();
             self.shared.count_line_error();
             self.drain()?;
         }
+
         if heard { Ok(false) } else { Err(LinkError::Silent) }
     }
 
     fn greet_once(&mut self) -> Result<bool, LinkError> {
         self.incoming.clear();
         self.outgoing.extend(START);
+
         let end = self.shared.clock.now() + REPLY_TIMEOUT;
         while self.shared.clock.now() < end {
             self.pump(end)?;
@@ -142,21 +146,27 @@ impl<'a> Link<'a> {
                 return Ok(true);
             }
         }
+
         Ok(false)
     }
 
-    /// Asks `request` and waits for its reply. Where the line lost or damaged it, asks again, three times in all.
+    /// Makes `request` and waits for its reply. Where the line lost or damaged it, repeats the request,
+    /// three times in all.
     pub fn ask(&mut self, request: Request) -> Result<Reply, LinkError> {
         let mut attempt = 1;
+
         loop {
             let error = match self.ask_once(request) {
                 Err(error) if error.is_of_the_line() => error,
                 outcome => return outcome,
             };
+
             self.shared.count_line_error();
+
             if attempt == ATTEMPTS {
                 return Err(error);
             }
+
             attempt += 1;
             self.drain()?;
         }
@@ -167,23 +177,28 @@ impl<'a> Link<'a> {
         self.incoming.clear();
         self.outgoing.extend(request.encode());
         self.awaiting = true;
+
         let end = self.shared.clock.now() + REPLY_TIMEOUT;
         loop {
             self.pump(end)?;
+
             let outcome = self.find_reply(request);
             if matches!(outcome, Ok(_) | Err(LinkError::Wire(WireError::Device(_)))) {
                 self.awaiting = false;
                 return outcome;
             }
+
             if self.shared.clock.now() >= end {
                 return outcome;
             }
         }
     }
 
-    /// The reply to `request` among the bytes that came: behind noise, or behind a late reply to something else.
+    /// Finds the reply to `request` among the bytes received: behind noise, or behind a late reply to
+    /// another request.
     fn find_reply(&self, request: Request) -> Result<Reply, LinkError> {
         let mut failure = if self.incoming.is_empty() { LinkError::Silent } else { WireError::Garbage.into() };
+
         for start in 0..self.incoming.len() {
             match request.reply(self.incoming.get(start..).unwrap_or_default()) {
                 Ok(Some(reply)) => {
@@ -194,31 +209,35 @@ impl<'a> Link<'a> {
                 _ => {}
             }
         }
+
         Err(failure)
     }
 
-    /// Counts what came `before` a reply and was no part of it.
+    /// Counts bytes that came `before` a reply and were not part of it.
     fn note_noise(&self, before: bool) {
         if before {
             self.shared.count_line_error();
         }
     }
 
-    /// Waits until the line is quiet, and forgets what came. A reply that is owed and of which nothing came yet is given
-    /// the time that a reply may take.
+    /// Waits until the line is quiet, and drops the bytes received. Where a reply is due of which nothing
+    /// has come yet, waits as long as a reply may take.
     fn drain(&mut self) -> Result<(), LinkError> {
         let begun = self.shared.clock.now();
         let end = begun + DRAINING;
         let late = self.awaiting && self.incoming.is_empty();
         let mut quiet_at = begun + if late { REPLY_TIMEOUT } else { QUIET };
         self.awaiting = false;
+
         loop {
             self.incoming.clear();
             self.pump(quiet_at.min(end))?;
+
             let now = self.shared.clock.now();
             if !self.incoming.is_empty() {
                 quiet_at = now + QUIET;
             }
+
             if now >= quiet_at.min(end) {
                 self.incoming.clear();
                 return Ok(());
@@ -226,12 +245,13 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Leaves the lens without current: it rests, and warms nobody. The driver is told whatever it answers, and asked
-    /// whether it obeyed.
+    /// Leaves the lens without current, so that it rests and does not warm up. Tells the driver whatever
+    /// it answers, and then asks whether it obeyed.
     pub fn relax(&mut self) -> Result<(), LinkError> {
         let mut attempt = 1;
         loop {
             self.drain()?;
+
             let outcome = self.relax_once();
             match outcome {
                 Err(error) if error.is_of_the_line() && attempt < ATTEMPTS => self.shared.count_line_error(),
@@ -243,6 +263,7 @@ impl<'a> Link<'a> {
 
     fn relax_once(&mut self) -> Result<(), LinkError> {
         let by_current = self.ask_once(Request::CurrentMode);
+        // The current is set even where the change of mode went unconfirmed: the lens must come to rest.
         self.tell(Request::SetCurrent(0))?;
         by_current?;
         match self.ask_once(Request::Current)? {
@@ -251,21 +272,22 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// The last that is done with the lens: no more commands are taken, and the lens is left without current.
+    /// The last operation on the lens: takes no more commands, and leaves the lens without current.
     pub fn close(&mut self) -> Result<(), LinkError> {
         self.closing = true;
         self.range = None;
         self.relax()
     }
 
-    /// Sends a request that gets no reply, or whose reply nobody needs.
+    /// Sends a request that has no reply, or whose reply is not needed.
     pub fn tell(&mut self, request: Request) -> Result<(), LinkError> {
         self.outgoing.extend(request.encode());
         self.flush()?;
         Ok(())
     }
 
-    /// An error that the driver sent unasked, which is how it answers a command that it did not accept.
+    /// An error that the driver sent without being asked; it answers so to a command that it did not
+    /// accept.
     pub fn stray_error(&mut self) -> Option<DeviceError> {
         let stray = std::mem::take(&mut self.incoming);
         let error = codec::error_reply(&stray);
@@ -275,19 +297,22 @@ impl<'a> Link<'a> {
         error
     }
 
-    /// Sends what waits to be sent, and waits until something happens or `until`: bytes came, the slot was filled, or
-    /// the thread is to end.
+    /// Sends what waits to be sent, then waits until bytes came, the slot was filled, the thread is to
+    /// end, or `until`.
     pub fn pump(&mut self, until: Moment) -> Result<(), LinkError> {
         self.take_command();
         self.flush()?;
+
         let until = self.command_due().map_or(until, |due| due.min(until));
         let left = Timespec::try_from(until.since(self.shared.clock.now())).unwrap_or_default();
         let wanted = if self.outgoing.is_empty() { PollFlags::IN } else { PollFlags::IN | PollFlags::OUT };
         let mut watched = [PollFd::new(self.port.file(), wanted), PollFd::new(&self.shared.wake, PollFlags::IN)];
+
         match poll(&mut watched, Some(&left)) {
             Ok(_) | Err(rustix::io::Errno::INTR) => {}
             Err(error) => return Err(io::Error::from(error).into()),
         }
+
         let [port, wake] = watched.map(|one| one.revents());
         if wake.contains(PollFlags::IN) {
             let _ = rustix::io::read(&self.shared.wake, &mut [0; 8]);
@@ -295,12 +320,13 @@ impl<'a> Link<'a> {
                 return Err(LinkError::Stopped);
             }
         }
+
         self.take_command();
         self.flush()?;
         if port.intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR) { self.receive() } else { Ok(()) }
     }
 
-    /// When the command that waits in the slot may go out.
+    /// When the command waiting in the slot may be sent.
     fn command_due(&self) -> Option<Moment> {
         let free = self.range.is_some() && self.outgoing.is_empty();
         let sent = self.sent.filter(|_| free && self.shared.has_command())?;
@@ -313,6 +339,7 @@ impl<'a> Link<'a> {
         if self.command_due().is_some_and(|due| self.shared.clock.now() < due) {
             return;
         }
+
         if let Some(target) = self.shared.take_command() {
             self.send_focal_power(range, range.raw(target));
         }
@@ -336,7 +363,7 @@ impl<'a> Link<'a> {
             Ok(0) => Err(io::Error::from(ErrorKind::UnexpectedEof).into()),
             Ok(read) => {
                 self.incoming.extend(bytes.iter().take(read));
-                // A line that babbles is noticed by its length; it must not fill the memory.
+                // A line that never stops sending must not fill the memory; its length gives it away.
                 self.incoming.truncate(4096);
                 Ok(())
             }

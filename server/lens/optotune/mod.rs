@@ -1,9 +1,10 @@
 //! The Optotune Lens Driver 4/4i over USB serial, as a [`Lens`].
 //!
-//! The caller's side only touches memory; a thread of its own talks to the port. When the lens is dropped, that thread
-//! puts the driver into current mode at 0 mA: the lens relaxes to its resting focal power and does not warm up (unless
-//! [`Settings::keep`] is set). [`let_go_of_all`] does the same before a process ends by another way. Only
-//! `kill -9` leaves the lens at the last focal power commanded, until it is opened again.
+//! The caller's side only touches memory; a thread of its own talks to the port. When the lens is
+//! dropped, that thread puts the driver into current mode at 0 mA: the lens relaxes to its resting focal
+//! power and does not warm up (unless [`Settings::keep`] is set). [`let_go_of_all`] does the same before
+//! a process ends in another way. Only `kill -9` leaves the lens at the last focal power commanded,
+//! until it is opened again.
 
 pub mod codec;
 mod handshake;
@@ -28,30 +29,33 @@ use crate::clock::Clock;
 use crate::options::Options;
 use crate::priority::{self, Place};
 
-/// Until it is measured on the bench: see the simulated lens's figures.
+/// Until they are measured on the bench: the simulated lens's figures.
 const DYNAMICS: LensDynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
 
-/// How serial numbers of emulated units begin (see [`super::emulator`]): behind those no glass moves.
+/// Prefix of the serial numbers of emulated units (see [`super::emulator`]), in which no glass moves.
 const EMULATED: &str = "EMUL";
 
-/// Longest wait for a device to say who it is, on a line where much has to be said twice.
+/// Longest wait for a device to identify itself, on a line where much has to be repeated.
 const CONNECT: Duration = Duration::from_secs(4);
 /// Longest wait for an answer.
 const ANSWER: Duration = Duration::from_millis(900);
 
-/// Longest wait for the driver's thread to let the lens go: a driver that is silent is told and asked three times, twice.
+/// Longest wait for the driver's thread to let the lens go: it tells and asks a silent driver three
+/// times, twice over.
 const LETTING_GO: Duration = Duration::from_secs(3);
 
-/// The lenses that are open: whatever ends the process, they must not be left under current.
+/// The open lenses: however the process ends, they must not be left under current.
 static OPEN: Mutex<Vec<Weak<Shared>>> = Mutex::new(Vec::new());
 
-/// Leaves every open lens without current, but for those that are to stay where they are, and waits until that is done.
-/// They take no commands any more.
+/// Leaves every open lens without current, except those that are to stay where they are, and waits until
+/// that is done. The lenses take no more commands.
 pub fn let_go_of_all() {
     let open: Vec<_> = {
         let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         open.drain(..).filter_map(|shared| shared.upgrade()).collect()
     };
+
+    // All are told before any is waited for, so that they let go at the same time.
     for shared in &open {
         shared.end();
     }
@@ -72,12 +76,15 @@ impl OptotuneLens {
     /// Connects to the driver at `path`.
     ///
     /// # Errors
-    /// When it cannot be used right now; says why and what to do. Later failures heal by themselves.
+    /// When it cannot be used right now; says why and what to do. It recovers from later failures by
+    /// itself.
     pub fn connect(path: &Path, settings: Settings, clock: Arc<dyn Clock>) -> Result<Self, LensError> {
         let response = Arc::new(Response::new(DYNAMICS, 0.0, FocalPower::MIDDLE));
         let system = |error: std::io::Error| LensError::Gone(format!("the system is out of resources: {error}"));
         let shared = Arc::new(Shared::new(clock, response).map_err(system)?);
-        let (theirs, path_of_thread) = (shared.clone(), path.to_owned());
+
+        let theirs = shared.clone();
+        let path_of_thread = path.to_owned();
         OPEN.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::downgrade(&shared));
         let thread = std::thread::Builder::new()
             .name("lens".into())
@@ -87,18 +94,21 @@ impl OptotuneLens {
                 theirs.ended();
             })
             .map_err(system)?;
+
         let mut lens = Self {
             shared,
             name: format!("Optotune lens at {}", path.display()).into(),
             thread: Some(thread),
             emulated: false,
         };
+
         lens.emulated = lens.shared.wait_connected(CONNECT)?.serial.starts_with(EMULATED);
         Ok(lens)
     }
 
-    /// The lens of a specification: `device` is a path, or `auto` for the one that is plugged in; options are `min` and
-    /// `max`, the dioptres to use, and `low` and `high`, the temperature limits in °C.
+    /// The lens of a specification: `device` is a path, or `auto` for the one that is plugged in;
+    /// options are `min` and `max`, the dioptres to use, and `low` and `high`, the temperature limits in
+    /// °C.
     pub(super) fn open(
         device: &str,
         mut options: Options,
@@ -112,7 +122,9 @@ impl OptotuneLens {
             temperatures: (options.take("low")?.unwrap_or(low), options.take("high")?.unwrap_or(high)),
             keep,
         };
+
         options.finish()?;
+
         let path = if device == "auto" { port::find(Path::new(port::BY_ID))? } else { PathBuf::from(device) };
         Self::connect(&path, settings, clock)
     }
@@ -124,6 +136,7 @@ impl Drop for OptotuneLens {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
+
         let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         open.retain(|shared| !std::ptr::eq(shared.as_ptr(), Arc::as_ptr(&self.shared)));
     }
@@ -142,11 +155,13 @@ impl Lens for OptotuneLens {
     fn health(&self) -> LensHealth {
         let state = self.shared.state();
         let caution = state.device.as_ref().is_ok_and(|device| device.status.doubtful());
+
         let (working, message) = match (&state.device, &state.refusal) {
             (Ok(_), None) => (true, state.message.clone()),
             (Ok(_), Some(refusal)) => (false, refusal.clone()),
             (Err(trouble), _) => (false, Arc::from(format!("{trouble}; trying again"))),
         };
+
         LensHealth {
             name: self.name.clone(),
             simulated: self.emulated,

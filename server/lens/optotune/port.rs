@@ -1,4 +1,5 @@
-//! The serial port that a lens driver hangs on: found, opened for this process alone, and errors about it in words.
+//! The lens driver's serial port: finds it, opens it for this process alone, and puts errors about it
+//! into words.
 
 use std::fs::{File, TryLockError};
 use std::os::unix::fs::MetadataExt;
@@ -12,13 +13,14 @@ use rustix::termios::{
 
 use crate::lens::LensError;
 
-/// Where Linux lists serial ports by the USB names of their devices.
+/// Folder in which Linux lists serial ports by the USB names of their devices.
 pub const BY_ID: &str = "/dev/serial/by-id";
-/// How those names begin for a Lens Driver 4; the serial number follows.
+/// Prefix of those names for a Lens Driver 4; the serial number follows.
 const USB_NAME: &str = "usb-Optotune_LD_";
 const BAUD: u32 = 115_200;
 
-/// An open port: 115200 baud, 8 bits, no parity, no flow control, never blocking, refused to others until dropped.
+/// An open port: 115200 baud, 8 bits, no parity, no flow control, never blocking, refused to others
+/// until dropped.
 #[derive(Debug)]
 pub struct Port(File);
 
@@ -26,17 +28,19 @@ impl Port {
     /// Opens the port at `path`.
     ///
     /// # Errors
-    /// When it is not there, is in use, is not a serial port or may not be opened; says what to do.
+    /// When it does not exist, is in use, is not a serial port or may not be opened; says what to do.
     pub fn open(path: &Path) -> Result<Self, LensError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let fd = rustix::fs::open(path, flags, Mode::empty()).map_err(|error| open_error(path, error))?;
         let port = Self(File::from(fd));
-        // The lock keeps out other processes of ours whoever runs them; exclusive mode keeps out everyone but root.
+
+        // The lock keeps out parfocal processes of any user; exclusive mode keeps out everyone but root.
         match port.0.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(open_error(path, Errno::BUSY)),
             Err(TryLockError::Error(error)) => return Err(gone(path, &error.to_string())),
         }
+
         port.configure().map_err(|error| open_error(path, error))?;
         Ok(port)
     }
@@ -47,6 +51,7 @@ impl Port {
         settings.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes -= ControlModes::CRTSCTS | ControlModes::CSTOPB;
         settings.set_speed(BAUD)?;
+
         ioctl_tiocexcl(&self.0)?;
         tcsetattr(&self.0, OptionalActions::Now, &settings)?;
         tcflush(&self.0, QueueSelector::IOFlush)
@@ -61,8 +66,8 @@ impl Port {
 
 impl Drop for Port {
     fn drop(&mut self) {
-        // Closing a port would wait half a minute for a device that takes nothing; and exclusive mode would outlast us
-        // where another process has the port open too.
+        // Closing a port would wait half a minute for a device that accepts nothing; and exclusive mode
+        // would outlast this process where another one has the port open too.
         let _ = tcflush(&self.0, QueueSelector::OFlush);
         let _ = ioctl_tiocnxcl(&self.0);
     }
@@ -92,6 +97,7 @@ fn drivers(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut found: Vec<_> =
         entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(USB_NAME)).map(|e| e.path()).collect();
+
     found.sort_unstable();
     found
 }

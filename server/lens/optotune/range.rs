@@ -3,7 +3,7 @@
 use super::codec::Limits;
 use crate::lens::{FocalPower, LensError};
 
-/// Units of a dioptre.
+/// Driver's units per dioptre.
 const PER_DIOPTRE: f64 = 200.0;
 
 /// How the driver counts focal power: `(dioptres + offset) * 200`.
@@ -40,10 +40,10 @@ pub struct Range {
 }
 
 impl Range {
-    /// What the device allows, narrowed to the dioptres that were configured.
+    /// The range that the device allows, narrowed to the configured dioptres.
     ///
     /// # Errors
-    /// When nothing is left.
+    /// When the narrowed range is empty.
     pub fn new(
         scale: Scale,
         device: Limits,
@@ -51,11 +51,14 @@ impl Range {
         max_dioptre: Option<f64>,
     ) -> Result<Self, LensError> {
         let bound = |raw: f64| raw.clamp(f64::from(i16::MIN), f64::from(i16::MAX));
+        // Rounded inwards: the range must not exceed the dioptres asked for.
         let min = min_dioptre.map_or(device.min, |dioptre| device.min.max(whole(bound(scale.raw(dioptre)).ceil())));
         let max = max_dioptre.map_or(device.max, |dioptre| device.max.min(whole(bound(scale.raw(dioptre)).floor())));
+
         if min < max {
             return Ok(Self { scale, min, max });
         }
+
         Err(LensError::Refused(format!(
             "it reaches {:.2} to {:.2} dpt, all of it outside min and max: change them",
             scale.dioptre(device.min),
@@ -63,17 +66,19 @@ impl Range {
         )))
     }
 
-    /// The driver's units of `power`: never outside what the device allows.
+    /// The driver's units of `power`, never outside the range that the device allows.
     #[must_use]
     pub fn raw(self, power: FocalPower) -> i16 {
-        let (min, max) = (f64::from(self.min), f64::from(self.max));
+        let min = f64::from(self.min);
+        let max = f64::from(self.max);
         whole((min + power.get() * (max - min)).round())
     }
 
     /// The focal power nearest to `raw`.
     #[must_use]
     pub fn focal_power(self, raw: i16) -> FocalPower {
-        let (min, max) = (f64::from(self.min), f64::from(self.max));
+        let min = f64::from(self.min);
+        let max = f64::from(self.max);
         FocalPower::nearest((f64::from(raw) - min) / (max - min))
     }
 
@@ -90,7 +95,7 @@ impl Range {
     }
 }
 
-/// Callers round `value` and keep it within the bounds of `i16`.
+/// Converts to whole units; callers round `value` and keep it within the bounds of `i16`.
 const fn whole(value: f64) -> i16 {
     value as i16
 }

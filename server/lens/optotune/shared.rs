@@ -1,4 +1,4 @@
-//! What the caller and the driver's thread share: the command slot, and what is known of the device.
+//! State shared by the caller and the driver's thread: the command slot, and the readings of the device.
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -16,38 +16,38 @@ use crate::lens::{FocalPower, LensError, Response};
 /// A command that waited this long in the slot is not being carried out.
 const STALLED: Duration = Duration::from_millis(250);
 
-/// Both sides hold one. The lock is never held over input or output.
+/// Held by both sides. The lock is never held during input or output.
 pub struct Shared {
-    /// Time.
+    /// Clock for deadlines and time stamps.
     pub clock: Arc<dyn Clock>,
     /// Model of the glass, fed when a command goes over the wire.
     pub response: Arc<Response>,
-    /// Readable when there is something for the thread to look at.
+    /// Readable when the thread has something to look at.
     pub wake: OwnedFd,
     line_errors: AtomicU64,
     state: Mutex<State>,
     changed: Condvar,
 }
 
-/// Everything known.
+/// Everything known of the device.
 pub struct State {
-    /// The latest command that is not yet on its way, and when the slot was filled.
+    /// The latest command not yet sent, and when the slot was filled.
     wanted: Option<(FocalPower, Moment)>,
-    /// The latest command that was taken: what is restored when the lens comes back.
+    /// The latest command taken; restored when the lens comes back.
     pub last: Option<FocalPower>,
-    /// The device while it is connected and focal power is under control, else why it is not.
+    /// The device while it is connected and focal power is under control; else the reason why not.
     pub device: Result<Device, LensError>,
     /// Whether the first attempt to connect is over.
     tried: bool,
-    /// How a connected device does, in words.
+    /// State of a connected device, in words.
     pub message: Arc<str>,
-    /// Why commands are not carried out though the device is connected.
+    /// Why commands are not carried out although the device is connected.
     pub refusal: Option<Arc<str>>,
-    /// Whether a lens driver ever greeted back here.
+    /// Whether a lens driver ever replied to the greeting here.
     pub greeted: bool,
-    /// How far the thread is.
+    /// Progress of the thread.
     progress: Progress,
-    /// Someone waits for fresh readings.
+    /// Whether someone waits for fresh readings.
     pub refresh: bool,
     /// Counts the times that all readings were fresh.
     refreshed: u64,
@@ -60,23 +60,23 @@ pub struct Device {
     pub firmware: String,
     /// Serial number.
     pub serial: String,
-    /// What focal power 0..=1 stands for.
+    /// The range that focal power 0..=1 stands for.
     pub range: Range,
     /// Mode of control, by number.
     pub mode: u8,
     /// Status bits.
     pub status: Status,
-    /// Of the lens, in °C.
+    /// Temperature of the lens, °C.
     pub temperature: f64,
     /// Focal power set, as read back, in the driver's own units.
     pub read_back: i16,
 }
 
-/// How far the thread is.
+/// Progress of the driver's thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Progress {
     Serving,
-    /// It is to end.
+    /// The thread is to end.
     Ending,
     Ended,
 }
@@ -94,6 +94,8 @@ impl State {
 }
 
 impl Shared {
+    /// State for a driver that is not connected yet.
+    ///
     /// # Errors
     /// When the system has no event descriptor left.
     pub fn new(clock: Arc<dyn Clock>, response: Arc<Response>) -> io::Result<Self> {
@@ -110,16 +112,17 @@ impl Shared {
             refresh: false,
             refreshed: 0,
         };
+
         let line_errors = AtomicU64::new(0);
         Ok(Self { clock, response, wake, line_errors, state: Mutex::new(state), changed: Condvar::new() })
     }
 
-    /// What is known.
+    /// Locks the state.
     pub fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts a command into the slot, in place of one that is still there.
+    /// Puts a command into the slot, replacing one that is still there.
     ///
     /// # Errors
     /// When it will not be carried out.
@@ -129,15 +132,20 @@ impl Shared {
         if let Err(trouble) = &state.device {
             return Err(trouble.clone());
         }
+
+        // A command that is replaced passes its age on: the slot has been full since the first.
         let since = state.wanted.map_or(now, |(_, since)| since);
         state.wanted = Some((target, since));
         state.last = Some(target);
+
         let refusal = state.refusal.clone();
         drop(state);
         self.wake();
+
         if now.since(since) > STALLED {
             return Err(LensError::Stalled("its port accepts no more: check the USB cable".into()));
         }
+
         refusal.map_or(Ok(()), |why| Err(LensError::Refused(why.to_string())))
     }
 
@@ -160,17 +168,24 @@ impl Shared {
     /// Notes that the device is here.
     pub fn connected(&self, device: Device, message: Arc<str>) {
         let mut state = self.state();
-        (state.device, state.message, state.refusal) = (Ok(device), message, None);
-        (state.tried, state.refresh) = (true, false);
+        state.device = Ok(device);
+        state.message = message;
+        state.refusal = None;
+        state.tried = true;
+        state.refresh = false;
         state.refreshed += 1;
+
         self.changed.notify_all();
     }
 
-    /// Notes that the device is away, and why. What was in the slot stays what will be restored.
+    /// Notes that the device is away, and why. The latest command is kept, to be restored later.
     pub fn lost(&self, trouble: LensError) {
         let mut state = self.state();
-        (state.device, state.wanted, state.refusal) = (Err(trouble), None, None);
+        state.device = Err(trouble);
+        state.wanted = None;
+        state.refusal = None;
         state.tried = true;
+
         self.changed.notify_all();
     }
 
@@ -185,7 +200,7 @@ impl Shared {
     /// Waits for the end of the first attempt to connect, at most `timeout`, and returns the device.
     ///
     /// # Errors
-    /// With what stood in the way.
+    /// With the reason why the device is not connected.
     pub fn wait_connected(&self, timeout: Duration) -> Result<Device, LensError> {
         let (state, _) = self
             .changed
@@ -194,7 +209,7 @@ impl Shared {
         state.device.clone()
     }
 
-    /// Has everything read afresh, waits for it at most `timeout`, and returns it.
+    /// Requests fresh readings, waits for them at most `timeout`, and returns them.
     ///
     /// # Errors
     /// When the device is away or does not answer in time.
@@ -204,17 +219,20 @@ impl Shared {
             state.refresh = true;
             state.refreshed
         };
+
         self.wake();
+
         let waiting = |state: &mut State| state.device.is_ok() && state.refreshed == before;
         let (state, late) =
             self.changed.wait_timeout_while(self.state(), timeout, waiting).unwrap_or_else(PoisonError::into_inner);
+
         match &state.device {
             Ok(_) if late.timed_out() => Err(LensError::Gone("it did not answer in time".into())),
             device => device.clone(),
         }
     }
 
-    /// Waits `time`, or until the thread is to end; whether it is.
+    /// Waits `time`, or until the thread is to end; returns whether it is to end.
     pub fn stop_within(&self, time: Duration) -> bool {
         let (state, _) = self
             .changed
@@ -250,7 +268,7 @@ impl Shared {
         self.line_errors.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often that was.
+    /// Number of line errors so far.
     pub fn line_errors(&self) -> u64 {
         self.line_errors.load(Ordering::Relaxed)
     }

@@ -12,7 +12,7 @@ const CONDITIONS: [&str; 8] = [
     "outside the temperature limits set",
 ];
 
-/// What the driver says of itself and its lens, one bit a condition.
+/// The driver's report on itself and its lens, one bit a condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Status(pub u32);
 
@@ -25,31 +25,31 @@ impl Status {
     const GUARANTEED_RANGE: u32 = 1 << 6;
     const USER_TEMPERATURE: u32 = 1 << 7;
 
-    /// Whether no lens that can be used is plugged in.
+    /// Whether no usable lens is plugged in.
     #[must_use]
     pub const fn without_lens(self) -> bool {
         self.0 & (Self::LENS_MISSING | Self::MEMORY_FAULTY) != 0
     }
 
-    /// Whether the driver forgot its temperature limits, as it does when it restarts.
+    /// Whether the driver lost its temperature limits, as it does when it restarts.
     #[must_use]
     pub const fn restarted(self) -> bool {
         self.0 & Self::NO_LIMITS != 0
     }
 
-    /// Whether the lens is too hot or too cold for its focal power to be trusted.
+    /// Whether the lens is too hot or too cold for reliable focal power.
     #[must_use]
     pub const fn outside_temperature(self) -> bool {
         self.0 & (Self::PRODUCT_TEMPERATURE | Self::GUARANTEED_RANGE | Self::USER_TEMPERATURE) != 0
     }
 
-    /// Whether the lens cannot go where it was sent.
+    /// Whether the lens cannot reach the focal power commanded.
     #[must_use]
     pub const fn unreachable(self) -> bool {
         self.0 & Self::UNREACHABLE != 0
     }
 
-    /// Whether commands are followed, but the focal power cannot be relied on.
+    /// Whether the lens follows commands, but its focal power is unreliable.
     #[must_use]
     pub const fn doubtful(self) -> bool {
         self.outside_temperature() || self.unreachable()
@@ -63,7 +63,7 @@ impl Status {
     }
 }
 
-/// The mode of control that the driver counts as `number`.
+/// Name of the mode of control that the driver numbers `number`.
 #[must_use]
 pub const fn mode_name(number: u8) -> &'static str {
     match number {

@@ -4,7 +4,7 @@ use super::codec::WireError;
 use super::link::LinkError;
 use crate::lens::LensError;
 
-/// What ends a connection.
+/// The reason for ending a connection.
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
     /// The thread is to end.

@@ -1,4 +1,5 @@
-//! The thread that talks to the driver: connects, follows commands, looks after the lens in the gaps, comes back.
+//! The thread that talks to the driver: connects, follows commands, takes readings in the gaps between
+//! them, and reconnects.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -14,22 +15,22 @@ use super::trouble::Trouble;
 use crate::clock::Moment;
 use crate::lens::LensError;
 
-/// Wait before the first new attempt; doubles up to [`BACKOFF_MOST`].
+/// Wait before the first attempt to reconnect; doubles up to [`BACKOFF_MOST`].
 const BACKOFF_FIRST: Duration = Duration::from_millis(50);
-/// Short enough that the lens is back within a second of the end of its trouble.
+/// Longest wait between attempts: short enough that the lens is back within a second of its recovery.
 const BACKOFF_MOST: Duration = Duration::from_millis(400);
-/// Between two readings; each is read every third time.
+/// Time between two readings; each value is read every third time.
 const READING_EVERY: Duration = Duration::from_millis(200);
-/// What is read, in turn.
+/// The values read in turn.
 const READINGS: [Request; 3] = [Request::Status, Request::FocalPower, Request::Temperature];
-/// All that is read, in the order in which it is asked for at once.
+/// All values, in the order in which they are read at once.
 const KINDS: [Request; 4] = [Request::Status, Request::Mode, Request::Temperature, Request::FocalPower];
-/// How long a reading that is due waits for a command, so as to be made right behind one: then the reply is in before
+/// How long a due reading waits for a command, to be made right after one: then the reply is in before
 /// the next command comes.
 const GAP_PATIENCE: Duration = Duration::from_millis(60);
 /// A reading made this soon after a command is in its gap.
 const GAP: Duration = Duration::from_millis(5);
-/// Times that a command is sent again before it is called refused.
+/// Times that a command is sent again before it counts as refused.
 const RESENDS: u32 = 2;
 
 /// Serves the device at `path` until told to stop; then lets the lens go.
@@ -40,20 +41,23 @@ pub fn run(shared: &Shared, path: &Path, settings: &Settings) {
         let trouble = catch_unwind(AssertUnwindSafe(|| attend(shared, path, settings, &mut link, &mut backoff)))
             .unwrap_or_else(|_| Trouble::Lens(LensError::Gone("its driver failed".into())));
         shared.lost(trouble.into());
-        // Asked for while the port was open, the end finds it open.
+
+        // Where the end was requested while the port was open, the open connection is used for it.
         if shared.stop_within(Duration::ZERO) {
             return let_go(shared, path, settings, link);
         }
-        // Closed for others, and for the next attempt.
+
+        // The port is closed for others, and for the next attempt.
         drop(link);
         if shared.stop_within(backoff) {
             return let_go(shared, path, settings, None);
         }
+
         backoff = (backoff * 2).min(BACKOFF_MOST);
     }
 }
 
-/// Connects, and follows commands for as long as that goes well. The connection is left in `link`.
+/// Connects, and follows commands until that fails. Leaves the connection in `link`.
 fn attend<'a>(
     shared: &'a Shared,
     path: &Path,
@@ -65,6 +69,7 @@ fn attend<'a>(
         Ok(port) => link.insert(Link::new(port, shared)),
         Err(error) => return error.into(),
     };
+
     match connect(shared, path, settings, link) {
         Ok(mut session) => {
             *backoff = BACKOFF_FIRST;
@@ -74,17 +79,18 @@ fn attend<'a>(
     }
 }
 
-/// The last that the driver hears of us: zero current, unless the lens is to stay where it is. `link` is the connection
-/// to it, if there is one still.
+/// The last words to the driver: zero current, unless the lens is to stay where it is. `link` is the
+/// connection to it, if there still is one.
 fn let_go(shared: &Shared, path: &Path, settings: &Settings, link: Option<Link>) {
-    // What is no lens driver must not be told anything.
+    // Never send anything to a device that is not a lens driver.
     if settings.keep || !shared.state().greeted {
         return;
     }
     if link.is_some_and(|link| close(link).is_ok()) {
         return;
     }
-    // The line may be well again, and the lens still under current.
+
+    // A fresh connection may still work, and the lens may still be under current.
     let afresh = Port::open(path).map_err(|error| error.to_string());
     if let Err(error) = afresh.and_then(|port| close(Link::new(port, shared))) {
         tracing::warn!(error, "could not confirm that the lens is without current after closing");
@@ -105,6 +111,8 @@ fn connect<'a, 'b>(
     link: &'b mut Link<'a>,
 ) -> Result<Session<'a, 'b>, Trouble> {
     let mut device = handshake::perform(link, settings, path)?;
+
+    // A lens that came back returns to the latest command; a new one stays where it is.
     let last = shared.state().last;
     match last {
         Some(power) => {
@@ -113,8 +121,10 @@ fn connect<'a, 'b>(
         }
         None => shared.response.command(shared.clock.now(), device.range.focal_power(device.read_back)),
     }
+
     link.follow_commands(device.range);
     shared.connected(device.clone(), words(&device, settings, shared.line_errors()));
+
     let next_reading = shared.clock.now() + READING_EVERY;
     Ok(Session { shared, settings, link, device, next_reading, turn: 0, unmet: 0 })
 }
@@ -127,7 +137,7 @@ struct Session<'a, 'b> {
     device: Device,
     next_reading: Moment,
     turn: usize,
-    /// Times in a row that the read-back was not what was sent.
+    /// Times in a row that the read-back differed from the command.
     unmet: u32,
 }
 
@@ -145,9 +155,11 @@ impl Session<'_, '_> {
         let now = self.shared.clock.now();
         let due = now >= self.next_reading;
         self.link.pump(if due { self.next_reading + GAP_PATIENCE } else { self.next_reading })?;
+
         if self.shared.state().refresh {
             return self.read_everything();
         }
+
         let now = self.shared.clock.now();
         let behind_command = self.link.sent().is_some_and(|sent| now.since(sent.at) < GAP);
         if now >= self.next_reading + GAP_PATIENCE || (now >= self.next_reading && behind_command) {
@@ -163,17 +175,19 @@ impl Session<'_, '_> {
         for request in KINDS {
             self.read(request)?;
         }
+
         self.publish();
         self.shared.refreshed();
         Ok(())
     }
 
-    /// Reads `request`. A lens that is gone, or a driver that forgot how it was set up, ends the connection.
+    /// Reads `request`. A lens that is gone, or a driver that lost its settings, ends the connection.
     fn read(&mut self, request: Request) -> Result<(), Trouble> {
         let sent = self.link.sent();
         if let Some(error) = self.link.stray_error() {
             tracing::warn!(%error, "the lens driver did not accept a command");
         }
+
         match self.link.ask(request)? {
             Reply::Status(bits) => self.device.status.0 = bits,
             Reply::Mode(mode) => self.device.mode = mode,
@@ -184,6 +198,7 @@ impl Session<'_, '_> {
             }
             _ => {}
         }
+
         if self.device.status.without_lens() || self.device.status.restarted() {
             let why = "the driver lost its lens or was restarted, and is being set up again";
             return Err(LensError::Gone(why.into()).into());
@@ -191,15 +206,15 @@ impl Session<'_, '_> {
         Ok(())
     }
 
-    /// Sends the last command again if the device does not have it.
+    /// Sends the last command again if the device did not take it.
     fn compare(&mut self, sent: Option<Sent>, read_back: i16) {
-        // A command that went out meanwhile makes the comparison void.
+        // A command sent in the meantime makes the comparison void.
         let Some(last) = self.link.sent().filter(|&last| Some(last) == sent) else { return };
         if last.raw == read_back {
             self.unmet = 0;
         } else {
             self.unmet += 1;
-            // Next is the status, which may tell why, and then the focal power again.
+            // The next reading is the status, which may tell why, and then the focal power again.
             self.turn = READINGS.len() - 1;
             self.link.send_focal_power(self.device.range, last.raw);
         }
@@ -209,6 +224,7 @@ impl Session<'_, '_> {
         // Without the dioptres: they would tell the operator of a blinded session how the policy moves.
         let refusal = (self.unmet > RESENDS)
             .then(|| Arc::from("it does not go where it is sent: restart the driver or check the lens"));
+
         let mut state = self.shared.state();
         state.device = Ok(self.device.clone());
         state.message = words(&self.device, self.settings, self.shared.line_errors());
@@ -216,7 +232,7 @@ impl Session<'_, '_> {
     }
 }
 
-/// How a connected device does, in a sentence.
+/// The state of a connected device, in a sentence.
 fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
     let Device { status, temperature, range, .. } = device;
     let line = match line_errors {
@@ -224,6 +240,7 @@ fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
         1 => "; 1 error on its line so far".to_owned(),
         many => format!("; {many} errors on its line so far: if they continue, check its USB cable"),
     };
+
     let (low, high) = settings.temperatures;
     if status.doubtful() {
         return Arc::from(format!(
@@ -232,6 +249,8 @@ fn words(device: &Device, settings: &Settings, line_errors: u64) -> Arc<str> {
             status.words().join("; ")
         ));
     }
-    let (min, max) = (range.min_dioptre(), range.max_dioptre());
+
+    let min = range.min_dioptre();
+    let max = range.max_dioptre();
     Arc::from(format!("follows commands between {min:.2} and {max:.2} dpt, at {temperature:.1} °C{line}"))
 }

@@ -1,23 +1,23 @@
-//! What every reply has around its payload, and the replies that are errors.
+//! The frame around every reply's payload, and the replies that are errors.
 
 use crc::{CRC_16_ARC, Crc, Table};
 
 pub(super) const CHECKSUM: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_ARC);
 
-/// What firmware before error codes answers to a damaged request.
+/// Reply of firmware from before error codes to a damaged request.
 const OLD_CRC_ERROR: &[u8] = b"N\r\n";
 /// Bytes of checksum and line end behind a reply's payload.
 pub(super) const TRAILER: usize = 4;
 /// Bytes of an error reply: `E`, its number, trailer.
 const ERROR_LENGTH: usize = 2 + TRAILER;
 
-/// Why bytes are no reply.
+/// Why bytes are not a valid reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum WireError {
     /// The checksum does not fit.
     #[error("a reply's checksum is wrong")]
     Checksum,
-    /// It has not the form of a reply to this request.
+    /// The bytes do not have the form of a reply to this request.
     #[error("a reply is unreadable")]
     Garbage,
     /// The driver answered with an error.
@@ -51,6 +51,7 @@ pub fn error_reply(bytes: &[u8]) -> Option<DeviceError> {
     if bytes.starts_with(OLD_CRC_ERROR) {
         return Some(DeviceError::Checksum);
     }
+
     let &[b'E', number] = checked(bytes.get(..ERROR_LENGTH)?)? else { return None };
     Some(match number.checked_sub(b'0').unwrap_or(number) {
         1 => DeviceError::Checksum,

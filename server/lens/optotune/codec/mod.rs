@@ -1,8 +1,9 @@
-//! The wire format of the Optotune Lens Driver 4/4i: requests, replies, checksums. Does no input or output.
+//! The wire format of the Optotune Lens Driver 4/4i: requests, replies, checksums. Does no input or
+//! output.
 //!
-//! A request is a payload and its CRC-16/ARC, low byte first; a reply is the same followed by `\r\n`. A reply may hold
-//! `\r\n` inside, so it is told complete by the length that its request leads to, not by its end. Integers are
-//! big-endian. Formats: Optotune, *Lens Driver 4 manual*.
+//! A request is a payload and its CRC-16/ARC, low byte first; a reply is the same followed by `\r\n`. A
+//! reply may contain `\r\n`, so its request determines its length; its end does not show it. Integers
+//! are big-endian. Formats: Optotune, *Lens Driver 4 manual*.
 
 mod frame;
 
@@ -14,7 +15,7 @@ pub const START: &[u8] = b"Start";
 /// Answer to [`START`].
 pub const READY: &[u8] = b"Ready\r\n";
 
-/// Something asked of the driver. Temperatures in 1/16 °C, focal power in the driver's own units (see
+/// A request to the driver. Temperatures in 1/16 °C, focal power in the driver's own units (see
 /// [`super::range::Scale`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
@@ -53,7 +54,7 @@ pub enum Request {
     Status,
 }
 
-/// What the driver answered.
+/// A reply of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reply {
     /// `A` to `F`.
@@ -108,6 +109,7 @@ impl Request {
             let values = values.into_iter().flat_map(i16::to_be_bytes).take(used);
             name.iter().copied().chain(values).collect()
         };
+
         match self {
             Self::FirmwareType => of(b"H", [0, 0], 0),
             Self::FirmwareVersion => of(b"V", [0, 0], 1),
@@ -126,7 +128,7 @@ impl Request {
         }
     }
 
-    /// How the reply's payload begins, and its length in bytes; nothing for a request that gets no reply.
+    /// How the reply's payload begins, and its length in bytes; `None` for a request without a reply.
     const fn reply_form(self) -> Option<(&'static [u8], usize)> {
         match self {
             Self::SetCurrent(_) | Self::SetFocalPower(_) => None,
@@ -145,20 +147,25 @@ impl Request {
         }
     }
 
-    /// The reply to this request at the start of `bytes`, or nothing while bytes are missing.
+    /// The reply to this request at the start of `bytes`, or `None` while bytes are missing.
     ///
     /// # Errors
-    /// When the driver reports an error, or the bytes are no such reply.
+    /// When the driver reports an error, or the bytes are not such a reply.
     pub fn reply(self, bytes: &[u8]) -> Result<Option<Reply>, WireError> {
         let Some((name, length)) = self.reply_form() else { return Err(WireError::Garbage) };
+
         let whole = bytes.get(..length + TRAILER);
         let values = whole.and_then(checked).and_then(|payload| payload.strip_prefix(name));
+
         if let Some(reply) = values.and_then(|values| self.decode(values)) {
             return Ok(Some(reply));
         }
+
         if let Some(error) = error_reply(bytes) {
             return Err(error.into());
         }
+
+        // A reply of the right name and length whose checksum fails was damaged on the way.
         match whole {
             None => Ok(None),
             Some(whole) if whole.starts_with(name) && whole.ends_with(b"\r\n") && checked(whole).is_none() => {
@@ -173,6 +180,7 @@ impl Request {
         let word = |at: usize| values.get(at..at + 2)?.try_into().ok().map(u16::from_be_bytes);
         let signed = |at: usize| word(at).map(u16::cast_signed);
         let limits = |at: usize| Some(Limits { status: *values.get(at)?, max: signed(at + 1)?, min: signed(at + 3)? });
+
         match self {
             Self::SetCurrent(_) | Self::SetFocalPower(_) => None,
             Self::FirmwareType => values.first().copied().map(Reply::FirmwareType),
