@@ -67,10 +67,10 @@ struct Inner {
 /// Why a setting cannot be changed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ControlError {
-    /// The camera is away, or does not have it.
+    /// The camera is away, or does not have this setting.
     #[error("the camera does not offer this setting now")]
     NotOffered,
-    /// Outside the camera's bounds.
+    /// The value lies outside the camera's bounds.
     #[error("must be from {min} to {max}")]
     OutOfBounds {
         /// Least value.
@@ -81,7 +81,7 @@ pub enum ControlError {
 }
 
 impl Controls {
-    /// What the camera offers now.
+    /// The settings that the camera offers now.
     #[must_use]
     pub fn offered(&self) -> CameraOffer {
         self.inner().offer.clone()
@@ -98,23 +98,24 @@ impl Controls {
         if !(min..=max).contains(&value) {
             return Err(ControlError::OutOfBounds { min, max });
         }
+
         inner.offer.trouble = None;
         inner.wanted.retain(|(other, _)| *other != setting);
         inner.wanted.push((setting, value));
         Ok(())
     }
 
-    /// The camera's side: what it offers now.
+    /// For the camera: sets what it offers now.
     pub fn offer(&self, available: Vec<Adjustable>) {
         self.inner().offer.settings = available;
     }
 
-    /// The camera's side: it did not change `setting`, and says `why`.
+    /// For the camera: notes that it did not change `setting`, and `why`.
     pub fn refuse(&self, setting: Setting, why: &str) {
         self.inner().offer.trouble = Some(format!("{} was not changed: the camera says: {why}", setting.label()));
     }
 
-    /// The camera's side: takes what was asked for.
+    /// For the camera: takes the changes asked for.
     #[must_use]
     pub fn take(&self) -> Vec<(Setting, f64)> {
         std::mem::take(&mut self.inner().wanted)

@@ -1,4 +1,4 @@
-//! Cameras: where frames come from. Knows no policy.
+//! Cameras, the sources of frames. This room knows nothing of policies.
 
 mod controls;
 pub mod footage;
@@ -29,9 +29,9 @@ use crate::lens::FocalPower;
 
 /// A source of frames at its own pace.
 ///
-/// An implementation guarantees that [`Camera::next_frame`] returns within `timeout` plus one frame's time; that frame
-/// numbers rise strictly, gaps being frames lost; and that after an error it goes on trying to come back by itself, so
-/// the caller just asks again.
+/// An implementation guarantees that [`Camera::next_frame`] returns within `timeout` plus one frame's
+/// time; that frame numbers rise strictly, gaps being frames lost; and that after an error it keeps
+/// trying to recover by itself, so the caller just asks again.
 pub trait Camera: Send {
     /// Waits for the next frame.
     ///
@@ -39,21 +39,23 @@ pub trait Camera: Send {
     /// When none came within `timeout`, or the device failed.
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError>;
 
-    /// What the camera is, and how it does.
+    /// The camera's name and state.
     fn health(&self) -> CameraHealth;
 
-    /// Width and height in samples of the mosaics that it delivers; none from a camera that delivers colour pictures.
+    /// Width and height in samples of the mosaics that it delivers; `None` from a camera that delivers
+    /// colour pictures.
     fn mosaic_size(&self) -> Option<(usize, usize)> {
         None
     }
 
-    /// Whether [`Camera::next_frame`] computes the picture, as simulations do, instead of taking it from a device. Then
-    /// its thread is no part of the way from camera to lens, and gets no priority over other programs.
+    /// Whether [`Camera::next_frame`] computes the picture, as simulations do, instead of taking it from
+    /// a device. Then its thread is not part of the way from camera to lens, and gets no priority over
+    /// other programs.
     fn computes(&self) -> bool {
         false
     }
 
-    /// Its settings, where an operator can change any.
+    /// The camera's settings, where an operator can change any.
     fn controls(&self) -> Option<Controls> {
         None
     }
@@ -64,9 +66,9 @@ pub trait Camera: Send {
 pub struct Frame {
     /// Counts up from 1 while the server runs; a gap is a lost frame.
     pub number: u64,
-    /// End of the exposure, taken once, here; every later stage carries it on.
+    /// End of the exposure, taken once, here; every later stage passes it on.
     pub exposed_at: Moment,
-    /// Length of the exposure; zero where the camera does not tell.
+    /// Length of the exposure; zero where the camera does not report it.
     pub exposure: Duration,
     /// The picture.
     pub image: FrameImage,
@@ -75,7 +77,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The middle of the exposure: when the lens was where most of the light saw it.
+    /// The middle of the exposure: the lens's place at that time is the one that most of the light saw.
     #[must_use]
     pub fn middle(&self) -> Moment {
         let half = u64::try_from(self.exposure.as_nanos() / 2).unwrap_or(u64::MAX);
@@ -83,7 +85,7 @@ impl Frame {
     }
 }
 
-/// A frame's picture, shared, never copied.
+/// A frame's picture; shared, never copied.
 #[derive(Debug, Clone)]
 pub enum FrameImage {
     /// Raw samples of the hyperspectral sensor.
@@ -106,11 +108,11 @@ pub struct Truth {
 pub struct CameraHealth {
     /// Name for people, for example `brain phantom (simulated)`.
     pub name: Arc<str>,
-    /// Whether the picture is not of the real world at this moment: said on every page.
+    /// Whether the picture is not of the real world at this moment; every page says so.
     pub simulated: bool,
     /// Whether frames are coming.
     pub working: bool,
-    /// One sentence: what is the case and, if it is bad, what to do.
+    /// One sentence: the state and, if it is bad, what to do.
     pub message: Arc<str>,
     /// Frames a second over the last second, as measured.
     pub fps: f64,
@@ -121,13 +123,13 @@ pub struct CameraHealth {
 /// Why there is no frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CameraError {
-    /// Nothing came in time.
+    /// No frame came in time.
     #[error("no frame within {0:?}")]
     Timeout(Duration),
-    /// The device went away or failed; it is being looked for again.
+    /// The device went away or failed; the camera looks for it again.
     #[error("the camera failed: {0}")]
     Failed(String),
-    /// The source cannot be used at all: said at start.
+    /// The source cannot be used at all; reported at start.
     #[error("{0}")]
     BadSource(String),
 }

@@ -1,4 +1,4 @@
-//! The pace of simulated cameras: frames fall due at fixed times; one that is missed is lost, never queued.
+//! The pace of simulated cameras: frames are due at fixed times; a missed frame is lost, never queued.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::CameraError;
 use crate::clock::{Clock, Moment};
 
-/// A camera's time table and how well it is kept.
+/// A camera's timetable and how well it is kept.
 #[derive(Debug, Clone)]
 pub struct Pace {
     start: Moment,
@@ -20,32 +20,34 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// A frame every `1 / fps` seconds, the first at `start`. A rate outside 1..=1000 is brought to its nearer end.
+    /// A frame every `1 / fps` seconds, the first at `start`. A rate outside 1..=1000 is clamped to it.
     #[must_use]
     pub fn new(fps: f64, start: Moment) -> Self {
         let fps = if fps.is_nan() { 1.0 } else { fps.clamp(1.0, 1000.0) };
         Self { start, period: Duration::from_secs_f64(1.0 / fps), number: 0, lost: 0, delivered: VecDeque::new() }
     }
 
-    /// Waits for the next frame's time and says its number.
+    /// Waits for the next frame's time and returns its number.
     ///
     /// # Errors
-    /// When that time is further away than `timeout`; then it waits for that long.
+    /// When that time is further away than `timeout`; then it has waited for that long.
     pub fn wait(&mut self, clock: &dyn Clock, timeout: Duration) -> Result<u64, CameraError> {
         let now = clock.now();
         let (number, due) = self.next(now);
         let ahead = due.since(now);
+
         std::thread::sleep(ahead.min(timeout));
         if ahead > timeout {
             return Err(CameraError::Timeout(timeout));
         }
+
         self.lost += number - self.number - 1;
         self.number = number;
         Ok(number)
     }
 
-    /// The next frame to make at `now`, and when it is due. A frame less than half a period late is still made; older
-    /// ones are skipped.
+    /// The next frame to make at `now`, and when it is due. A frame less than half a period late is still
+    /// made; older ones are skipped.
     fn next(&self, now: Moment) -> (u64, Moment) {
         // 584 years of nanoseconds fit `u64`.
         let period = self.period.as_nanos() as u64;
@@ -80,7 +82,7 @@ impl Pace {
         self.lost
     }
 
-    /// How the pace is kept, in one sentence.
+    /// How well the pace is kept, in one sentence.
     #[must_use]
     pub fn message(&self) -> Arc<str> {
         let asked = 1.0 / self.period.as_secs_f64();
@@ -88,6 +90,7 @@ impl Pace {
         if kept {
             return Arc::from(format!("{asked:.0} frames a second, as requested"));
         }
+
         Arc::from(format!("this machine is too busy for {asked:.0} frames a second; lower the rate with --fps"))
     }
 }

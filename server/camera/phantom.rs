@@ -9,7 +9,7 @@ use super::{Camera, CameraError, CameraHealth, CameraSettings, Frame, FrameImage
 use crate::clock::Moment;
 use crate::simulation::phantom::{Hand, Phantom, Pose, SENSOR_HEIGHT, SENSOR_WIDTH};
 
-/// What lies before the phantom's camera.
+/// What the phantom's camera looks at, and how it is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Before {
     /// The brain, and the camera in a hand.
@@ -23,7 +23,7 @@ pub enum Before {
 }
 
 impl Before {
-    /// What is meant by the `name` behind `phantom:`.
+    /// The scene that `name` stands for in `phantom:name`.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         match name {
@@ -37,13 +37,14 @@ impl Before {
 
 /// Brightness of the white tile, of full scale.
 const WHITE: f32 = 0.8;
-/// Where the clamp holds the camera: over the middle of the brain, in focus at the middle of the range.
+/// Place of the camera in the clamp: over the middle of the brain, in focus at the middle of the range.
 const CLAMPED: Pose = Pose { place: [0.0; 2], roll: 0.0, tilt: [0.0; 2], focus: 0.5 };
 /// Frames after which a camera in a clamp keeps its exposure, so that sharpness changes with focus alone.
 const EXPOSURE_FOUND: u64 = 20;
 
-/// The phantom, seen live through a lens. The exposure takes place while the picture is being computed: it is centred
-/// on the computation's start, when the lens is looked through, and ends when the frame is handed over.
+/// The phantom, seen live through a lens. The exposure takes place while the picture is being computed:
+/// it is centred on the computation's start, when the lens is looked through, and ends when the frame is
+/// handed over.
 pub struct PhantomCamera {
     phantom: Phantom,
     hand: Hand,
@@ -61,7 +62,7 @@ impl PhantomCamera {
         Self::looking(Before::Hand, settings)
     }
 
-    /// The same with something else before the camera.
+    /// The same with another scene.
     #[must_use]
     pub fn looking(before: Before, settings: CameraSettings) -> Self {
         let phantom = Phantom::new(settings.seed);
@@ -79,7 +80,8 @@ impl PhantomCamera {
 }
 
 impl PhantomCamera {
-    /// Takes exposure `number`, looked at through the lens at `looked`; what is known of it, if it is of the brain.
+    /// Takes exposure `number`, looking through the lens at `looked`. Returns the truth about it, if it
+    /// shows the brain.
     fn expose(&mut self, number: u64, looked: Moment, samples: &mut [u16]) -> Option<Truth> {
         let pose = match self.before {
             Before::Hand => self.hand.pose_at(looked.since(self.start)),
@@ -93,11 +95,14 @@ impl PhantomCamera {
                 return None;
             }
         };
+
         let exposed = self.settings.optics.focal_power_at(looked);
         self.phantom.expose(&pose, exposed, samples);
+
         if self.before == Before::Hand || number <= EXPOSURE_FOUND {
             self.phantom.adjust_exposure(samples);
         }
+
         Some(Truth { optimal: self.phantom.optimal(&pose), exposed })
     }
 }
@@ -106,11 +111,14 @@ impl Camera for PhantomCamera {
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
         let number = self.pace.wait(&*self.settings.clock, timeout)?;
         let looked = self.settings.clock.now();
+
         let mut samples = self.pool.blank();
         let truth = self.expose(number, looked, &mut samples);
         let image = self.pool.frame(samples)?;
+
         let exposed_at = self.settings.clock.now();
         self.pace.delivered(exposed_at);
+
         Ok(Frame {
             number,
             exposed_at,

@@ -1,4 +1,5 @@
-//! Pictures whose best focus is known, played as a live camera: what footage and recorded scans have in common.
+//! Pictures whose best focus is known, played as a live camera: the common part of footage and recorded
+//! scans.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -9,19 +10,20 @@ use crate::clock::Moment;
 use crate::imaging::RgbImage;
 use crate::lens::FocalPower;
 
-/// What can be looked at through a lens.
+/// Something that can be looked at through a lens.
 pub trait View: Send {
     /// Why there may be nothing to see.
     type Error: Display;
 
-    /// What is seen `time` after the start at `focal_power`, and the optimal focal power.
+    /// The picture `time` after the start at `focal_power`, and the optimal focal power.
     ///
     /// # Errors
     /// When a picture cannot be read.
     fn look(&mut self, time: Duration, focal_power: FocalPower) -> Result<(RgbImage, FocalPower), Self::Error>;
 }
 
-/// A view, played in real time. It counts as simulated: also a recording of the real world is not the real world now.
+/// A view, played in real time. It counts as simulated: even a recording of the real world is not the
+/// real world now.
 pub struct Playback<V> {
     name: Arc<str>,
     view: V,
@@ -44,11 +46,14 @@ impl<V: View> Camera for Playback<V> {
         let number = self.pace.wait(&*self.settings.clock, timeout)?;
         let looked = self.settings.clock.now();
         let exposed = self.settings.optics.focal_power_at(looked);
+
         let seen = self.view.look(looked.since(self.start), exposed);
         self.fault = seen.as_ref().err().map(|error| Arc::from(error.to_string()));
         let (image, optimal) = seen.map_err(|error| CameraError::Failed(error.to_string()))?;
+
         let exposed_at = self.settings.clock.now();
         self.pace.delivered(exposed_at);
+
         Ok(Frame {
             number,
             exposed_at,

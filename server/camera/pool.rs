@@ -1,4 +1,5 @@
-//! Mosaics whose memory is used again once nobody holds them: a 4.4 MB allocation a frame costs more than the picture.
+//! Mosaics whose memory is reused once nobody holds them: allocating 4.4 MB a frame costs more than the
+//! picture.
 
 use std::sync::Arc;
 
@@ -17,13 +18,13 @@ pub struct MosaicPool {
 }
 
 impl MosaicPool {
-    /// A pool of `width` x `height` samples a frame; empty as yet.
+    /// An empty pool for frames of `width` x `height` samples.
     #[must_use]
     pub const fn new(width: usize, height: usize) -> Self {
         Self { width, height, given: Vec::new() }
     }
 
-    /// Memory for a frame's samples; what is in it is left from before.
+    /// Memory for a frame's samples; it still holds older values.
     pub fn blank(&mut self) -> Vec<u16> {
         let free = self.given.iter().position(|frame| Arc::strong_count(frame) == 1);
         let freed = free.and_then(|index| Arc::try_unwrap(self.given.swap_remove(index)).ok());

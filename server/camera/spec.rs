@@ -5,9 +5,9 @@ use std::path::Path;
 use super::phantom::{Before, PhantomCamera};
 use super::{Camera, CameraError, CameraSettings, footage, recorded};
 
-/// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a white tile),
-/// `phantom:dark` (with its lens cap on), `footage:PATH` with a video, an image or a folder of images, `scan:DIR` with a
-/// recorded scan, or `gige:ID`.
+/// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a
+/// white tile), `phantom:dark` (with its lens cap on), `footage:PATH` with a video, an image or a folder
+/// of images, `scan:DIR` with a recorded scan, or `gige:ID`.
 ///
 /// # Errors
 /// [`CameraError::BadSource`] when there is no such camera, or its source cannot be used.
@@ -34,9 +34,9 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
                 .into(),
         )),
         _ => Err(CameraError::BadSource(format!(
-            "unknown camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and `phantom:dark` \
-             to try the bench's commands), `footage:PATH` (a video, an image or a folder of images), `scan:DIR` (a \
-             recorded scan) or `gige:ID` (`gige:list` lists them)"
+            "unknown camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and \
+             `phantom:dark` to try the bench's commands), `footage:PATH` (a video, an image or a folder of images), \
+             `scan:DIR` (a recorded scan) or `gige:ID` (`gige:list` lists them)"
         ))),
     }
 }

@@ -1,32 +1,39 @@
-//! Sharpness over focal power at rest: the scale by which a moving lens is read from the picture.
+//! Sharpness over focal power at rest: the scale for reading a moving lens's focal power from the
+//! picture.
 
 use super::BenchError;
 
 /// Least change of sharpness along the flank, as a share of the greatest sharpness.
 const CONTRAST: f64 = 0.15;
-/// Parts of the flank flatter than this share of its steepest part tell too little to be used.
+/// Parts of the flank flatter than this share of its steepest part are too imprecise to use.
 const STEEP: f64 = 0.3;
 
-/// One side of the focus peak, where sharpness tells focal power.
+/// One side of the focus peak, where sharpness determines focal power.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flank {
-    /// Focal power and sharpness, focal power rising, sharpness strictly rising or strictly falling. At least two.
+    /// Focal power and sharpness; focal power rises, sharpness strictly rises or strictly falls. At
+    /// least two.
     points: Vec<(f64, f64)>,
     /// Distance between the curves on the way up and on the way down, in focal power.
     pub hysteresis: f64,
 }
 
 impl Flank {
-    /// The steepest side of the curves that were seen going `up` and `down` through the same `powers`, which rise.
+    /// The steepest side of the curves measured going `up` and `down` through the same `powers`, which
+    /// rise.
     pub fn find(powers: &[f64], up: &[f64], down: &[f64]) -> Result<Self, BenchError> {
         let mean: Vec<f64> = up.iter().zip(down).map(|(up, down)| (up + down) / 2.0).collect();
         let (first, last) = steepest_run(&mean);
         let (first, last) = trimmed(&mean, first, last);
+
         let contrast = (mean[last] - mean[first]).abs() / mean.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         if first == last || contrast < CONTRAST {
             return Err(BenchError::Flat(contrast));
         }
+
+        // A difference in sharpness over the slope is a difference in focal power.
         let slope = (mean[last] - mean[first]) / (powers[last] - powers[first]);
+
         let apart = (first..=last).map(|stop| down[stop] - up[stop]).sum::<f64>() / (last - first + 1) as f64;
         let points = (first..=last).map(|stop| (powers[stop], mean[stop])).collect();
         Ok(Self { points, hysteresis: apart / slope })
@@ -38,12 +45,14 @@ impl Flank {
         (power(self.points.first()), power(self.points.last()))
     }
 
-    /// The focal power that a patch of `sharpness` was seen at; extended straight beyond the ends.
+    /// The focal power at which a patch of `sharpness` was seen; extrapolated straight beyond the ends.
     pub fn focal_power(&self, sharpness: f64) -> f64 {
         let rising = self.points.last() > self.points.first() && self.points[1].1 > self.points[0].1;
         let beyond = |of: f64| if rising { of >= sharpness } else { of <= sharpness };
         let next = self.points.iter().position(|point| beyond(point.1)).unwrap_or(self.points.len() - 1).max(1);
-        let ((from, low), (to, high)) = (self.points[next - 1], self.points[next]);
+
+        let (from, low) = self.points[next - 1];
+        let (to, high) = self.points[next];
         from + (sharpness - low) / (high - low) * (to - from)
     }
 }
@@ -52,28 +61,33 @@ impl Flank {
 fn steepest_run(values: &[f64]) -> (usize, usize) {
     let mut best = (0, 0);
     let mut first = 0;
+
     for stop in 1..values.len() {
         let turned = stop > first + 1 && (values[stop] > values[stop - 1]) != (values[stop - 1] > values[stop - 2]);
         if turned {
             first = stop - 1;
         }
+
         if (values[stop] - values[first]).abs() > (values[best.1] - values[best.0]).abs() {
             best = (first, stop);
         }
     }
+
     best
 }
 
-/// The run without its flat ends.
+/// Cuts the flat ends off a run.
 fn trimmed(values: &[f64], mut first: usize, mut last: usize) -> (usize, usize) {
     let rise = |stop: usize| (values[stop + 1] - values[stop]).abs();
     let steepest = (first..last).map(rise).fold(0.0, f64::max);
+
     while first < last && rise(first) < STEEP * steepest {
         first += 1;
     }
     while last > first && rise(last - 1) < STEEP * steepest {
         last -= 1;
     }
+
     (first, last)
 }
 

@@ -1,4 +1,4 @@
-//! Dead time and settling time that explain what was seen of steps.
+//! The dead time and settling time that explain the steps seen.
 
 use std::time::Duration;
 
@@ -9,24 +9,24 @@ use crate::lens::LensDynamics;
 pub struct Sample {
     /// Seconds from the command to the middle of the exposure.
     pub at: f64,
-    /// Share of the step that the lens had done.
+    /// Share of the step that the lens had made.
     pub share: f64,
 }
 
-/// Points of each round's grid, a side.
+/// Points a side of each round's grid.
 const GRID: u32 = 40;
-/// Rounds; each looks four cells either way of the best of the one before.
+/// Rounds; each searches four cells either way of the best point of the one before.
 const ROUNDS: u32 = 4;
 
-/// The response to a step that explains samples best: nothing for `delay`, and then `1 - exp(-t / tau)` with
-/// `tau = settling / ln 20`, as [`crate::lens::Response`] has it.
+/// The step response that explains samples best: nothing for `delay`, and then `1 - exp(-t / tau)` with
+/// `tau = settling / ln 20`, as in [`crate::lens::Response`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Seconds from the command to the first movement.
     pub delay: f64,
     /// Seconds from the first movement to within 5 % of the step.
     pub settling: f64,
-    /// Root mean square of what it does not explain, as a share of the step.
+    /// Root mean square of the residuals, as a share of the step.
     pub rms: f64,
 }
 
@@ -34,8 +34,10 @@ impl Fit {
     /// The best fit within `longest` seconds, by least squares.
     #[must_use]
     pub fn of(samples: &[Sample], longest: f64) -> Self {
-        let (mut delays, mut settlings) = ((0.0, longest), (0.0, longest));
+        let mut delays = (0.0, longest);
+        let mut settlings = (0.0, longest);
         let mut best = Self { delay: 0.0, settling: 0.0, rms: f64::INFINITY };
+
         for _ in 0..ROUNDS {
             for (delay, settling) in grid(delays).flat_map(|delay| grid(settlings).map(move |of| (delay, of))) {
                 let candidate = Self { delay, settling, rms: 0.0 };
@@ -44,8 +46,11 @@ impl Fit {
                     best = Self { rms, ..candidate };
                 }
             }
-            (delays, settlings) = (around(delays, best.delay), around(settlings, best.settling));
+
+            delays = around(delays, best.delay);
+            settlings = around(settlings, best.settling);
         }
+
         best
     }
 
@@ -56,10 +61,11 @@ impl Fit {
         if since < 0.0 {
             return 0.0;
         }
+
         if self.settling > 0.0 { 1.0 - 20_f64.powf(-since / self.settling) } else { 1.0 }
     }
 
-    /// As the loop takes it.
+    /// The fit in the control loop's form.
     #[must_use]
     pub fn dynamics(&self) -> LensDynamics {
         let seconds = |value: f64| Duration::from_secs_f64(value.max(0.0));

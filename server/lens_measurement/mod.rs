@@ -1,4 +1,4 @@
-//! How a lens answers a step, as a camera sees it; measured once, before the first session.
+//! Measures how a lens responds to a step, as a camera sees it; done once, before the first session.
 
 mod curve;
 mod fit;
@@ -18,28 +18,28 @@ use crate::lens::LensError;
 /// Why a lens could not be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// The lens.
+    /// The lens failed.
     #[error(transparent)]
-    Lens(#[from] LensError),
+    /// The camera failed.
     /// The camera.
     #[error("no frames to measure with: {0}")]
     Camera(#[from] CameraError),
-    /// The camera's picture is of no use.
+    /// The camera's picture cannot be used.
     #[error("{0}")]
     Picture(String),
-    /// The lens moves and nothing is seen of it.
+    /// The lens moves, but the picture does not show it.
     #[error(
         "the picture hardly changes with the focal power ({:.0} %): put something with fine texture under the optics, in \
          focus somewhere within the lens's range, and light it well", 100.0 * .0
     )]
     Flat(f64),
-    /// Steps do not look alike.
+    /// The steps differ from one another.
     #[error(
         "the steps do not look alike (they scatter by {:.0} %): camera and object must stand still, and the light must not \
          flicker", 100.0 * .0
     )]
     Unsteady(f64),
-    /// It was not watched for long enough.
+    /// The lens was not watched for long enough.
     #[error("the lens had not settled after {0:.0} ms: watch for longer, with --watch")]
     TooSlow(f64),
 }

@@ -10,7 +10,7 @@ const POINTS: u32 = 200;
 #[must_use]
 pub fn plot(measurement: &Measurement) -> String {
     let fit = &measurement.both;
-    // Three times as long as the lens takes shows how it came to rest.
+    // Three times the lens's own time also shows how it came to rest.
     let longest = (3000.0 * (fit.delay + fit.settling).max(0.01)).ceil();
     let across = Axis { label: "ms after the command", from: 0.0, to: longest };
     let up = Axis { label: "share of the step", from: -0.2, to: 1.2 };
@@ -25,5 +25,6 @@ pub fn plot(measurement: &Measurement) -> String {
     let name = format!("fit: delay {:.1} ms, settling {:.1} ms", 1000.0 * fit.delay, 1000.0 * fit.settling);
     let times = (0..=POINTS).map(|step| longest * f64::from(step) / f64::from(POINTS));
     panel.line(&name, "#111111", times.map(|ms| (ms, fit.share(ms / 1000.0))));
+
     plot.svg()
 }

@@ -12,7 +12,7 @@ use crate::control::Eye;
 /// Longest wait for a frame.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What a camera sees, as one number a frame.
+/// A camera's view, reduced to one number a frame.
 pub struct View {
     camera: Box<dyn Camera>,
     eye: Eye,
@@ -26,7 +26,7 @@ impl View {
         Self { camera, eye, clock }
     }
 
-    /// Now.
+    /// The current time.
     #[must_use]
     pub fn now(&self) -> Moment {
         self.clock.now()
@@ -50,7 +50,9 @@ impl View {
 
     /// Mean sharpness of `frames` frames exposed at `from` or later.
     pub(super) fn mean(&mut self, from: Moment, frames: usize) -> Result<f64, BenchError> {
-        let (mut sum, mut seen) = (0.0, 0);
+        let mut sum = 0.0;
+        let mut seen = 0;
+
         while seen < frames {
             let (at, sharpness) = self.next()?;
             if at >= from {
@@ -58,6 +60,7 @@ impl View {
                 seen += 1;
             }
         }
+
         Ok(sum / frames as f64)
     }
 }

@@ -1,5 +1,6 @@
-//! A video over time. A short one goes there and back again, so that it never jumps. A long one goes from beginning to end
-//! and over again, with a cut in between, and only a window that moves on with it is kept in memory.
+//! A video over time. A short one plays forwards and backwards, so that it never jumps. A long one plays
+//! from beginning to end over and over, with a cut in between; only a window that moves along with it is
+//! kept in memory.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ const MOST: usize = 30 * FPS as usize;
 /// Quality of the kept JPEGs: hardly any loss.
 const QUALITY: u8 = 96;
 
-/// A video; it goes on being decoded while it plays.
+/// A video. It is decoded while it plays.
 pub(super) struct Clip {
     shelf: Arc<Shelf>,
     loader: Option<JoinHandle<()>>,
@@ -44,35 +45,41 @@ impl Clip {
         let mut video = Video::open(path, FPS, WIDTH, HEIGHT)?;
         let picture = video.next().ok_or_else(|| failed(&"it holds no pictures"))?;
         large_enough(path, picture.width, picture.height)?;
+
         let mut encoder = JpegEncoder::new(QUALITY).map_err(|error| failed(&error))?;
         let first = encoder.encode(&picture).map_err(|error| failed(&error))?;
+
         let shelf = Arc::new(Shelf::new(first, most));
         let loader = Loader { path: path.to_owned(), encoder, shelf: Arc::clone(&shelf) };
         let thread = std::thread::Builder::new().name("footage".to_owned());
         let thread = thread.spawn(move || loader.run(video)).map_err(|error| failed(&error))?;
+
         let decompressor = Decompressor::new().ok();
         Ok(Self { shelf, loader: Some(thread), decompressor, index: 0, backwards: false, steps: 0, picture })
     }
 
-    /// The picture at `time` after the start; asked for in rising order.
+    /// The picture at `time` after the start; times must be asked for in rising order.
     pub(super) fn at(&mut self, time: Duration) -> &RgbImage {
         let due = time.as_nanos() * u128::from(FPS) / 1_000_000_000;
         if due > self.steps {
             let jpeg = self.advance(due);
             if let (Some(jpeg), Some(decompressor)) = (jpeg, &mut self.decompressor) {
                 let RgbImage { width, height, data } = &mut self.picture;
-                let (width, height) = (*width, *height);
+                let width = *width;
+                let height = *height;
                 let image = Image { pixels: &mut data[..], width, pitch: 3 * width, height, format: PixelFormat::RGB };
-                // The JPEG is our own, of this very size; should it fail, the picture before stays.
+                // The JPEG is our own and of this very size; should it fail, the previous picture stays.
                 let _ = decompressor.decompress(&jpeg, image);
             }
         }
+
         &self.picture
     }
 
-    /// Goes on to step `due`, as far as the loader has come; gives the picture there.
+    /// Moves on to step `due`, as far as the loader has come, and returns the picture there.
     fn advance(&mut self, due: u128) -> Option<Bytes> {
         let mut held = self.shelf.lock();
+
         while self.steps < due {
             self.steps += 1;
             if held.whole {
@@ -87,6 +94,7 @@ impl Clip {
                 }
             }
         }
+
         self.shelf.changed.notify_all();
         held.pictures.get(self.index).cloned()
     }
@@ -102,7 +110,7 @@ impl Drop for Clip {
     }
 }
 
-/// Where the loader puts pictures and the clip takes them.
+/// The pictures that the loader has put and the clip takes.
 struct Shelf {
     held: Mutex<Held>,
     changed: Condvar,
@@ -111,11 +119,11 @@ struct Shelf {
 
 struct Held {
     pictures: VecDeque<Bytes>,
-    /// That is all there is: the whole video, or what is left of one that cannot be read any more.
+    /// Whether no more pictures will come: the video ended, or cannot be read any further.
     whole: bool,
-    /// Pictures have been let go: the video is longer than the window.
+    /// Whether pictures have been dropped: the video is longer than the window.
     moved_on: bool,
-    /// Nobody watches any more.
+    /// Whether the clip is gone.
     closed: bool,
 }
 
@@ -129,11 +137,12 @@ impl Shelf {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds a picture once there is room; `false` if nobody watches any more.
+    /// Adds a picture once there is room; returns `false` if the clip is gone.
     fn put(&self, jpeg: Bytes) -> bool {
         let held = self.lock();
         let full = |held: &mut Held| held.pictures.len() >= self.most && !held.closed;
         let mut held = self.changed.wait_while(held, full).unwrap_or_else(PoisonError::into_inner);
+
         held.pictures.push_back(jpeg);
         self.changed.notify_all();
         !held.closed
@@ -148,7 +157,7 @@ struct Loader {
 }
 
 impl Loader {
-    /// Goes through `video`, and where it is longer than the window, through it again and again.
+    /// Plays `video` into the shelf, over and over where it is longer than the window.
     fn run(mut self, mut video: Video) {
         loop {
             for picture in &mut video {
@@ -157,12 +166,15 @@ impl Loader {
                     return;
                 }
             }
+
             let longer = self.shelf.lock().moved_on;
             let again = longer.then(|| Video::open(&self.path, FPS, WIDTH, HEIGHT).ok()).flatten();
+
             let Some(again) = again else {
                 self.shelf.lock().whole = true;
                 return self.shelf.changed.notify_all();
             };
+
             video = again;
         }
     }

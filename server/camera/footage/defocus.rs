@@ -5,12 +5,12 @@ use multiversion::multiversion;
 use crate::imaging::RgbImage;
 use crate::simulation::gaussian::half_kernel;
 
-/// Standard deviations after which the kernel is cut: what is left out weighs 0.05 %.
+/// Standard deviations after which the kernel is cut: the part left out weighs 0.05 %.
 const CUT: f64 = 3.5;
-/// Narrower blur than this, in pixels, moves no byte by more than one.
+/// Blur below this, in pixels, changes no byte by more than one.
 const NARROWEST: f64 = 0.15;
 
-/// Blurs windows; keeps its memory from one to the next.
+/// Blurs windows; reuses its memory from one to the next.
 #[derive(Debug, Default)]
 pub(super) struct Defocus {
     /// The window with its margin above and below, blurred across.
@@ -19,25 +19,34 @@ pub(super) struct Defocus {
 }
 
 impl Defocus {
-    /// The window of `size` at `corner` of `picture`, blurred with standard deviation `sigma` pixels. What lies around
-    /// the window blurs into it; beyond the picture, its border goes on.
+    /// The window of `size` at `corner` of `picture`, blurred with standard deviation `sigma` pixels. The
+    /// surroundings of the window blur into it; outside the picture, its border is repeated.
     pub(super) fn see(&mut self, picture: &RgbImage, corner: [usize; 2], size: [usize; 2], sigma: f64) -> RgbImage {
         let [width, height] = size;
         let mut data = vec![0; 3 * width * height];
+
         if sigma < NARROWEST {
-            for (y, out) in data.chunks_exact_mut(3 * width).enumerate() {
-                out.copy_from_slice(&picture.data[3 * ((corner[1] + y) * picture.width + corner[0])..][..3 * width]);
+            let rows = data.chunks_exact_mut(3 * width);
+            for (y, out) in rows.enumerate() {
+                let start = 3 * ((corner[1] + y) * picture.width + corner[0]);
+                out.copy_from_slice(&picture.data[start..][..3 * width]);
             }
+
             return RgbImage { width, height, data };
         }
+
         let kernel = kernel(sigma);
         let reach = kernel.len() - 1;
+
         self.across.resize(3 * width * (height + 2 * reach), 0.0);
+
         for (row, out) in self.across.chunks_exact_mut(3 * width).enumerate() {
             let y = (corner[1] + row).saturating_sub(reach).min(picture.height - 1);
             pad(&mut self.line, &picture.data[3 * y * picture.width..][..3 * picture.width], corner[0], width, reach);
+
             blur_across(out, &self.line, &kernel);
         }
+
         blur_down(&mut data, &self.across, 3 * width, &kernel);
         RgbImage { width, height, data }
     }
@@ -49,10 +58,12 @@ fn kernel(sigma: f64) -> Vec<f32> {
     half_kernel(sigma, reach).into_iter().map(|weight| weight as f32).collect()
 }
 
-/// The pixels from `reach` left of `left` to `reach` right of `left + width`; beyond the row, its border goes on.
+/// Collects the pixels from `reach` left of `left` to `reach` right of `left + width`; outside the row,
+/// its border is repeated.
 fn pad(line: &mut Vec<f32>, row: &[u8], left: usize, width: usize, reach: usize) {
     let pixels = row.as_chunks::<3>().0;
     line.clear();
+
     let places = left..left + width + 2 * reach;
     line.extend(places.flat_map(|x| pixels[x.saturating_sub(reach).min(pixels.len() - 1)].map(f32::from)));
 }
@@ -70,12 +81,15 @@ fn blur_across(out: &mut [f32], line: &[f32], kernel: &[f32]) {
 fn blur_down(data: &mut [u8], across: &[f32], row: usize, kernel: &[f32]) {
     let reach = kernel.len() - 1;
     let mut sum = vec![0.0; row];
+
     for (y, out) in data.chunks_exact_mut(row).enumerate() {
         let at = |y: usize| &across[y * row..][..row];
         weigh(&mut sum, at(y + reach), kernel[0]);
+
         for (tap, &weight) in kernel.iter().enumerate().skip(1) {
             add_pair(&mut sum, at(y + reach - tap), at(y + reach + tap), weight);
         }
+
         for (out, sum) in out.iter_mut().zip(&sum) {
             *out = (sum + 0.5) as u8;
         }

@@ -1,6 +1,7 @@
-//! Footage as a camera: sharp pictures made into a live focal-time scan, as simulated scans are in the literature (Budd
-//! et al., MICCAI 2023): a window walks over the picture, the optimal focal power walks, and what is seen is blurred by
-//! a Gaussian whose standard deviation grows with the distance between the two.
+//! Footage as a camera: makes sharp pictures into a live focal-time scan, as simulated scans are in the
+//! literature (Budd et al., MICCAI 2023). A window walks over the picture, the optimal focal power walks,
+//! and the window is blurred by a Gaussian whose standard deviation grows with the distance between
+//! focal power and optimum.
 
 mod clip;
 mod defocus;
@@ -51,9 +52,11 @@ pub fn open(path: &std::path::Path, settings: CameraSettings) -> Result<impl Cam
     let mut reel = Reel::open(path)?;
     let first = reel.at(Duration::ZERO)?;
     let (_, room) = window(first.width, first.height);
+
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let blur = BLURS.0 + (BLURS.1 - BLURS.0) * rng.random::<f64>();
     let walk = Path::new(settings.seed, RATE, [FOCUS, crop(room[0]), crop(room[1])]);
+
     let name = format!("footage {} (simulated focus)", base_name(path));
     Ok(Playback::new(name, Footage { reel, walk, blur, defocus: Defocus::default() }, settings))
 }
@@ -66,6 +69,7 @@ impl View for Footage {
         let picture = self.reel.at(time)?;
         let (window, room) = window(picture.width, picture.height);
         let corner = [place(x, room[0]), place(y, room[1])];
+
         let optimal = FocalPower::nearest(optimal);
         let seen = self.defocus.see(picture, corner, window, self.blur * optimal.distance(focal_power));
         Ok((seen, optimal))

@@ -15,7 +15,7 @@ use crate::imaging::{RgbImage, decode_any, is_mosaic};
 /// How long a still is shown.
 const STILL: Duration = Duration::from_secs(5);
 
-/// Where the pictures come from.
+/// The source of the pictures.
 pub(super) enum Reel {
     /// A video.
     Video(Clip),
@@ -36,7 +36,7 @@ impl Reel {
         Clip::open(path).map(Self::Video)
     }
 
-    /// The picture at `time` after the start; asked for in rising order.
+    /// The picture at `time` after the start; times must be asked for in rising order.
     pub(super) fn at(&mut self, time: Duration) -> Result<&RgbImage, FootageError> {
         match self {
             Self::Video(video) => Ok(video.at(time)),
@@ -59,6 +59,7 @@ impl Stills {
             let (width, height) = reader.into_dimensions().map_err(|error| FootageError::unreadable(file, error))?;
             large_enough(file, width as usize, height as usize)?;
         }
+
         let picture = still(&files[0])?;
         Ok(Self { files, shown: 0, picture })
     }
@@ -73,7 +74,7 @@ impl Stills {
     }
 }
 
-/// Begins to read the picture in `file` as what the file holds: its name may lie about that.
+/// Begins to read the picture in `file` by its contents: its name may be wrong about the format.
 ///
 /// # Errors
 /// When the file cannot be read.
@@ -85,21 +86,25 @@ pub fn picture_reader(file: &Path) -> io::Result<ImageReader<BufReader<File>>> {
 fn still(file: &Path) -> Result<RgbImage, FootageError> {
     let bytes = std::fs::read(file).map_err(|error| FootageError::unreadable(file, error))?;
     let picture = decode_any(&bytes).map_err(|error| FootageError::unreadable(file, error))?;
+
     if is_mosaic(&picture) {
-        // Its colours would have to be told as estimated, which footage's are not.
+        // A mosaic's colours would have to be marked as estimated, which footage's are not.
         let reason = "it is a sensor's mosaic: look at it with `parfocal inspect`, or import a scan of such";
         return Err(FootageError::unreadable(file, reason));
     }
+
     let fits = picture.width() as usize <= WIDTH && picture.height() as usize <= HEIGHT;
     let scaled =
         if fits { picture } else { picture.resize(WIDTH as u32, HEIGHT as u32, image::imageops::FilterType::Triangle) };
     let rgb = scaled.to_rgb8();
-    let (width, height) = (rgb.width() as usize, rgb.height() as usize);
+
+    let width = rgb.width() as usize;
+    let height = rgb.height() as usize;
     large_enough(file, width, height)?;
     RgbImage::new(width, height, rgb.into_raw()).map_err(|error| FootageError::unreadable(file, error))
 }
 
-/// Whether its name says that `path` is a picture.
+/// Whether `path` has the name of a picture.
 pub(crate) fn is_picture(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known))
@@ -111,6 +116,7 @@ pub(crate) fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     let entries = std::fs::read_dir(folder).map_err(unreadable)?;
     let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>();
     let mut files = paths.map_err(unreadable)?;
+
     files.retain(|file| is_picture(file));
     files.sort();
     if files.is_empty() { Err(FootageError::Empty(folder.to_owned())) } else { Ok(files) }

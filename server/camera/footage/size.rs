@@ -1,14 +1,14 @@
-//! How large the pictures of footage may be.
+//! The sizes that pictures of footage may have.
 
 use std::path::Path;
 
 use super::video::FootageError;
 
-/// Most pixels across and down: what the blur can follow in real time.
+/// Largest width in pixels: the blur can keep up with it in real time.
 pub(super) const WIDTH: usize = 1024;
 /// See [`WIDTH`].
 pub(super) const HEIGHT: usize = 384;
-/// Least pixels across and down.
+/// Least width and height in pixels.
 pub(super) const LEAST: usize = 64;
 
 /// Refuses pictures of fewer than [`LEAST`] pixels either way.

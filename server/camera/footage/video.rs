@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 
 use crate::imaging::RgbImage;
 
-/// Bytes of a picture beyond which something is wrong with the stream.
+/// Bytes beyond which a picture is implausible, and the stream damaged.
 const MOST_BYTES: usize = 1 << 28;
 
 /// Why footage cannot be used.
@@ -27,7 +27,7 @@ pub enum FootageError {
     /// A folder without pictures.
     #[error("there is no picture (PNG, JPEG or TIFF) in {}", .0.display())]
     Empty(PathBuf),
-    /// Pictures too small to hold a patch and move about.
+    /// Pictures too small to hold a patch and to move about in.
     #[error("{} is {width}x{height} pixels, but at least {least}x{least} are needed", path.display())]
     TooSmall {
         /// The file.
@@ -55,8 +55,8 @@ pub struct Video {
 }
 
 impl Video {
-    /// Starts decoding `path` at `fps` pictures a second, each scaled down to at most `width` x `height` pixels, its
-    /// aspect kept.
+    /// Starts decoding `path` at `fps` pictures a second, each scaled down to at most `width` x `height`
+    /// pixels, its aspect kept.
     ///
     /// # Errors
     /// When there is no such file or no decoder, or the file holds no video.
@@ -65,15 +65,18 @@ impl Video {
         let scale = format!(
             "fps={fps},scale='min({width},iw)':'min({height},ih)':force_original_aspect_ratio=decrease:flags=area"
         );
+
         let mut decoder = ffmpeg(path)
             .args(["-an", "-vf", &scale, "-f", "image2pipe", "-c:v", "ppm", "-"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .map_err(FootageError::NoDecoder)?;
+
         let Some(pictures) = decoder.stdout.take() else {
             return Err(FootageError::unreadable(path, "ffmpeg gives no output"));
         };
+
         Ok(Self { decoder, pictures: BufReader::with_capacity(1 << 20, pictures) })
     }
 }
@@ -88,13 +91,13 @@ impl Iterator for Video {
 
 impl Drop for Video {
     fn drop(&mut self) {
-        // Either may fail only because the decoder has ended by itself.
+        // Either fails only if the decoder has already ended by itself.
         let _ = self.decoder.kill();
         let _ = self.decoder.wait();
     }
 }
 
-/// Decodes one picture and throws it away, for the decoder's opinion of the file.
+/// Decodes one picture and drops it, to learn whether the decoder can read the file.
 fn check(path: &Path) -> Result<(), FootageError> {
     std::fs::File::open(path).map_err(|error| FootageError::unreadable(path, error))?;
     let tried = ffmpeg(path).args(["-an", "-frames:v", "1", "-f", "null", "-"]).output();
@@ -102,17 +105,19 @@ fn check(path: &Path) -> Result<(), FootageError> {
     if tried.status.success() {
         return Ok(());
     }
+
     let told = String::from_utf8_lossy(&tried.stderr);
     let last = told.lines().last().unwrap_or("no reason given");
     Err(FootageError::unreadable(path, format!("ffmpeg finds no video in it ({last})")))
 }
 
-/// The program on the file at `path`; what it is to make of it is for the caller to add.
+/// The decoder with the file at `path` as its input; the caller adds what to do with it.
 #[must_use]
 pub fn ffmpeg(path: &Path) -> Command {
-    // What stands before a colon in a bare name would count as a protocol.
+    // The decoder would take anything before a colon in a bare name for a protocol.
     let mut name = OsString::from("file:");
     name.push(path);
+
     let mut command = Command::new("ffmpeg");
     command.args(["-v", "error", "-nostdin", "-i"]).arg(name).stdin(Stdio::null());
     command
@@ -126,15 +131,19 @@ fn ppm(stream: &mut impl BufRead) -> std::io::Result<Option<RgbImage>> {
     if stream.take(3).read_to_end(&mut magic)? == 0 {
         return Ok(None);
     }
+
     let mut numbers = [0_usize; 3];
     for number in &mut numbers {
         *number = decimal(stream)?;
     }
     let [width, height, depth] = numbers;
+
     let bytes = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(3)).filter(|size| *size <= MOST_BYTES);
     let bytes = bytes.filter(|_| magic == b"P6\n" && depth == 255).ok_or_else(damaged)?;
+
     let mut data = vec![0; bytes];
     stream.read_exact(&mut data)?;
+
     RgbImage::new(width, height, data).map(Some).map_err(|_| damaged())
 }
 

@@ -16,12 +16,13 @@ use crate::options::{BadOptions, Options};
 
 /// Size of the sensor this program is made for.
 const SENSOR: (i32, i32) = (2048, 1088);
-/// Frames that may be under way between camera and thread.
+/// Frames that may be in transfer between camera and thread.
 const BUFFERS: usize = 8;
-/// Aravis's fake camera cannot negotiate, and the loopback that it sits on takes packets of any size.
+/// Packet size for Aravis's fake camera: it cannot negotiate, and its loopback takes packets of any
+/// size.
 const FAKE_PACKET: i32 = 16_000;
 
-/// Which camera, and how it is to be set up.
+/// The camera asked for, and how to set it up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wanted {
     /// Identity, or address.
@@ -30,17 +31,17 @@ pub struct Wanted {
     format: Option<PixelFormat>,
     width: Option<i32>,
     height: Option<i32>,
-    /// Bytes of a GigE Vision packet, if they are not to be negotiated.
+    /// Bytes of a GigE Vision packet, unless negotiated.
     packet: Option<i32>,
-    /// Microseconds.
+    /// Exposure time, microseconds.
     exposure: Option<f64>,
-    /// In the camera's own units.
+    /// Gain, in the camera's own units.
     gain: Option<f64>,
     fps: f64,
 }
 
 impl Wanted {
-    /// What `source` and `fps` ask for.
+    /// Parses `source`, with `fps` as the rate.
     pub fn parse(source: &str, fps: f64) -> Result<Self, CameraError> {
         let bad = |error: BadOptions| CameraError::BadSource(format!("camera gige: {error}"));
         let (id, mut options) = Options::split(source).map_err(bad)?;
@@ -54,6 +55,7 @@ impl Wanted {
             gain: options.take("gain").map_err(bad)?,
             fps,
         };
+
         options.finish().map_err(bad)?;
         Ok(wanted)
     }
@@ -72,7 +74,7 @@ pub struct Device {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// How pixels come.
+    /// Pixel format in use.
     pub format: PixelFormat,
     /// Bytes of a packet, on GigE Vision.
     pub packet: Option<u32>,
@@ -81,36 +83,41 @@ pub struct Device {
 /// Why a camera cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
-    /// Aravis says so.
+    /// Aravis reports an error.
     #[error("{0}")]
     Aravis(#[from] glib::Error),
-    /// Ours.
+    /// This program cannot use the camera.
     #[error("{0}")]
     Unsuitable(String),
 }
 
-/// What came.
+/// What the stream delivered.
 pub enum Arrival {
     /// A whole frame.
     Whole(Buffer),
     /// A frame with parts missing.
     Incomplete(u64),
-    /// Nothing in time.
+    /// Nothing came in time.
     Nothing,
 }
 
 impl Device {
-    /// Connects to the camera that is wanted, sets it up and starts it.
+    /// Connects to the camera asked for, sets it up and starts it.
     pub fn open(wanted: &Wanted) -> Result<Self, DeviceError> {
         let camera = connect(&wanted.id)?;
-        let (vendor, model) = (camera.vendor_name()?, camera.model_name()?);
+
+        let vendor = camera.vendor_name()?;
+        let model = camera.model_name()?;
         let fake = vendor == "Aravis";
+
         let format = choose_format(&camera, wanted.format)?;
         let (width, height) = set_region(&camera, wanted)?;
         camera.set_acquisition_mode(AcquisitionMode::Continuous)?;
+
         // A camera that cannot do one of these runs as it is: exposure and rate can still be set by hand.
         let _ = camera.set_exposure_time_auto(Auto::Off);
         let _ = camera.set_gain_auto(Auto::Off);
+
         if let Some(exposure) = wanted.exposure {
             camera.set_exposure_time(exposure)?;
         }
@@ -118,34 +125,39 @@ impl Device {
             camera.set_gain(gain)?;
         }
         set_frame_rate(&camera, wanted.fps);
+
         let packet = negotiate_packet(&camera, wanted.packet.or(fake.then_some(FAKE_PACKET)))?;
         let stream = camera.create_stream()?;
         let payload = usize::try_from(camera.payload()?).unwrap_or_default();
         for _ in 0..BUFFERS {
             stream.push_buffer(Buffer::new_allocate(payload));
         }
+
         let lost = Arc::new(AtomicBool::new(false));
         if let Some(device) = camera.device() {
             let noted = lost.clone();
             device.connect_control_lost(move |_| noted.store(true, Ordering::Relaxed));
         }
+
         camera.start_acquisition()?;
+
         let name = format!("{vendor} {model}");
         Ok(Self { camera, stream, lost, name, fake, width, height, format, packet })
     }
 
-    /// Whether the camera has been noticed to be gone.
+    /// Whether the camera is known to be gone.
     pub fn is_lost(&self) -> bool {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Waits for what comes next. Give a whole frame's buffer back.
+    /// Waits for the next arrival. The caller must give a whole frame's buffer back.
     pub fn wait(&self, timeout: Duration) -> Arrival {
         let micros = u64::try_from(timeout.as_micros()).unwrap_or(u64::MAX);
         let Some(buffer) = self.stream.timeout_pop_buffer(micros) else { return Arrival::Nothing };
         if buffer.status() == BufferStatus::Success {
             return Arrival::Whole(buffer);
         }
+
         let number = buffer.frame_id();
         self.give_back(buffer);
         Arrival::Incomplete(number)
@@ -156,7 +168,7 @@ impl Device {
         self.stream.push_buffer(buffer);
     }
 
-    /// What the camera offers to change.
+    /// The settings that the camera offers to change.
     pub fn offers(&self) -> Vec<Adjustable> {
         let offer = |setting| {
             let (value, (min, max)) = match setting {
@@ -186,16 +198,18 @@ impl Drop for Device {
     }
 }
 
-/// The camera `id`. One on this very machine answers on every network interface, and its packets are then waited for on
-/// the wrong one; by its address it is found on the loopback.
+/// Opens the camera `id`. A camera on this very machine answers on every network interface, and Aravis
+/// would then wait for its packets on the wrong one; by its address it is found on the loopback.
 fn connect(id: &str) -> Result<::aravis::Camera, glib::Error> {
     let camera = ::aravis::Camera::new(Some(id))?;
     let device = camera.device().and_then(|device| device.downcast::<GvDevice>().ok());
     let ends = device.map(|device| [device.device_address(), device.interface_address()].map(loopback));
+
     if ends != Some([true, false]) {
         return Ok(camera);
     }
-    // It has one controller at a time.
+
+    // A camera has one controller at a time.
     drop(camera);
     ::aravis::Camera::new(Some("127.0.0.1"))
 }
@@ -209,30 +223,35 @@ fn choose_format(camera: &::aravis::Camera, wanted: Option<PixelFormat>) -> Resu
     let offered = camera.dup_available_pixel_formats_as_strings()?;
     let has = |format: &PixelFormat| offered.iter().any(|name| name == format.name());
     let chosen = wanted.map_or_else(|| PixelFormat::ALL.into_iter().find(has), |format| Some(format).filter(has));
+
     let Some(format) = chosen else {
         let wanted = wanted.map_or("any format that can be read".into(), |format| format.name().to_owned());
         return Err(DeviceError::Unsuitable(format!("it does not offer {wanted}; it offers {}", offered.join(", "))));
     };
+
     camera.set_pixel_format_from_string(format.name())?;
     Ok(format)
 }
 
 fn set_region(camera: &::aravis::Camera, wanted: &Wanted) -> Result<(usize, usize), DeviceError> {
-    let (width_most, height_most) = (camera.width_bounds()?.1, camera.height_bounds()?.1);
+    let width_most = camera.width_bounds()?.1;
+    let height_most = camera.height_bounds()?.1;
     let width = wanted.width.unwrap_or(width_most.min(SENSOR.0));
     let height = wanted.height.unwrap_or(height_most.min(SENSOR.1));
+
     let fits = |side: i32, most: i32| side > 0 && side <= most && side % 4 == 0;
     if !fits(width, width_most) || !fits(height, height_most) {
         return Err(DeviceError::Unsuitable(format!(
             "{width}x{height} cannot be used: sides must be multiples of {CELL}, at most {width_most}x{height_most}"
         )));
     }
+
     camera.set_region(0, 0, width, height)?;
     let (_, _, width, height) = camera.region()?;
     Ok((usize::try_from(width).unwrap_or_default(), usize::try_from(height).unwrap_or_default()))
 }
 
-/// As near to `fps` as the camera comes.
+/// Sets the rate nearest to `fps` that the camera offers.
 fn set_frame_rate(camera: &::aravis::Camera, fps: f64) {
     let nearest = camera.frame_rate_bounds().map_or(fps, |(min, max)| fps.clamp(min, max.max(min)));
     if let Err(error) = camera.set_frame_rate(nearest) {
@@ -240,11 +259,13 @@ fn set_frame_rate(camera: &::aravis::Camera, fps: f64) {
     }
 }
 
-/// Large packets cost less: Aravis finds the largest that come through.
+/// Sets the packet size. Large packets cost less, so by default Aravis finds the largest that come
+/// through.
 fn negotiate_packet(camera: &::aravis::Camera, wanted: Option<i32>) -> Result<Option<u32>, DeviceError> {
     if !camera.is_gv_device() {
         return Ok(None);
     }
+
     match wanted {
         Some(bytes) => camera.gv_set_packet_size(bytes)?,
         None => camera.gv_auto_packet_size()?,

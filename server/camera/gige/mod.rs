@@ -31,17 +31,19 @@ pub struct GigeCamera {
 }
 
 impl GigeCamera {
-    /// Connects to the camera `source`: an identity as [`list`] gives it, or an address; with options `format` (a pixel
-    /// format), `width`, `height`, `packet` (bytes, instead of negotiating), `exposure` (microseconds), `gain`. `list` says
-    /// which cameras there are.
+    /// Connects to the camera `source`: an identity as [`list`] gives it, or an address; with options
+    /// `format` (a pixel format), `width`, `height`, `packet` (bytes, instead of negotiating), `exposure`
+    /// (microseconds), `gain`. With `list` as the source, the error lists the cameras that answer.
     ///
     /// # Errors
-    /// [`CameraError::BadSource`] when it cannot be used right now; says why. Later failures heal by themselves.
+    /// [`CameraError::BadSource`] when it cannot be used right now; says why. It recovers from later
+    /// failures by itself.
     pub fn open(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
         let wanted = Wanted::parse(source, settings.fps)?;
         if wanted.id == "list" {
             return Err(CameraError::BadSource(listing()));
         }
+
         let (tell, told) = mpsc::channel();
         let thread = std::thread::Builder::new()
             .name("gige".into())
@@ -60,13 +62,14 @@ impl GigeCamera {
                 }
             })
             .map_err(|error| CameraError::BadSource(format!("the system is out of resources: {error}")))?;
+
         let opened = told.recv().unwrap_or_else(|_| Err("the camera's thread ended at once".to_owned()));
         let (size, shared) = opened.map_err(CameraError::BadSource)?;
         Ok(Self { size, shared, thread: Some(thread) })
     }
 
-    /// When the last packet of the frame that [`Camera::next_frame`] gave last was in: what the transfer took, which is the
-    /// link's doing, ends here. For measurements.
+    /// When the last packet of the frame that [`Camera::next_frame`] gave last was in: the time of the
+    /// transfer, which the link determines, ends here. For measurements.
     #[must_use]
     pub fn whole_at(&self) -> Option<Moment> {
         self.shared.whole_at()
@@ -93,7 +96,8 @@ impl Camera for GigeCamera {
 
 impl Drop for GigeCamera {
     fn drop(&mut self) {
-        // A thread that is looking for a lost camera ends by itself within seconds; nobody need wait for that.
+        // A thread that is looking for a lost camera ends by itself within seconds; waiting for it is of
+        // no use.
         let streaming = self.shared.stop();
         if let Some(thread) = self.thread.take().filter(|_| streaming) {
             let _ = thread.join();
@@ -104,11 +108,11 @@ impl Drop for GigeCamera {
 /// A camera that can be opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// What to name it by.
+    /// Identity, to open it by.
     pub id: String,
-    /// Who made it, and which.
+    /// Maker and model.
     pub model: String,
-    /// Where it is.
+    /// Network address or USB port.
     pub address: String,
 }
 
@@ -119,6 +123,7 @@ pub fn list() -> Vec<Found> {
     let aravis = ARAVIS.get_or_init(|| Aravis::initialize().ok().map(std::sync::Mutex::new));
     let Some(aravis) = aravis else { return Vec::new() };
     let devices = aravis.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_device_list();
+
     let found = devices.into_iter().map(|device| Found {
         id: device.id.to_string_lossy().into_owned(),
         model: format!("{} {}", device.vendor.to_string_lossy(), device.model.to_string_lossy()),
@@ -132,6 +137,7 @@ fn listing() -> String {
     if found.is_empty() {
         return "no camera answers: check power, cable and the network interface's address".into();
     }
+
     let one = |found: &Found| format!("gige:{} ({} at {})", found.id, found.model, found.address);
     format!("cameras that answer: {}", found.iter().map(one).collect::<Vec<_>>().join(", "))
 }

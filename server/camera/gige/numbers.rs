@@ -1,13 +1,13 @@
-//! The camera's frame numbers: how far it went, gaps being frames lost.
+//! The camera's frame numbers: gaps in them are frames lost.
 
-/// GigE Vision counts frames from 1 to this, and then again from 1.
+/// GigE Vision counts frames from 1 to this number, and then again from 1.
 const LAST_NUMBER: u64 = 65_535;
 
-/// Frames from the camera's number `seen` to `now`; 1 where its counting was broken off.
+/// Frames from the camera's number `seen` to `now`; 1 where its counting was interrupted.
 pub const fn steps(seen: Option<u64>, now: u64) -> u64 {
     match seen {
         Some(seen) if now > seen => now - seen,
-        // Rolled over, unless that would be an absurd gap.
+        // The number rolled over, unless that would be an absurd gap.
         Some(seen) if seen <= LAST_NUMBER && now + LAST_NUMBER - seen < 1000 => now + LAST_NUMBER - seen,
         _ => 1,
     }

@@ -19,7 +19,7 @@ pub enum PixelFormat {
 }
 
 impl PixelFormat {
-    /// Every format, the one that suits a 10-bit sensor on a busy link best first.
+    /// Every format, the best one for a 10-bit sensor on a busy link first.
     pub const ALL: [Self; 5] = [Self::Mono10p, Self::Mono10, Self::Mono12, Self::Mono16, Self::Mono8];
 
     /// Name by the convention.
@@ -42,12 +42,13 @@ impl PixelFormat {
         }
     }
 
-    /// Unpacks `bytes` into `samples`, scaled to 10 bit. Whichever is shorter ends it.
+    /// Unpacks `bytes` into `samples`, scaled to 10 bit; stops at the end of the shorter one.
     pub fn unpack(self, bytes: &[u8], samples: &mut [u16]) {
         match self {
             Self::Mono8 => {
                 for (sample, &byte) in samples.iter_mut().zip(bytes) {
-                    // So that full scale stays full scale, as saturation is told by.
+                    // The top bits are repeated below, so that full scale stays full scale: saturation is
+                    // detected by it.
                     *sample = u16::from(byte) << 2 | u16::from(byte) >> 6;
                 }
             }

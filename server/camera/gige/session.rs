@@ -1,4 +1,4 @@
-//! A camera's streaming from one loss to the next: unpacks frames, counts those lost, changes settings.
+//! A camera's streaming from one loss to the next: unpacks frames, counts lost ones, changes settings.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,9 +12,10 @@ use super::timestamps::{Timestamps, arrival};
 use crate::camera::{Frame, FrameImage, MosaicPool, Setting};
 use crate::imaging::MosaicFrame;
 
-/// The thread looks at requests at least this often.
+/// The thread checks for requests at least this often.
 const LOOK: Duration = Duration::from_millis(50);
-/// A camera that sends nothing for this long, beyond its exposure, is lost; a slow one may take three of its frames' time.
+/// A camera that sends nothing for this long, beyond its exposure, is lost; a slow one may take the time
+/// of three frames.
 const SILENCE: Duration = Duration::from_millis(1500);
 
 /// A camera's streaming from one loss to the next.
@@ -23,40 +24,54 @@ pub(super) struct Session<'a> {
     device: Device,
     /// Our number of the latest frame.
     number: &'a mut u64,
-    /// What was changed of the camera's settings, the latest of each: a camera that comes back has forgotten it.
+    /// The changes made to the camera's settings, the latest of each: a camera that comes back has lost
+    /// them.
     changes: &'a mut Vec<(Setting, f64)>,
     /// The camera's number of the latest frame.
     seen: Option<u64>,
-    /// As the camera has it; zero where it does not tell.
+    /// Exposure time of the camera; zero where it does not report it.
     exposure: Duration,
-    /// From one frame to the next, as the camera has it; zero where it does not tell.
+    /// Time between frames; zero where the camera does not report it.
     period: Duration,
-    /// Whether whole frames have ceased to come while others do.
+    /// Whether only incomplete frames come.
     torn: bool,
     pool: MosaicPool,
     timestamps: Timestamps,
 }
 
 impl<'a> Session<'a> {
-    /// Streaming from `device`, our numbers going on from `number`, with the `changes` that were made of its settings before.
+    /// Streaming from `device`. Our numbers continue from `number`, and `changes` made to the settings
+    /// before are made again.
     pub fn new(shared: &'a Shared, device: Device, number: &'a mut u64, changes: &'a mut Vec<(Setting, f64)>) -> Self {
         let pool = MosaicPool::new(device.width, device.height);
-        let (seen, exposure, period, torn) = (None, Duration::ZERO, Duration::ZERO, false);
-        let timestamps = Timestamps::default();
-        let mut session = Self { shared, device, number, changes, seen, exposure, period, torn, pool, timestamps };
+        let mut session = Self {
+            shared,
+            device,
+            number,
+            changes,
+            seen: None,
+            exposure: Duration::ZERO,
+            period: Duration::ZERO,
+            torn: false,
+            pool,
+            timestamps: Timestamps::default(),
+        };
+
         for (setting, value) in session.changes.clone() {
             session.change(setting, value);
         }
+
         session.offer();
         session
     }
 
-    /// Streams until the camera is lost or the thread is to end; says why.
+    /// Streams until the camera is lost or the thread is to end; returns the reason.
     pub fn stream(mut self) -> String {
         let mut last = self.shared.clock.now();
         let mut whole = last;
         while !self.shared.stopping() {
             self.change_settings();
+
             match self.device.wait(LOOK) {
                 Arrival::Whole(buffer) => {
                     last = self.shared.clock.now();
@@ -76,24 +91,27 @@ impl<'a> Session<'a> {
                 }
                 Arrival::Nothing => {}
             }
+
             if self.device.is_lost() {
                 return "the camera is gone: check its power and cable".into();
             }
         }
+
         "closed".into()
     }
 
-    /// How long a camera that is well may send nothing.
+    /// How long a working camera may send nothing.
     fn silence(&self) -> Duration {
         SILENCE.max(3 * self.period) + self.exposure
     }
 
-    /// Says so when all frames that come lack parts, and when they do no longer.
+    /// Reports when every frame that comes is incomplete, and when that is over.
     fn tell_torn(&mut self, torn: bool) {
         if torn != self.torn {
             self.torn = torn;
             let words = words(&self.device);
-            let why = "; every frame arrives with parts missing: larger packets, a larger receive buffer, or fewer frames a second";
+            let why = "; every frame arrives with parts missing: larger packets, a larger receive buffer, or fewer \
+                       frames a second";
             self.shared.set_condition(Ok(if torn { Arc::from(format!("{words}{why}")) } else { words }));
         }
     }
@@ -101,27 +119,32 @@ impl<'a> Session<'a> {
     fn deliver(&mut self, buffer: &Buffer) {
         let arrived = arrival(buffer.system_timestamp(), self.shared.clock.as_ref());
         let now = self.shared.clock.now();
+
         self.count(buffer.frame_id());
         let exposed_at = self.timestamps.moment(buffer.timestamp(), arrived);
+
         match self.mosaic(&buffer.image_data()) {
             Some(mosaic) => {
-                let (number, exposure, image) = (*self.number, self.exposure, FrameImage::Mosaic(mosaic));
+                let number = *self.number;
+                let exposure = self.exposure;
+                let image = FrameImage::Mosaic(mosaic);
                 self.shared.deliver(Frame { number, exposed_at, exposure, image, truth: None }, now);
             }
             None => self.shared.lose(1),
         }
     }
 
-    /// The mosaic of a frame's `bytes`; nothing if there are too few.
+    /// The mosaic of a frame's `bytes`; `None` if there are too few.
     fn mosaic(&mut self, bytes: &[u8]) -> Option<Arc<MosaicFrame>> {
         let Device { width, height, format, .. } = self.device;
         let bytes = bytes.get(..format.bytes(width * height))?;
+
         let mut samples = self.pool.blank();
         format.unpack(bytes, &mut samples);
         self.pool.frame(samples).ok()
     }
 
-    /// Moves our number on as the camera's went, gaps being frames lost.
+    /// Advances our number as far as the camera's; gaps are frames lost.
     fn count(&mut self, camera_number: u64) {
         let steps = steps(self.seen, camera_number);
         *self.number += steps;
@@ -151,14 +174,16 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Says what can be changed, and notes how long the camera exposes.
+    /// Publishes what can be changed, and notes the camera's exposure time.
     fn offer(&mut self) {
         let offers = self.device.offers();
         let value = |setting| offers.iter().find(|one| one.setting == setting).map(|one| one.value);
         let seconds = |value: f64| Duration::from_secs_f64(value.clamp(0.0, 1000.0));
+
         let exposure = value(Setting::Exposure).map_or(Duration::ZERO, |micros| seconds(micros / 1e6));
         self.period =
             value(Setting::FrameRate).filter(|&rate| rate > 0.0).map_or(Duration::ZERO, |rate| seconds(1.0 / rate));
+
         if exposure != self.exposure {
             self.timestamps.forget();
         }

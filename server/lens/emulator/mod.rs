@@ -1,9 +1,9 @@
-//! An Optotune Lens Driver 4 that is not there, behind a pseudo-terminal: for tests, and for trying the real driver
+//! An emulated Optotune Lens Driver 4 behind a pseudo-terminal: for tests, and for trying the real driver
 //! without a bench (`parfocal lens emulate`).
 //!
-//! It shares no code with the driver's codec, down to the checksum: written from the protocol's description alone, so
-//! that one misreading cannot hide in both. Serial numbers begin with `EMUL`, by which the driver knows that no glass
-//! moves and has it said on every page.
+//! It shares no code with the driver's codec, not even the checksum: it was written from the protocol's
+//! description alone, so that one misreading cannot hide in both. Serial numbers begin with `EMUL`; they
+//! tell the driver that no glass moves, which every page then says.
 
 mod firmware;
 mod pty;
@@ -42,8 +42,10 @@ impl Emulator {
         let serial = String::from_utf8_lossy(&model.serial).into_owned();
         let link = folder.path().join(format!("usb-Optotune_LD_Optotune_LD_{serial}-if00"));
         let firmware = Arc::new(Mutex::new(Firmware::new(model)));
+
         let mut emulator = Self { firmware, clock, folder, link, pty: None };
         emulator.plug_in()?;
+
         Ok(emulator)
     }
 
@@ -65,37 +67,39 @@ impl Emulator {
         let _ = std::fs::remove_file(&self.link);
     }
 
-    /// Plugs the USB cable in, which also gives the unit power anew.
+    /// Plugs the USB cable in, which also restarts the unit.
     ///
     /// # Errors
     /// When the system has no pseudo-terminal left.
     pub fn plug_in(&mut self) -> io::Result<()> {
         self.unplug();
         self.restart();
+
         let pty = Pty::open(self.firmware.clone(), self.clock.clone())?;
         std::os::unix::fs::symlink(pty.path(), &self.link)?;
         self.pty = Some(pty);
         Ok(())
     }
 
-    /// Restarts the unit without its USB connection noticing.
+    /// Restarts the unit without an interruption of its USB connection.
     pub fn restart(&self) {
         let now = self.clock.now();
         self.firmware().power_cycle(now);
     }
 
-    /// Makes `fault` the case from the next request on.
+    /// Sets `fault`, from the next request on.
     pub fn set_fault(&self, fault: Fault) {
         self.firmware().fault = fault;
     }
 
-    /// Lets `glitch` befall `replies` replies, after the next `spared` ones and all for which glitches are already due.
+    /// Schedules `glitch` for `replies` replies, after `spared` good ones; both come after all replies
+    /// for which glitches are already scheduled.
     pub fn glitch(&self, glitch: Glitch, spared: usize, replies: usize) {
         let befalls = std::iter::repeat_n(None, spared).chain(std::iter::repeat_n(Some(glitch), replies));
         self.firmware().glitches.extend(befalls);
     }
 
-    /// Lets the unit take `latency` to answer a request, from the next one on.
+    /// Sets the time the unit takes to answer a request, from the next one on.
     pub fn set_latency(&self, latency: Duration) {
         self.firmware().model.latency = latency;
     }
@@ -105,18 +109,19 @@ impl Emulator {
         self.firmware().temperature = celsius;
     }
 
-    /// Plugs the lens into the driver, or out of it.
+    /// Plugs the lens into the driver, or unplugs it.
     pub fn set_lens_present(&self, present: bool) {
         self.firmware().lens_present = present;
     }
 
-    /// Focal power commands carried out so far, in the driver's units, each with the moment it was read from the wire.
+    /// Focal power commands carried out so far, in the driver's units, each with the moment it was read
+    /// from the wire.
     #[must_use]
     pub fn commands(&self) -> Vec<(Moment, i16)> {
         self.firmware().commands.iter().copied().collect()
     }
 
-    /// Everything that the unit was told to do so far, carried out or not.
+    /// Every order that the unit received so far, carried out or not.
     #[must_use]
     pub fn orders(&self) -> Vec<Order> {
         self.firmware().orders.iter().copied().collect()
@@ -128,13 +133,13 @@ impl Emulator {
         self.firmware().requests
     }
 
-    /// Mode of control, as the unit counts them, and the current in counts.
+    /// Mode of control, by the driver's number, and the current in counts.
     #[must_use]
     pub fn mode_and_current(&self) -> (u8, i16) {
         self.firmware().mode_and_current()
     }
 
-    /// The glass, 0..=1 standing for the whole of what the lens can do.
+    /// The glass; 0..=1 stands for the whole range of the lens.
     #[must_use]
     pub fn glass(&self) -> Arc<Response> {
         self.firmware().glass()

@@ -18,7 +18,8 @@ use super::firmware::Firmware;
 use crate::clock::Clock;
 use crate::priority::{self, Place};
 
-/// While nobody has the port open there is nothing to wait for; look again this often.
+/// Interval at which to look whether someone has opened the port: until then there is nothing to wait
+/// for.
 const UNOPENED: Duration = Duration::from_millis(5);
 
 /// A pseudo-terminal with a driver behind it, until dropped.
@@ -29,17 +30,22 @@ pub struct Pty {
 }
 
 impl Pty {
+    /// Opens a pseudo-terminal and serves `firmware` on it.
+    ///
     /// # Errors
     /// When the system has no pseudo-terminal, event descriptor or thread left.
     pub fn open(firmware: Arc<Mutex<Firmware>>, clock: Arc<dyn Clock>) -> io::Result<Self> {
         let driver = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&driver)?;
         unlockpt(&driver)?;
+
         let path = PathBuf::from(OsStr::from_bytes(ptsname(&driver, Vec::new())?.as_bytes()));
-        // A serial port does not echo, nor change line ends.
+
+        // A serial port neither echoes nor changes line ends.
         let mut settings = tcgetattr(&driver)?;
         settings.make_raw();
         tcsetattr(&driver, OptionalActions::Now, &settings)?;
+
         let stop = Arc::new(eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?);
         let server = Server { port: File::from(driver), stop: stop.clone(), firmware, clock };
         let thread = std::thread::Builder::new().name("lens-emulator".into()).spawn(move || {
@@ -47,6 +53,7 @@ impl Pty {
             priority::raise(Place::Wire);
             server.run();
         })?;
+
         Ok(Self { path, stop, thread: Some(thread) })
     }
 
@@ -82,26 +89,30 @@ impl Server {
                 }
                 continue;
             }
+
             let Ok(read) = self.port.read(&mut bytes) else { continue };
             let received = bytes.get(..read).unwrap_or_default();
+
             let answers = {
                 let mut firmware = self.firmware.lock().unwrap_or_else(PoisonError::into_inner);
                 firmware.receive(received, self.clock.now())
             };
+
             for answer in answers {
                 if self.stopped_within(answer.takes) {
                     return;
                 }
-                // Nobody may be listening any more.
+                // The other side may have closed the port.
                 let _ = self.port.write_all(&answer.bytes);
             }
         }
     }
 
-    /// What there is on the port; nothing when it is time to stop.
+    /// Waits for events on the port and returns them; `None` when it is time to stop.
     fn wait(&self) -> Option<PollFlags> {
         let mut watched = [PollFd::new(&self.port, PollFlags::IN), PollFd::new(&*self.stop, PollFlags::IN)];
         let _ = poll(&mut watched, None);
+
         let [port, stop] = watched.map(|one| one.revents());
         stop.is_empty().then_some(port)
     }

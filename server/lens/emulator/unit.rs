@@ -1,11 +1,11 @@
-//! Which unit is emulated, and what is wrong with it.
+//! The emulated unit's properties and faults.
 
 use std::str::FromStr;
 use std::time::Duration;
 
 use crate::lens::LensDynamics;
 
-/// Focal power that the emulated lens can reach at all, in dioptres.
+/// Range of the emulated lens, in dioptres.
 pub const LENS_DIOPTRES: (f64, f64) = (5.0, 10.0);
 const GLASS: LensDynamics = LensDynamics { delay: Duration::from_millis(1), settling: Duration::from_millis(15) };
 /// Half of 0.04 of the lens's 5 dioptres.
@@ -14,28 +14,28 @@ const PLAY: f64 = 0.004;
 /// What is wrong with the emulated driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fault {
-    /// Nothing.
+    /// No fault.
     #[default]
     None,
     /// Every reply is noise.
     Garbage,
     /// Every reply has a wrong checksum.
     WrongChecksum,
-    /// Nothing is answered and nothing done.
+    /// It answers nothing and does nothing.
     Silent,
-    /// Every request is answered with an error, and not carried out.
+    /// It answers every request with an error, and carries none out.
     Errors,
-    /// Every reply that tells the focal power has a wrong checksum.
+    /// Every reply with the focal power has a wrong checksum.
     WrongReadBack,
     /// Focal power commands are ignored.
     DropsCommands,
-    /// Some other device that says what it likes.
+    /// Another kind of device, which answers everything with its own message.
     Stranger,
-    /// Every third reply meets with a [`Glitch`], each kind in turn.
+    /// Every third reply suffers a [`Glitch`], each kind in turn.
     NoisyLine,
 }
 
-/// What can happen to a single reply on its way.
+/// What can happen to a single reply on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Glitch {
     /// A few bytes of noise arrive before it.
@@ -112,7 +112,7 @@ impl FromStr for Fault {
     }
 }
 
-/// What makes one unit differ from another.
+/// The properties in which units differ.
 #[derive(Debug, Clone)]
 pub struct Model {
     /// Serial number, eight characters.
@@ -125,15 +125,15 @@ pub struct Model {
     pub ascii_errors: bool,
     /// Whether a wrong checksum is answered with `N` as old firmware does.
     pub old: bool,
-    /// How its glass moves.
+    /// Dynamics of its glass.
     pub glass: LensDynamics,
     /// Half-width of its hysteresis, as a share of the lens's range.
     pub play: f64,
 }
 
 impl Model {
-    /// [`Model::play`] of a hysteresis given as the dioptres between the way up and the way down; none outside 0 to the
-    /// whole of the range.
+    /// [`Model::play`] of a hysteresis given as the dioptres between the way up and the way down; `None`
+    /// outside 0 to the whole range.
     #[must_use]
     pub fn play_of(hysteresis: f64) -> Option<f64> {
         let range = LENS_DIOPTRES.1 - LENS_DIOPTRES.0;

@@ -1,6 +1,6 @@
-//! The protocol as the emulated driver knows it, apart from the real driver's codec.
+//! The protocol as the emulated driver implements it, independently of the real driver's codec.
 
-/// Every request but the greeting: its name, and the bytes between name and checksum.
+/// Every request except the greeting: its name, and the number of bytes between name and checksum.
 pub const REQUESTS: [(&[u8], usize); 17] = [
     (b"H", 0),
     (b"V", 1),
