@@ -1,4 +1,5 @@
-//! The clocks: one monotonic, one of the wall; handed in everywhere, so that a trial replays exactly.
+//! The clocks, one monotonic and one of the wall. They are parameters everywhere, so that a trial
+//! replays exactly.
 
 use std::ops::Add;
 use std::sync::Mutex;
@@ -7,8 +8,8 @@ use std::time::Duration;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-/// A point on the monotonic clock (`CLOCK_MONOTONIC`), in nanoseconds since an arbitrary start that holds until the
-/// machine reboots. Comparable between processes of one machine.
+/// A point on the monotonic clock (`CLOCK_MONOTONIC`), in nanoseconds since an arbitrary start that stays
+/// the same until the machine reboots. Comparable between processes of one machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Moment(u64);
@@ -41,11 +42,11 @@ impl Add<Duration> for Moment {
     }
 }
 
-/// Where time comes from.
+/// The source of time.
 pub trait Clock: Send + Sync {
-    /// Now, on the monotonic clock.
+    /// The current time on the monotonic clock.
     fn now(&self) -> Moment;
-    /// Now, on the wall's clock (UTC).
+    /// The current time on the wall's clock (UTC).
     fn wall(&self) -> Timestamp;
 }
 
@@ -66,7 +67,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// A clock that stands still until it is told to move: for tests and for simulations faster than time.
+/// A clock that stands still until it is advanced: for tests and for simulations faster than time.
 #[derive(Debug)]
 pub struct ManualClock(Mutex<(Moment, Timestamp)>);
 

@@ -1,44 +1,49 @@
-//! Files that are there whole or not at all, whenever the disk is full or the power goes; and files that are nobody else's.
+//! Files that are whole or absent, even when the disk is full or the power fails; and files that other
+//! accounts cannot read.
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-/// Puts a file with these bytes at `path` (see [`replace_with`]), or where a link there leads. A device or a pipe is written to, never
-/// replaced.
+/// Puts a file with these bytes at `path` (see [`replace_with`]), or where a link there leads. A device or
+/// a pipe is written to, never replaced.
 ///
 /// # Errors
-/// When it cannot be written; then nothing of it is left.
+/// When it cannot be written; then no part of it is left.
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // What a shell lends there, such as /dev/stdout, may lead to a plain file that others hold open.
+    // A path that a shell lends, such as /dev/stdout, may lead to a plain file that others hold open.
     let lent = path.starts_with("/dev") || path.starts_with("/proc");
     if lent || fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return fs::write(path, bytes);
     }
+
     replace_with(&fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()), |writer| writer.write_all(bytes))
 }
 
-/// Puts a file with what `fill` writes at `path`. It is written beside it first, so that what was there before stays until
-/// all of it is on the disk.
+/// Puts a file with the output of `fill` at `path`. It is written beside it first, so that the old file
+/// stays until all of the new one is on the disk.
 ///
 /// # Errors
-/// When it cannot be written; then nothing of it is left.
+/// When it cannot be written; then no part of it is left.
 pub fn replace_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let beside = path.with_file_name(format!(".{name}.partial"));
+
     let written = write_through_with(&beside, fill).and_then(|()| fs::rename(&beside, path));
+
     match &written {
         Ok(()) => sync_folder_of(path),
         Err(_) => drop(fs::remove_file(&beside)),
     }
+
     written
 }
 
 /// Writes a file and waits until the disk has it.
 ///
 /// # Errors
-/// When it cannot be written; a part of it may be there then.
+/// When it cannot be written; then a part of it may be left.
 pub fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_through_with(path, |writer| writer.write_all(bytes))
 }
@@ -46,21 +51,24 @@ pub fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
 fn write_through_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let mut writer = BufWriter::with_capacity(1 << 20, File::create(path)?);
     fill(&mut writer)?;
+
     // A file renamed before the disk has it may be empty after a power cut.
     writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()
 }
 
-/// Waits until the disk has the name of `path`: what was renamed may otherwise have its old name after a power cut. What is there is whole
-/// under either name, so a folder that cannot be read, or a file system that cannot do this, is no failure.
+/// Waits until the disk has the name of `path`: a renamed file may otherwise have its old name after a
+/// power cut. The file is whole under either name, so a folder that cannot be read, or a file system that
+/// cannot do this, is not a failure.
 pub fn sync_folder_of(path: &Path) {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-/// Takes every other account's access to the file or folder `path` away.
+/// Takes access to the file or folder `path` away from all other accounts.
 ///
 /// # Errors
-/// When it is not there or not ours, or when it is a folder that all accounts share, such as /tmp, which must stay theirs too.
+/// When it does not exist or is not ours, or when it is a folder that all accounts share, such as /tmp,
+/// which must stay theirs too.
 pub fn make_private(path: &Path) -> io::Result<()> {
     const OTHERS: u32 = 0o077;
     const SHARED: u32 = 0o1000;
@@ -70,13 +78,16 @@ pub fn make_private(path: &Path) -> io::Result<()> {
     if mode & OTHERS == 0 {
         return Ok(());
     }
+
+    // The sticky bit marks a folder that is shared on purpose.
     if there.is_dir() && mode & SHARED != 0 {
         return Err(io::Error::other("all accounts share this folder"));
     }
+
     fs::set_permissions(path, Permissions::from_mode(mode & !OTHERS & 0o7777))
 }
 
-/// Whether `name` is that of a file that a process killed in [`replace`] left behind.
+/// Whether a process killed in [`replace`] may have left a file of this `name`.
 #[must_use]
 pub fn is_partial(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(".partial")

@@ -1,4 +1,4 @@
-//! Identifiers: one type each, so that none is taken for another.
+//! Identifiers: one type each, so that the compiler keeps them apart.
 
 use std::fmt;
 use std::str::FromStr;

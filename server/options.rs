@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::str::FromStr;
 
-/// Options that make no sense; says which and why.
+/// Invalid options; says which and why.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct BadOptions(String);
@@ -18,13 +18,14 @@ pub struct Options<'a> {
 }
 
 impl<'a> Options<'a> {
-    /// `spec` as the part before `?` and its options.
+    /// Splits `spec` into the part before `?` and its options.
     ///
     /// # Errors
     /// When an option is not `NAME=VALUE`, or is given twice.
     pub fn split(spec: &'a str) -> Result<(&'a str, Self), BadOptions> {
         let (device, text) = spec.split_once('?').unwrap_or((spec, ""));
         let mut values = BTreeMap::new();
+
         for pair in text.split('&').filter(|pair| !pair.is_empty()) {
             let Some((name, value)) = pair.split_once('=') else {
                 return Err(BadOptions(format!("in '{spec}': '{pair}' is not NAME=VALUE")));
@@ -33,10 +34,11 @@ impl<'a> Options<'a> {
                 return Err(BadOptions(format!("in '{spec}': '{name}' is given twice")));
             }
         }
+
         Ok((device, Self { spec, values, known: Vec::new() }))
     }
 
-    /// Option `name`, if it was given.
+    /// The value of option `name`, if it was given.
     ///
     /// # Errors
     /// When its value cannot be read.

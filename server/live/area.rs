@@ -1,34 +1,36 @@
-//! When the content area found in a picture is worth telling the loop: the patch should not tremble with the detection,
-//! nor jump because in one picture the circle was not seen, or seen where it is not.
+//! Decides when a content area found in a picture is worth reporting to the loop. The patch should not
+//! tremble with the detection, nor jump because in one picture the circle was missed or misplaced.
 
 use crate::imaging::ContentArea;
 
-/// Pixels that centre or radius must have moved by. The detection's own error is about 6 px at 1080x1920, so about a
-/// quarter of that at the size of one band.
+/// Pixels that centre or radius must have moved by. The detection's own error is about 6 px at
+/// 1080x1920, so about a quarter of that at the size of one band.
 const MOVED: f64 = 2.0;
 
-/// Pixels beyond which a circle is believed only once the next one agrees: up to one detection in ten may be wrong by more than 15 px at
-/// 1080x1920 (what the method's authors allow it), about 4 at the size of one band.
+/// Pixels beyond which a circle counts only once the next one agrees: up to one detection in ten may be
+/// wrong by more than 15 px at 1080x1920 (the method's authors allow for it), about 4 at the size of one
+/// band.
 const JUMP: f64 = 4.0;
 
-/// Detections in a row without a circle before there is none.
+/// Detections in a row without a circle after which there is none.
 const MISSES: u32 = 10;
 
-/// What the loop was last told, and what has been seen since.
+/// The area last reported to the loop, and what has been seen since.
 #[derive(Debug, Default)]
 pub struct AreaWatch {
     told: Option<ContentArea>,
-    /// A circle far from the one told, which the next may confirm.
+    /// A circle far from the reported one, which the next detection may confirm.
     doubted: Option<ContentArea>,
     misses: u32,
 }
 
 impl AreaWatch {
-    /// Takes in a detection; what comes back is to be told to the loop.
+    /// Takes in a detection; returns what to report to the loop, if anything.
     #[allow(clippy::option_option, reason = "that there is no area is news too")]
     pub fn see(&mut self, found: Option<ContentArea>) -> Option<Option<ContentArea>> {
         self.misses = if found.is_some() { 0 } else { self.misses + 1 };
         let doubted = self.doubted.take();
+
         let news = match (self.told, found) {
             (None, None) => false,
             (None, Some(_)) => true,
@@ -40,6 +42,7 @@ impl AreaWatch {
                 confirmed
             }
         };
+
         news.then(|| {
             self.told = found;
             found

@@ -1,4 +1,4 @@
-//! Live: the imaging thread. Each frame is made once into what every viewer gets; a viewer who is slow misses frames and
+//! Live: the imaging thread. It prepares each frame once for all viewers; a slow viewer misses frames and
 //! holds up nobody.
 
 mod area;
@@ -14,10 +14,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use prometheus_client::metrics::histogram::Histogram;
 use tokio::sync::watch;
 
-/// Upper ends of the latency histogram's buckets, seconds: about the bars, 1 ms for the median and 3 ms for 99 in 100.
+/// Upper ends of the latency histogram's buckets, seconds. They lie around the limits, 1 ms for the median
+/// and 3 ms for 99 in 100.
 const LATENCY_BUCKETS: [f64; 10] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3, 1e-2, 2e-2, 5e-2];
 
-/// What the imaging thread has done so far.
+/// Counts of the imaging thread's work so far.
 #[derive(Debug)]
 pub struct Counts {
     viewers: AtomicU64,
@@ -44,7 +45,7 @@ impl Counts {
         self.viewers.load(Ordering::Relaxed)
     }
 
-    /// Frames made into JPEG since the start.
+    /// Frames encoded as JPEG since the start.
     #[must_use]
     pub fn encoded(&self) -> u64 {
         self.encoded.load(Ordering::Relaxed)
@@ -56,14 +57,14 @@ impl Counts {
         self.jpeg_bytes.load(Ordering::Relaxed)
     }
 
-    /// From exposure to lens command, seconds, of the frames that reached the imaging thread.
+    /// Time from exposure to lens command, seconds, of the frames that reached the imaging thread.
     #[must_use]
     pub const fn latency(&self) -> &Histogram {
         &self.latency
     }
 }
 
-/// Where viewers get frames from. Clone freely.
+/// The viewers' source of frames. Clone freely.
 #[derive(Debug, Clone)]
 pub struct LiveHandle {
     frames: watch::Receiver<Option<Arc<EncodedFrame>>>,
@@ -71,17 +72,19 @@ pub struct LiveHandle {
 }
 
 impl LiveHandle {
-    /// Joins the viewers. While nobody has, no picture is made.
+    /// Joins the viewers. Without viewers no picture is made.
     #[must_use]
     pub fn watch(&self) -> Watcher {
         self.counts.viewers.fetch_add(1, Ordering::Relaxed);
         let mut frames = self.frames.clone();
-        // What was made before is stale by the time somebody comes.
+
+        // A frame made earlier is stale by the time somebody joins.
         frames.mark_unchanged();
+
         Watcher { frames, counts: Arc::clone(&self.counts) }
     }
 
-    /// What the imaging thread has done so far.
+    /// Counts of the imaging thread's work so far.
     #[must_use]
     pub fn counts(&self) -> &Counts {
         &self.counts
@@ -96,8 +99,8 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// The latest frame not seen yet, waiting for one if need be; `None` once the imaging thread has ended. Dropping the
-    /// future loses nothing.
+    /// The latest frame not seen yet, waiting for one if needed; `None` once the imaging thread has
+    /// ended. Dropping the future loses nothing.
     pub async fn next(&mut self) -> Option<Arc<EncodedFrame>> {
         loop {
             self.frames.changed().await.ok()?;

@@ -1,4 +1,5 @@
-//! A frame as it leaves the imaging thread: the picture, which anyone may see, apart from what only the operator may.
+//! A frame as it leaves the imaging thread: the picture, which anyone may see, apart from the data that
+//! only the operator may see.
 
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use crate::control::Hold;
 use crate::imaging::{ContentArea, PatchArea};
 use crate::lens::FocalPower;
 
-/// A picture and what belongs to it. Lengths in pixels of this picture.
+/// A picture and its data. Lengths in pixels of this picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Frame's number.
@@ -24,9 +25,9 @@ pub struct Picture {
     pub jpeg: Bytes,
     /// Whether its colours are estimated from bands that hold no red.
     pub estimated: bool,
-    /// Where the patch was taken.
+    /// The patch's place.
     pub patch: PatchArea,
-    /// The content area in use when it was.
+    /// The content area in use at that time.
     pub content_area: Option<ContentArea>,
 }
 
@@ -48,8 +49,8 @@ pub struct Insight {
 /// One frame, made once for all viewers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EncodedFrame {
-    /// What anyone may see.
+    /// The part that anyone may see.
     pub picture: Picture,
-    /// What only the operator and the researcher may see.
+    /// The part that only the operator and the researcher may see.
     pub insight: Insight,
 }

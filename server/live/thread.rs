@@ -15,10 +15,11 @@ use crate::camera::FrameImage;
 use crate::control::{Command, ControlHandle, ControlledFrame};
 use crate::imaging::{GrayImage, JpegEncoder, JpegError, Reconstructor, RgbImage, content_area, rgb_to_gray};
 
-/// The content area is looked for in every so many frames: it moves as slowly as a hand lets an eyepiece slip.
+/// Interval of the search for the content area, frames: it moves as slowly as a hand lets an eyepiece
+/// slip.
 const DETECT_EVERY: u64 = 10;
 
-/// Longest wait for a frame before it is asked whether there will be any.
+/// Longest wait for a frame before checking whether more will come.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Starts the thread; it ends when the loop closes its slot.
@@ -29,9 +30,11 @@ pub fn start(control: ControlHandle, reconstructor: Reconstructor) -> std::io::R
     let (sender, frames) = watch::channel(None);
     let counts = Arc::new(Counts::default());
     let handle = LiveHandle { frames, counts: Arc::clone(&counts) };
+
     let studio = Studio::new(reconstructor).map_err(std::io::Error::other)?;
     let worker = Worker { control, sender, counts, studio, areas: AreaWatch::default(), looked: None };
     let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || worker.run())?;
+
     Ok((handle, thread))
 }
 
@@ -50,6 +53,7 @@ impl Worker {
         crate::priority::lower();
         while !self.control.frames.is_closed() {
             let Some(frame) = self.control.frames.take(PATIENCE) else { continue };
+
             // One bad picture must not end the live view.
             if catch_unwind(AssertUnwindSafe(|| self.turn(frame))).is_err() {
                 tracing::error!("a picture could not be made; going on with the next");
@@ -60,20 +64,26 @@ impl Worker {
     fn turn(&mut self, frame: ControlledFrame) {
         self.counts.latency.observe(f64::from(frame.record.latency_micros) / 1e6);
         let watched = self.counts.viewers() > 0;
-        // By distance: of frames that come faster than they are shown, those of a round number may never be seen here.
+
+        // By distance: where frames come faster than they are shown, those of a round number may never be
+        // seen here.
         let detect = self.looked.is_none_or(|looked| frame.frame.number.abs_diff(looked) >= DETECT_EVERY);
         if !watched && !detect {
             return;
         }
-        let (number, image) = (frame.frame.number, frame.frame.image.clone());
+
+        let number = frame.frame.number;
+        let image = frame.frame.image.clone();
         self.studio.develop(&image);
+
         if watched {
             match self.studio.encode(&image) {
                 Ok(jpeg) => self.publish(frame, &image, jpeg),
                 Err(error) => tracing::error!(%error, "a picture could not be encoded"),
             }
         }
-        // After the picture has left: nobody waits for this.
+
+        // Detection comes after the picture has left: nobody waits for it.
         if detect {
             self.looked = Some(number);
             if let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {
@@ -85,8 +95,10 @@ impl Worker {
     fn publish(&self, controlled: ControlledFrame, image: &FrameImage, jpeg: Bytes) {
         self.counts.encoded.fetch_add(1, Ordering::Relaxed);
         self.counts.jpeg_bytes.fetch_add(jpeg.len() as u64, Ordering::Relaxed);
+
         let (width, height) = size(image);
         let ControlledFrame { frame, patch, content_area, record, belief } = controlled;
+
         self.sender.send_replace(Some(Arc::new(EncodedFrame {
             picture: Picture {
                 number: frame.number,
@@ -109,7 +121,7 @@ impl Worker {
     }
 }
 
-/// Size of the picture that is made of `image`.
+/// Size of the picture made from `image`.
 fn size(image: &FrameImage) -> (usize, usize) {
     match image {
         FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
@@ -117,7 +129,7 @@ fn size(image: &FrameImage) -> (usize, usize) {
     }
 }
 
-/// Makes pictures, in memory that is used again for each.
+/// Makes pictures, reusing its memory for each.
 struct Studio {
     reconstructor: Reconstructor,
     encoder: JpegEncoder,
@@ -131,14 +143,14 @@ impl Studio {
         Ok(Self { reconstructor, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
     }
 
-    /// Makes colour and gray of a mosaic; a colour picture is as it is.
+    /// Makes colour and gray from a mosaic; leaves a colour picture as it is.
     fn develop(&mut self, image: &FrameImage) {
         if let FrameImage::Mosaic(mosaic) = image {
             self.reconstructor.reconstruct(mosaic, &mut self.rgb, &mut self.gray);
         }
     }
 
-    /// JPEG of `image`, which was developed last.
+    /// JPEG of `image`, which must be the one developed last.
     fn encode(&mut self, image: &FrameImage) -> Result<Bytes, JpegError> {
         match image {
             FrameImage::Mosaic(_) => self.encoder.encode(&self.rgb),
@@ -146,7 +158,7 @@ impl Studio {
         }
     }
 
-    /// Gray picture of `image`, which was developed last.
+    /// Gray picture of `image`, which must be the one developed last.
     fn gray(&mut self, image: &FrameImage) -> &GrayImage {
         if let FrameImage::Rgb(rgb) = image {
             rgb_to_gray(rgb, &mut self.gray);

@@ -1,4 +1,4 @@
-//! What the camera's thread and its callers share.
+//! State shared by the camera's thread and its callers.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -8,23 +8,23 @@ use super::device::Device;
 use crate::camera::{CameraError, CameraHealth, Controls, Frame};
 use crate::clock::{Clock, Moment};
 
-/// What the thread and the caller share.
+/// State shared by the thread and the caller.
 pub struct Shared {
     pub(super) clock: Arc<dyn Clock>,
-    /// Settings.
+    /// Settings that the operator can change.
     pub controls: Controls,
     state: Mutex<State>,
     changed: Condvar,
 }
 
 struct State {
-    /// The latest frame, and when it was whole.
+    /// The latest frame, and when it was complete.
     frame: Option<(Frame, Moment)>,
-    /// When the frame that was taken last was whole.
+    /// When the frame taken last was complete.
     taken: Option<Moment>,
     name: Arc<str>,
     fake: bool,
-    /// What is the case, in words; an error is trouble.
+    /// The camera's state in words; an error when there is trouble.
     condition: Result<Arc<str>, Arc<str>>,
     delivered: VecDeque<Moment>,
     lost: u64,
@@ -32,7 +32,7 @@ struct State {
 }
 
 impl Shared {
-    /// For a camera that was just opened.
+    /// State for a camera that was just opened.
     pub fn new(clock: Arc<dyn Clock>, device: &Device) -> Self {
         let state = State {
             frame: None,
@@ -53,6 +53,7 @@ impl Shared {
             .changed
             .wait_timeout_while(self.state(), timeout, |state| state.frame.is_none())
             .unwrap_or_else(PoisonError::into_inner);
+
         match (state.frame.take(), &state.condition) {
             (Some((frame, whole_at)), _) => {
                 state.taken = Some(whole_at);
@@ -63,20 +64,22 @@ impl Shared {
         }
     }
 
-    /// When the last packet of the frame that was taken last was in.
+    /// When the last packet of the frame taken last was in.
     pub fn whole_at(&self) -> Option<Moment> {
         self.state().taken
     }
 
-    /// How the camera does.
+    /// The camera's state.
     pub fn health(&self) -> CameraHealth {
         let now = self.clock.now();
         let state = self.state();
         let recent = state.delivered.iter().filter(|at| now.since(**at) < Duration::from_secs(1)).count();
+
         let message = match &state.condition {
             Ok(words) => words.clone(),
             Err(trouble) => Arc::from(format!("{trouble}; looking for it again")),
         };
+
         CameraHealth {
             name: state.name.clone(),
             simulated: state.fake,
@@ -87,7 +90,7 @@ impl Shared {
         }
     }
 
-    /// Tells the thread to end; whether it is busy with a camera.
+    /// Tells the thread to end; returns whether it is busy with a camera.
     pub fn stop(&self) -> bool {
         let mut state = self.state();
         state.stop = true;
@@ -99,15 +102,18 @@ impl Shared {
         self.state().stop
     }
 
-    /// Puts a frame, whole since `whole_at`, up for taking; one that nobody took counts as lost.
+    /// Offers a frame, complete since `whole_at`; a frame that nobody took counts as lost.
     pub(super) fn deliver(&self, frame: Frame, whole_at: Moment) {
         let now = self.clock.now();
         let mut state = self.state();
+
         state.lost += u64::from(state.frame.replace((frame, whole_at)).is_some());
+
         state.delivered.push_back(now);
         while state.delivered.front().is_some_and(|&at| now.since(at) > Duration::from_secs(1)) {
             state.delivered.pop_front();
         }
+
         self.changed.notify_all();
     }
 
@@ -125,7 +131,7 @@ impl Shared {
         state.condition = condition;
     }
 
-    /// Waits `time`, or until the thread is to end; whether it is.
+    /// Waits `time`, or until the thread is to end; returns whether it is to end.
     pub(super) fn stop_within(&self, time: Duration) -> bool {
         let (state, _) = self
             .changed

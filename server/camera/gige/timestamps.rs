@@ -1,38 +1,41 @@
-//! The camera's clock against ours.
+//! Maps the camera's clock to ours.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::clock::{Clock, Moment};
 
-/// How far back arrivals are compared; a crystal's drift over that time is some tens of microseconds.
+/// How far back arrivals are compared; over that time a crystal drifts by some tens of microseconds.
 const WINDOW: Duration = Duration::from_secs(4);
 
 /// Maps a camera's time stamps to the monotonic clock.
 ///
-/// The first packet of a frame leaves the camera when its exposure has ended, and is then delayed by a varying time. The
-/// least difference between arrival and stamp over the last seconds is therefore that of a frame that was hardly
-/// delayed, and a stamp plus that difference is the end of its exposure without the jitter of network and machine.
+/// The first packet of a frame leaves the camera when its exposure has ended, and is then delayed by a
+/// varying time. The least difference between arrival and stamp over the last seconds is therefore that
+/// of a frame that was hardly delayed, and a stamp plus that difference is the end of its exposure
+/// without the jitter of network and machine.
 #[derive(Debug, Default)]
 pub struct Timestamps {
-    /// Stamp's arrival and difference, differences rising: the front is the least of the window.
+    /// Arrival of each stamp and its difference; differences rise, so the front is the window's least.
     differences: VecDeque<(Moment, i128)>,
     last: Option<Moment>,
 }
 
 impl Timestamps {
-    /// The moment that `stamp` (nanoseconds of the camera's clock) stands for, its frame having begun to arrive at
-    /// `arrived`. Never later than `arrived` but to come after the frame before; a camera without a clock gets `arrived`.
+    /// The moment of `stamp` (nanoseconds of the camera's clock), whose frame began to arrive at
+    /// `arrived`. Never later than `arrived`, except to come after the frame before; a camera without a
+    /// clock gets `arrived`.
     pub fn moment(&mut self, stamp: u64, arrived: Moment) -> Moment {
         let moment = self.undelayed(stamp, arrived);
-        // Else a least difference just found would put this frame before the last one.
+
+        // A smaller least difference just found could put this frame before the last one.
         let rising = self.last.map_or(moment, |last| moment.max(Moment::from_nanos(last.as_nanos() + 1)));
         self.last = Some(rising);
         rising
     }
 
-    /// Compares arrivals afresh: the exposure was changed, and with it, for cameras that stamp its beginning, the time from stamp to
-    /// arrival.
+    /// Starts comparing arrivals afresh, because the exposure was changed. For cameras that stamp its
+    /// beginning, that changes the time from stamp to arrival.
     pub fn forget(&mut self) {
         self.differences.clear();
     }
@@ -41,27 +44,33 @@ impl Timestamps {
         if stamp == 0 {
             return arrived;
         }
+
         let difference = i128::from(arrived.as_nanos()) - i128::from(stamp);
+        // Larger differences before this one can never be the least again.
         while self.differences.back().is_some_and(|&(_, other)| other >= difference) {
             self.differences.pop_back();
         }
         self.differences.push_back((arrived, difference));
+
         while self.differences.front().is_some_and(|&(seen, _)| arrived.since(seen) > WINDOW) {
             self.differences.pop_front();
         }
+
         let least = self.differences.front().map_or(difference, |&(_, least)| least);
         Moment::from_nanos(u64::try_from(i128::from(stamp) + least).unwrap_or(0)).min(arrived)
     }
 }
 
-/// When the frame that Aravis noted at `noted`, nanoseconds of the wall's clock, began to arrive.
+/// The moment at which a frame began to arrive that Aravis noted at `noted`, nanoseconds of the wall's
+/// clock.
 pub fn arrival(noted: u64, clock: &dyn Clock) -> Moment {
     let wall = u64::try_from(clock.wall().as_nanosecond()).unwrap_or_default();
-    // Read last: what comes in between makes the arrival late, which `Timestamps` takes out again, never early, which it would
-    // believe for seconds.
+    // The monotonic clock is read last. A pause between the two makes the arrival late, which `Timestamps`
+    // removes again; the other order would make it early, which `Timestamps` would believe for seconds.
     let now = clock.now();
     let age = wall.saturating_sub(noted);
-    // A wall clock that was set meanwhile makes nonsense of it.
+
+    // A wall clock that was set in the meantime makes the age meaningless.
     let age = if age > 1_000_000_000 { 0 } else { age };
     Moment::from_nanos(now.as_nanos().saturating_sub(age))
 }

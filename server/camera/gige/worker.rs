@@ -1,4 +1,4 @@
-//! The camera's thread: streams, and finds a lost camera again.
+//! The camera's thread: streams, and reconnects a lost camera.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use super::device::{Device, Wanted};
 use super::session::Session;
 use super::shared::{Shared, words};
 
-/// Between two attempts to find a lost camera.
+/// Time between two attempts to find a lost camera.
 const RETRY: Duration = Duration::from_millis(300);
 
 /// Streams from `device`, and from the same camera opened anew when it is lost, until told to stop.
@@ -14,6 +14,7 @@ pub fn run(shared: &Shared, wanted: &Wanted, device: Device) {
     let mut number = 0;
     let mut changes = Vec::new();
     let mut connected = Some(device);
+
     while !shared.stopping() {
         let trouble = match connected.take().map_or_else(|| Device::open(wanted), Ok) {
             Ok(device) => {
@@ -22,6 +23,7 @@ pub fn run(shared: &Shared, wanted: &Wanted, device: Device) {
             }
             Err(error) => error.to_string(),
         };
+
         shared.controls.offer(Vec::new());
         shared.set_condition(Err(trouble.into()));
         if shared.stop_within(RETRY) {
