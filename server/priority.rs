@@ -55,11 +55,12 @@ impl Standing {
         match self {
             Self::RealTime => "real-time priority: other programs do not delay the focus",
             Self::Preferred | Self::Ordinary => {
-                "no real-time priority: other programs can delay the focus; `parfocal serve --help` says how to allow it"
+                "no real-time priority: other programs can delay the focus; `parfocal serve --help` says how to \
+                 allow it"
             }
             Self::Withdrawn => {
-                "real-time priority was given up, because a thread kept a processor for seconds: other programs can delay \
-                 the focus until the next start; please report this with the log"
+                "real-time priority was given up, because a thread kept a processor for seconds: other programs can \
+                 delay the focus until the next start; please report this with the log"
             }
         }
     }

@@ -20,8 +20,8 @@ use crate::lens::LensError;
 pub enum BenchError {
     /// The lens failed.
     #[error(transparent)]
+    Lens(#[from] LensError),
     /// The camera failed.
-    /// The camera.
     #[error("no frames to measure with: {0}")]
     Camera(#[from] CameraError),
     /// The camera's picture cannot be used.
@@ -29,14 +29,14 @@ pub enum BenchError {
     Picture(String),
     /// The lens moves, but the picture does not show it.
     #[error(
-        "the picture hardly changes with the focal power ({:.0} %): put something with fine texture under the optics, in \
-         focus somewhere within the lens's range, and light it well", 100.0 * .0
+        "the picture hardly changes with the focal power ({:.0} %): put something with fine texture under the optics, \
+         in focus somewhere within the lens's range, and light it well", 100.0 * .0
     )]
     Flat(f64),
     /// The steps differ from one another.
     #[error(
-        "the steps do not look alike (they scatter by {:.0} %): camera and object must stand still, and the light must not \
-         flicker", 100.0 * .0
+        "the steps do not look alike (they scatter by {:.0} %): camera and object must stand still, and the light must \
+         not flicker", 100.0 * .0
     )]
     Unsteady(f64),
     /// The lens was not watched for long enough.

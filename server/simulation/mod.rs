@@ -1,4 +1,5 @@
-//! Simulation: what a camera would see, made from a seed. The brain phantom, textures, defocus, and the walks of a hand.
+//! Simulation: makes the pictures that a camera would see, from a seed. The brain phantom, textures,
+//! defocus, and the walks of a hand.
 
 pub mod blur;
 pub mod cover;

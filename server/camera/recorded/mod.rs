@@ -143,7 +143,10 @@ pub enum ScanError {
         of: usize,
     },
     /// A picture is not the one that was stored.
-    #[error("{} is damaged: its SHA-256 differs from {POSES}; restore it from a copy, or record the scan again", .0.display())]
+    #[error(
+        "{} is damaged: its SHA-256 differs from {POSES}; restore it from a copy, or record the scan again",
+        .0.display()
+    )]
     Checksum(PathBuf),
     /// A picture cannot be decoded.
     #[error("{}: {error}", path.display())]
@@ -157,7 +160,10 @@ pub enum ScanError {
     #[error("{} is not empty and is not a scan; choose a new folder", .0.display())]
     Occupied(PathBuf),
     /// The folder holds a scan that was begun with other arguments.
-    #[error("{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder", path.display())]
+    #[error(
+        "{} holds another scan ({difference}); give the same arguments to continue it, or choose a new folder",
+        path.display()
+    )]
     Other {
         /// The folder.
         path: PathBuf,

@@ -34,8 +34,8 @@ impl Encoder {
         self.0[usize::from(index)]
     }
 
-    /// The index of a linear component times [`Self::SCALE`]; what is out of range is brought into it.
     /// The index of a linear component times [`Self::SCALE`], clamped to the valid range.
+    #[inline(always)]
     pub(crate) fn index(scaled: f32) -> u16 {
         // Adding 2^23 leaves the number, rounded, in the lowest bits: cheaper than a cast, which must
         // handle NaN.

@@ -28,8 +28,8 @@ const DRAINING: Duration = Duration::from_millis(200);
 /// A port with a lens driver behind it.
 pub struct Link<'a> {
     port: Port,
+    shared: &'a Shared,
     /// Set once known; from then on commands are taken from the slot.
-    /// Once known, commands are taken from the slot.
     range: Option<Range>,
     sent: Option<Sent>,
     /// Whether a reply to an earlier request may still come.

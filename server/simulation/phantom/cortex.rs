@@ -18,8 +18,8 @@ pub(super) struct Cortex {
     /// Light that reaches the surface past its walls, 0..1.
     pub(super) open: Field,
     /// Share of dura and bone (1) against brain (0).
-    /// Closeness to a crown: 0 in a sulcus, about 1 on a crown.
-    /// How far from the next sulcus, 0 in it, about 1 on a crown.
+    pub(super) rim: Field,
+    /// Distance from the next sulcus: 0 in it, about 1 on a crown.
     pub(super) crown: Field,
 }
 
