@@ -50,6 +50,7 @@ fn gradient_magnitude_sums(patch: &[f32; PIXELS]) -> Row {
         let above = padded(&rows[y.saturating_sub(1)]);
         let here = padded(&rows[y]);
         let below = padded(&rows[(y + 1).min(PATCH_SIDE - 1)]);
+
         // Each Sobel operator is a difference along one axis of a 1-2-1 sum along the other.
         let mut smooth = [0.0; PADDED];
         let mut slope = [0.0; PADDED];
@@ -57,6 +58,7 @@ fn gradient_magnitude_sums(patch: &[f32; PIXELS]) -> Row {
             smooth[x] = above[x] + 2.0 * here[x] + below[x];
             slope[x] = below[x] - above[x];
         }
+
         for x in 0..PATCH_SIDE {
             let ix = smooth[x + 2] - smooth[x];
             let iy = slope[x] + 2.0 * slope[x + 1] + slope[x + 2];
@@ -82,6 +84,7 @@ fn local_ratio_sums(patch: &[f32; PIXELS], blur_rows: &Square, blur_columns: &Sq
     let mut image = [[0.0; PATCH_SIDE]; PATCH_SIDE];
     image.copy_from_slice(patch.as_chunks::<PATCH_SIDE>().0);
     let blurred = product(blur_rows, &product(&image, blur_columns));
+
     let mut sums = [0.0; PATCH_SIDE];
     for (row, smooth) in image.iter().zip(&blurred) {
         for x in 0..PATCH_SIDE {
@@ -117,16 +120,19 @@ static BLUR: LazyLock<Blur> = LazyLock::new(|| {
     let kernel = gaussian();
     let mut rows = [[0.0; PATCH_SIDE]; PATCH_SIDE];
     let mut columns = [[0.0; PATCH_SIDE]; PATCH_SIDE];
+
     for out in 0..PATCH_SIDE {
         let mut weights = [0.0; PATCH_SIDE];
         for (tap, weight) in kernel.iter().enumerate() {
             weights[(out + tap).saturating_sub(RADIUS).min(PATCH_SIDE - 1)] += weight;
         }
+
         for (from, &weight) in weights.iter().enumerate() {
             rows[out][from] = weight as f32;
             columns[from][out] = weight as f32;
         }
     }
+
     Blur { rows, columns }
 });
 
@@ -174,7 +180,9 @@ mod tests {
     /// difference meets a border.
     #[test]
     fn a_slanted_ramp_adds_the_axes_as_a_hypotenuse() {
-        let (inside, sides, ends) = (40.0, 12.0_f64.hypot(32.0), 24.0_f64.hypot(16.0));
+        let inside = 40.0;
+        let sides = 12.0_f64.hypot(32.0);
+        let ends = 24.0_f64.hypot(16.0);
         let corners = 12.0_f64.hypot(16.0);
         let expected = (900.0 * inside + 60.0 * sides + 60.0 * ends + 4.0 * corners) / 1024.0;
         assert_close(mgm(&patch(|x, y| 3.0 * x + 4.0 * y)), expected, 1e-4);
@@ -220,6 +228,7 @@ mod tests {
             })
             .sum::<f64>()
             / 32.0;
+
         let edge = patch(|x, _| if x < 16.0 { 0.0 } else { 255.0 });
         assert_close(mlr(&edge) / expected, 1.0, 4e-3);
     }

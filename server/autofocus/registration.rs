@@ -1,8 +1,8 @@
-//! What two patches of one scene tell of a change of blur: they are laid over each other, and where they show the same, only
-//! the blur differs.
+//! Compares the blur of two patches of one scene: they are laid over each other, and where they show
+//! the same, only the blur differs.
 //!
-//! Texture passes under the patch from frame to frame, and its own energy varies more than that of a slightly blurred one; the
-//! ratio of energies over the same texture does not.
+//! Texture passes under the patch from frame to frame, and its own energy varies more than that of a
+//! slightly blurred one; the ratio of energies over the same texture does not.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -29,14 +29,17 @@ const FLOOR: f32 = 1.0;
 
 type Square = [[f32; PATCH_SIDE]; PATCH_SIDE];
 
-/// How the blur changed from `before` to `now`: log ratios of energy, fine to coarse, positive when sharper; then the patches'
-/// correlation where they overlap, and the overlap's share of a patch. Each of the order of 1.
+/// How the blur changed from `before` to `now`: log ratios of energy, fine to coarse, positive when
+/// sharper; then the patches' correlation where they overlap, and the overlap's share of a patch.
+/// Each is of the order of 1.
 #[must_use]
 pub fn changes(before: (&Patch, &Spectrum), now: (&Patch, &Spectrum)) -> [f32; CHANGES] {
     let (dx, dy) = displacement(before.1, now.1);
     let moved = shifted(before.0, dx, dy);
     let still: Square = std::array::from_fn(|y| std::array::from_fn(|x| now.0.0[y * PATCH_SIDE + x]));
-    let (rows, columns) = (overlap(dy), overlap(dx));
+    let rows = overlap(dy);
+    let columns = overlap(dx);
+
     let mut energies = [[FLOOR; 2]; LAGS.len()];
     for (square, which) in [(&moved, 0), (&still, 1)] {
         let down = second_differences(square, rows.clone(), columns.clone());
@@ -45,21 +48,25 @@ pub fn changes(before: (&Patch, &Spectrum), now: (&Patch, &Spectrum)) -> [f32; C
             energies[lag][which] += down[lag] + along[lag];
         }
     }
+
     let mut out = [0.0; CHANGES];
     for (ratio, [before, now]) in out.iter_mut().zip(energies) {
         *ratio = (3.0 * (now / before).ln()).clamp(-4.0, 4.0);
     }
+
     out[LAGS.len() + 1] = (rows.len() * columns.len()) as f32 / (PATCH_SIDE * PATCH_SIDE) as f32;
     out[LAGS.len()] = correlation(&moved, &still, rows, columns);
     out
 }
 
-/// The displacement `(x, y)` in whole pixels for which `now` at a place shows what `before` shows at that place plus the
-/// displacement: the peak of their phase correlation (Kuglin and Hines 1975), which blur hardly
-/// moves, since it takes from each frequency's strength and not from its phase.
+/// The displacement `(x, y)` in whole pixels for which `now` at a place shows what `before` shows at
+/// that place plus the displacement: the peak of their phase correlation (Kuglin and Hines 1975).
+/// Blur hardly moves the peak, since it takes from each frequency's strength and not its phase.
 fn displacement(before: &Spectrum, now: &Spectrum) -> (isize, isize) {
     let map = correlate(before, now, &WAVES);
-    let (mut best, mut place) = (f32::NEG_INFINITY, (0, 0));
+    let mut best = f32::NEG_INFINITY;
+    let mut place = (0, 0);
+
     for dy in -FARTHEST..=FARTHEST {
         for dx in -FARTHEST..=FARTHEST {
             let value = map[dy.rem_euclid(PATCH_SIDE as isize) as usize][dx.rem_euclid(PATCH_SIDE as isize) as usize];
@@ -90,28 +97,38 @@ static WAVES: LazyLock<Waves> = LazyLock::new(|| {
 fn correlate(before: &Spectrum, now: &Spectrum, waves: &Waves) -> Square {
     let mut map = [[0.0f32; PATCH_SIDE]; PATCH_SIDE];
     for ky in (0..=FINEST).chain(PATCH_SIDE - FINEST..PATCH_SIDE) {
-        let (mut real, mut imaginary) = ([0.0f32; PATCH_SIDE], [0.0f32; PATCH_SIDE]);
+        let mut real = [0.0f32; PATCH_SIDE];
+        let mut imaginary = [0.0f32; PATCH_SIDE];
         for kx in 0..=FINEST {
-            let (a, b) = (before.real[ky][kx], before.imaginary[ky][kx]);
-            let (c, d) = (now.real[ky][kx], now.imaginary[ky][kx]);
+            let a = before.real[ky][kx];
+            let b = before.imaginary[ky][kx];
+            let c = now.real[ky][kx];
+            let d = now.imaginary[ky][kx];
+
             // The transform has e^(+i...), so a displaced patch's phase lags: before * conj(now).
-            let (re, im) = (a * c + b * d, b * c - a * d);
+            let re = a * c + b * d;
+            let im = b * c - a * d;
             let weight = 1.0 / (re * re + im * im + FAINT * FAINT).sqrt();
             // Frequencies along a row stand for their negatives too.
             let weight = if kx == 0 { weight } else { 2.0 * weight };
-            let (re, im) = (weight * re, weight * im);
+            let re = weight * re;
+            let im = weight * im;
+
             for x in 0..PATCH_SIDE {
                 real[x] += re * waves.cos[kx][x] + im * waves.sin[kx][x];
                 imaginary[x] += im * waves.cos[kx][x] - re * waves.sin[kx][x];
             }
         }
+
         for (y, line) in map.iter_mut().enumerate() {
-            let (cos, sin) = (waves.cos[ky][y], waves.sin[ky][y]);
+            let cos = waves.cos[ky][y];
+            let sin = waves.sin[ky][y];
             for x in 0..PATCH_SIDE {
                 line[x] += real[x] * cos + imaginary[x] * sin;
             }
         }
     }
+
     map
 }
 
@@ -143,12 +160,15 @@ fn second_differences(square: &Square, rows: Range<usize>, columns: Range<usize>
     for (mean, lag) in out.iter_mut().zip(LAGS) {
         let mut sums = [0.0f32; PATCH_SIDE];
         for y in rows.start + lag..rows.end.saturating_sub(lag) {
-            let (above, here, below) = (&square[y - lag], &square[y], &square[y + lag]);
+            let above = &square[y - lag];
+            let here = &square[y];
+            let below = &square[y + lag];
             for x in 0..PATCH_SIDE {
                 let difference = above[x] - 2.0 * here[x] + below[x];
                 sums[x] += difference * difference;
             }
         }
+
         let count = rows.len().saturating_sub(2 * lag) * columns.len();
         *mean = sums[columns.clone()].iter().sum::<f32>() / count.max(1) as f32;
     }
@@ -163,14 +183,18 @@ fn correlation(a: &Square, b: &Square, rows: Range<usize>, columns: Range<usize>
     for y in rows {
         for x in 0..PATCH_SIDE {
             // About the middle gray, so that squares of what differs are not lost in those of what does not.
-            let (a, b) = (a[y][x] - 128.0, b[y][x] - 128.0);
+            let a = a[y][x] - 128.0;
+            let b = b[y][x] - 128.0;
             for (sum, term) in sums.iter_mut().zip([a, b, a * a, b * b, a * b]) {
                 sum[x] += term;
             }
         }
     }
+
     let [a, b, aa, bb, ab] = sums.map(|sum| sum[columns.clone()].iter().sum::<f32>() / count);
-    let (aa, bb, ab) = (aa - a * a, bb - b * b, ab - a * b);
+    let aa = aa - a * a;
+    let bb = bb - b * b;
+    let ab = ab - a * b;
     if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
 }
 
@@ -183,13 +207,15 @@ mod tests {
 
     const SIDE: usize = 96;
 
-    /// A picture of spots of many sizes: white noise blurred to three widths, each brought to a deviation of 20 gray levels.
+    /// A picture of spots of many sizes: white noise blurred to three widths, each brought to a
+    /// deviation of 20 gray levels.
     fn scene(seed: u32) -> GrayImage {
         let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(1);
         let mut noise = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / (1 << 24) as f32 - 0.5
         };
+
         let mut sum = vec![128.0f32; SIDE * SIDE];
         for sigma in [0.7, 1.5, 3.0] {
             let white = GrayImage::new(SIDE, SIDE, (0..SIDE * SIDE).map(|_| noise()).collect()).unwrap();
@@ -199,6 +225,7 @@ mod tests {
                 *total += scale * value;
             }
         }
+
         GrayImage::new(SIDE, SIDE, sum).unwrap()
     }
 

@@ -50,7 +50,7 @@ pub struct PolicyEntry {
     pub reason: Option<String>,
 }
 
-/// Why a policy could not be had.
+/// Why a policy could not be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PolicyError {
     /// No such name.
@@ -103,7 +103,7 @@ impl Registry {
         self.put(name, summary, Source::Constructor(Arc::new(build)))
     }
 
-    /// This registry with policy `name` listed but not to be had, for `reason`, which says what to do.
+    /// This registry with policy `name` listed but unavailable, for `reason`, which says what to do.
     #[must_use]
     pub fn without(self, name: &str, summary: &'static str, reason: &str) -> Self {
         self.put(name, summary, Source::Missing(reason.into()))
@@ -141,6 +141,7 @@ impl Registry {
                 Source::Constructor(_) => None,
                 Source::Missing(reason) => Some(reason.to_string()),
             };
+
             PolicyEntry {
                 name: policy.name.clone(),
                 summary: policy.summary,
@@ -149,6 +150,7 @@ impl Registry {
                 reason,
             }
         };
+
         self.policies.iter().map(entry).collect()
     }
 
@@ -158,6 +160,7 @@ impl Registry {
     /// When there is no such policy or it cannot run.
     pub fn build(&self, name: &PolicyName) -> Result<Box<dyn Policy>, PolicyError> {
         let policy = self.policies.iter().find(|policy| policy.name == *name);
+
         match policy.map(|policy| &policy.source) {
             Some(Source::Constructor(build)) => Ok(build()),
             Some(Source::Missing(reason)) => {

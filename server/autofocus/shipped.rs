@@ -64,6 +64,7 @@ impl Registry {
             .with("mlr-hill-climber", "climbs the mean local ratio, a step a frame", || {
                 Box::new(HillClimber::new(mlr))
             });
+
         with_shipped(classical)
     }
 }
@@ -74,7 +75,7 @@ pub fn design(name: &str) -> Option<Design> {
     SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| shipped.design)
 }
 
-/// `registry` with all learned policies, those available whose weights are sound.
+/// Adds all learned policies to `registry`; one with damaged weights is listed but unavailable.
 #[must_use]
 pub fn with_shipped(registry: Registry) -> Registry {
     SHIPPED.iter().fold(registry, |registry, shipped| {
@@ -107,8 +108,8 @@ pub enum FolderError {
     },
 }
 
-/// `registry` with the learned policies whose weights lie in `folder` as `NAME.safetensors` in the place of those that
-/// ship; those of which there are none stay.
+/// Replaces the weights that ship by those that lie in `folder` as `NAME.safetensors`. A policy
+/// without a file there keeps its own.
 ///
 /// # Errors
 /// When there are none at all, or some are damaged or cannot be read.
@@ -119,6 +120,7 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
         let names: Vec<_> = SHIPPED.iter().map(|shipped| format!("{}.safetensors", shipped.name)).collect();
         return Err(FolderError::Empty { folder: folder.to_owned(), names: names.join(", ") });
     }
+
     there.into_iter().try_fold(registry, |registry, Shipped { name, summary, design, .. }| {
         let file = file_of(name);
         let unfit = |reason: String| FolderError::Unfit { file: file.clone(), reason };
@@ -128,8 +130,8 @@ pub fn with_folder(registry: Registry, folder: &Path) -> Result<Registry, Folder
     })
 }
 
-/// `registry` with a policy of weights that were found sound a moment ago; should libtorch fail all the same, the lens stays
-/// where it is.
+/// Adds a policy whose weights were found sound a moment ago; should libtorch fail all the same,
+/// the lens stays where it is.
 fn put(registry: Registry, name: &str, summary: &'static str, design: Design, bytes: Arc<[u8]>) -> Registry {
     let weights = Arc::clone(&bytes);
     let make = move || build(design, &bytes).unwrap_or_else(|_| Box::<Fixed>::default() as Box<dyn Policy>);
@@ -161,14 +163,16 @@ mod tests {
     }
 
     #[test]
-    fn damaged_and_missing_weights_in_a_folder_are_told_and_others_stay() {
+    fn damaged_and_missing_weights_in_a_folder_are_reported_and_others_stay() {
         let folder = tempfile::tempdir().unwrap();
         let with = || with_folder(with_shipped(Registry::default()), folder.path());
         assert!(with().err().unwrap().to_string().contains("mgm-learned.safetensors"));
+
         let file = folder.path().join("mgm-learned.safetensors");
         std::fs::write(&file, b"damaged").unwrap();
         let error = with().err().unwrap().to_string();
         assert!(error.contains("mgm-learned.safetensors") && error.contains("the weights are damaged"), "{error}");
+
         std::fs::copy("policies/mgm-learned.safetensors", &file).unwrap();
         assert!(with().unwrap().build(&PolicyName::new("parfocal")).is_ok());
     }

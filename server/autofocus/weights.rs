@@ -24,30 +24,35 @@ pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
     load_widening(store, bytes, "", 0)
 }
 
-/// Like [`load`], for a network that sees more than it once did: where the matrix `widened` has `columns` columns in the file, they
-/// are the first of the network's, and the others become 0.
+/// Like [`load`], for a network that sees more than it once did: where the matrix `widened` has
+/// `columns` columns in the file, they become the first of the network's, and the others become 0.
 ///
 /// # Errors
 /// As for [`load`].
 pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, columns: usize) -> Result<(), WeightsError> {
     let file = SafeTensors::deserialize(bytes).map_err(|error| WeightsError::Damaged(error.to_string()))?;
+
     let variables = store.variables();
     if let Some(name) = file.names().into_iter().find(|name| !variables.contains_key(*name)) {
         return Err(WeightsError::Mismatch(format!("the network has no tensor '{name}'")));
     }
+
     for (name, mut variable) in variables {
         let view = file.tensor(&name).map_err(|_| WeightsError::Mismatch(format!("tensor '{name}' is missing")))?;
+
         let shape: Vec<i64> = view.shape().iter().map(|&side| i64::try_from(side).unwrap_or(i64::MAX)).collect();
         let size = variable.size();
         let narrow = name == widened && size.len() == 2 && shape == [size[0], i64::try_from(columns).unwrap_or(0)];
         if view.dtype() != Dtype::F32 || (shape != size && !narrow) {
             return Err(WeightsError::Mismatch(format!("tensor '{name}' has shape {shape:?}, not {size:?}")));
         }
+
         let tensor = Tensor::f_from_data_size(view.data(), &shape, Kind::Float)
             .map_err(|error| WeightsError::Damaged(error.to_string()))?;
         if !bool::try_from(tensor.isfinite().all()).unwrap_or(false) {
             return Err(WeightsError::Damaged(format!("tensor '{name}' holds values that are no numbers")));
         }
+
         tch::no_grad(|| {
             if narrow {
                 let _ = variable.zero_();
@@ -57,23 +62,27 @@ pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, columns:
             }
         });
     }
+
     Ok(())
 }
 
-/// The variables of `store` as safetensors; the file's metadata say in one entry how they were `made`. One, because the
-/// entries' order in the file is random, and the same training must give the same file.
+/// The variables of `store` as safetensors; one entry of the file's metadata says how they were
+/// `made`. It is a single entry because the order of entries in the file is random, and the same
+/// training must give the same file.
 ///
 /// # Errors
-/// When the tensors cannot be laid out, which no network of this program gives cause for.
+/// When the tensors cannot be laid out, which does not happen with this program's networks.
 pub fn save(store: &nn::VarStore, made: &str) -> Result<Vec<u8>, WeightsError> {
     let data: BTreeMap<String, (Vec<usize>, Vec<u8>)> =
         store.variables().into_iter().map(|(name, tensor)| (name, raw(&tensor))).collect();
+
     let mut views = Vec::with_capacity(data.len());
     for (name, (shape, bytes)) in &data {
         let view = TensorView::new(Dtype::F32, shape.clone(), bytes)
             .map_err(|error| WeightsError::Damaged(error.to_string()))?;
         views.push((name.as_str(), view));
     }
+
     let notes = HashMap::from([("made".to_owned(), made.to_owned())]);
     safetensors::serialize(views, Some(notes)).map_err(|error| WeightsError::Damaged(error.to_string()))
 }
@@ -105,15 +114,18 @@ mod tests {
 
     #[test]
     fn weights_survive_the_way_out_and_in() {
-        let (from, to) = (store(3), store(3));
+        let from = store(3);
+        let to = store(3);
         load(&to, &save(&from, "a test").unwrap()).unwrap();
         assert_eq!(from.variables()["layer.weight"], to.variables()["layer.weight"]);
     }
 
     #[test]
     fn narrow_weights_become_the_first_columns_of_wide_ones() {
-        let (narrow, wide) = (store(3), store(5));
+        let narrow = store(3);
+        let wide = store(5);
         let bytes = save(&narrow, "a test").unwrap();
+
         load_widening(&wide, &bytes, "layer.weight", 3).unwrap();
         let [from, to] = [&narrow, &wide].map(|store| store.variables()["layer.weight"].shallow_clone());
         assert_eq!(to.narrow(1, 0, 3), from);

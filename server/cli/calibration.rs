@@ -1,4 +1,4 @@
-//! Calibrations in files: TOML, with pictures of 16 bit beside it for references per pixel.
+//! Calibrations in files: TOML, with 16-bit pictures beside it for references per pixel.
 
 use std::fs;
 use std::io::{Cursor, ErrorKind};
@@ -21,6 +21,7 @@ pub fn read(path: &Path) -> Result<Calibration, Failure> {
     let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
     let text = fs::read_to_string(&path)
         .map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
+
     let folder = path.parent().unwrap_or(Path::new("."));
     let calibration = Calibration::from_toml_with(&text, |name| picture(folder, name));
     Ok(calibration.map_err(|error| format!("calibration {}, {error}", path.display()))?)
@@ -79,18 +80,22 @@ fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
     }
 }
 
-/// What a new version in `folder` builds upon: the current calibration, or a typical unit's where there is none yet.
+/// The calibration that a new version in `folder` builds on: the current one, or a typical unit's
+/// if there is none yet.
 ///
 /// # Errors
-/// When it cannot be read; or is gone while versions before it are there, whose names a new one would take.
+/// When it cannot be read, or when it is gone while earlier versions are still there: a new one
+/// would take their names.
 pub fn begun(folder: &Path) -> Result<Calibration, Failure> {
     if folder.join(CURRENT).exists() {
         return read(folder);
     }
+
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
     let number = |name: &String| name.strip_prefix("calibration-")?.strip_suffix(".toml")?.parse::<u32>().ok();
     let Some(latest) = names.filter_map(|name| number(&name)).max() else { return Ok(Calibration::default()) };
+
     Err(format!(
         "{} holds earlier calibrations but no {CURRENT}: copy calibration-{latest}.toml to that name, \
          or give another folder",
@@ -99,16 +104,18 @@ pub fn begun(folder: &Path) -> Result<Calibration, Failure> {
     .into())
 }
 
-/// Keeps `calibration` in `folder` as the current one; the one before stays there under its version's name. `changed`
-/// names the references that are new. Returns the file's name.
+/// Saves `calibration` in `folder` as the current one; the one before stays there under its
+/// version's name. `changed` names the references that are new. Returns the file's path.
 pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, Failure> {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
+
     let current = folder.join(CURRENT);
     let before = match fs::read_to_string(&current) {
         Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
         before => before.map_err(failed)?,
     };
+
     let mut names = ["dark", "white"].map(|key| named(&before, key));
     let references = [("dark", &calibration.dark), ("white", &calibration.white)];
     for ((key, reference), name) in references.into_iter().zip(&mut names) {
@@ -119,11 +126,14 @@ pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Resul
             write_picture(&folder.join(name.as_str()), frame)?;
         }
     }
+
     let text = calibration.to_toml(&names[0], &names[1]);
+
     if !before.is_empty() {
         let version = named(&before, "version");
         replace(&folder.join(format!("calibration-{version}.toml")), before.as_bytes()).map_err(failed)?;
     }
+
     replace(&current, text.as_bytes()).map_err(failed)?;
     Ok(current)
 }
@@ -137,9 +147,11 @@ fn named(toml: &str, key: &str) -> String {
 fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), Failure> {
     let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
     let size = |side: usize| u32::try_from(side).map_err(|_| failed(&"it is too large"));
+
     let picture: Option<ImageBuffer<Luma<u16>, _>> =
         ImageBuffer::from_raw(size(frame.width())?, size(frame.height())?, frame.samples());
     let picture = picture.ok_or_else(|| failed(&"its size is wrong"))?;
+
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, ImageFormat::Tiff).map_err(|error| failed(&error))?;
     Ok(replace(path, bytes.get_ref()).map_err(|error| failed(&error))?)

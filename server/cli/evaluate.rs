@@ -80,14 +80,16 @@ const MOST_PHANTOM: usize = 100;
 /// Runs the command.
 ///
 /// # Errors
-/// When scans, footage, policies or shards cannot be had, or results cannot be written.
+/// When scans, footage, policies or shards cannot be used, or results cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.out {
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
     }
+
     if !arguments.stacks.is_empty() {
         return stacks(arguments);
     }
+
     let shards = if arguments.merge.is_empty() {
         let shard = evaluated(arguments)?;
         if arguments.shard.is_some() {
@@ -97,6 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         arguments.merge.iter().map(|file| read_shard(file)).collect::<Result<_, _>>()?
     };
+
     let (report, outcomes) = merge(shards)?;
 
     // Both in any case: what one cannot take, the other has.
@@ -116,11 +119,14 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> String {
 fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyName>), Failure> {
     compute_on_this_thread();
     let mut registry = Registry::standard();
+
     if let Some(folder) = &arguments.weights {
         registry = shipped::with_folder(registry, folder)?;
     }
+
     let policies = policies(&arguments.policies, &registry);
     let registry = policies.iter().fold(registry, scripted::with_file);
+
     // What cannot run is told before anything that takes time.
     policies.iter().try_for_each(|name| registry.build(name).map(drop))?;
     Ok((registry, policies))
@@ -135,6 +141,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
     if set.count() == 0 {
         return Err(format!("shard {part} has no scans: there are only {count}; make fewer shards").into());
     }
+
     let blank = without_detail(set.as_ref());
     match warning(blank, set.count()) {
         Ok(None) => {}
@@ -169,6 +176,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
 fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
     let text = serde_json::to_string(shard)? + "\n";
     let mut told = String::new();
+
     if let Some(folder) = &arguments.out {
         let file = folder.join(shard.part.file_name());
         replace(&file, text.as_bytes()).map_err(|error| unwritable(folder, &error))?;
@@ -180,6 +188,7 @@ fn give_shard(arguments: &Arguments, shard: &Shard) -> Result<(), Failure> {
             file.display()
         );
     }
+
     print(if arguments.json { &text } else { &told })
 }
 
@@ -200,15 +209,18 @@ impl Arguments {
 fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let (registry, policies) = registry_and_policies(arguments)?;
     let sources: Vec<StackSource> = arguments.stacks.iter().map(|text| StackSource::parse(text)).collect();
+
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
     let (report, outcomes) = bench(&registry, &policies, &sources, arguments.seed.unwrap_or(FIRST_SEED), &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;
     bar.finish_and_clear();
+
     if let Some(folder) = &arguments.out {
         report.write(&outcomes, folder).map_err(|error| unwritable(folder, &error))?;
     }
+
     print(&if arguments.json { serde_json::to_string(&report)? + "\n" } else { report.markdown() })
 }
 
@@ -223,7 +235,7 @@ fn policies(asked: &[String], registry: &Registry) -> Vec<PolicyName> {
     policies
 }
 
-/// The names in one argument; a file's goes on to its end.
+/// The names in one argument; a file's path goes on to the argument's end, commas included.
 fn names(argument: &str) -> Vec<&str> {
     let argument = argument.trim_start();
     match argument.split_once(',') {
@@ -248,16 +260,21 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     if arguments.scans == "simulated" {
         return simulated(arguments, part);
     }
+
     if !arguments.footage.is_empty() {
         return Err("--footage needs simulated scans; leave out --scans".into());
     }
+
     if arguments.scans == "relief" {
-        let (seed, count) = (arguments.seed(), arguments.count.unwrap_or(COUNT));
+        let seed = arguments.seed();
+        let count = arguments.count.unwrap_or(COUNT);
         let set = Benchmark { seed, ..Benchmark::relief(count)? };
         return Ok(Scans { set: Box::new(PartOf::new(set, part)), seed, count, between: None });
     }
+
     let between = Some(arguments.between);
     let recorded = |scans| Box::new(Recorded { scans, between: arguments.between });
+
     if arguments.scans == "phantom" {
         if arguments.count.is_some_and(|count| count > MOST_PHANTOM) {
             return Err(format!("--count is at most {MOST_PHANTOM} over the phantom").into());
@@ -266,6 +283,7 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
         let scans = part.scans(count).into_iter().map(|index| phantom(arguments.seed().wrapping_add(index as u64)));
         return Ok(Scans { set: recorded(scans.collect()), seed: arguments.seed(), count, between });
     }
+
     let folder = Path::new(&arguments.scans);
     if !folder.is_dir() {
         return Err(format!(
@@ -274,16 +292,19 @@ fn scans(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
         )
         .into());
     }
+
     if arguments.count.is_some_and(|count| count > 1) {
         return Err("a folder holds one scan; leave out --count".into());
     }
     if part != Part::WHOLE {
         return Err("a folder holds one scan, which cannot be split; leave out --shard".into());
     }
+
     let folder = ScanFolder::open(folder)?;
     let bar = bar(folder.poses().len(), 0);
     let scan = RecordedScan::read(&folder, &|| bar.inc(1))?;
     bar.finish_and_clear();
+
     Ok(Scans { set: recorded(vec![Arc::new(scan)]), seed: folder.header().seed, count: 1, between })
 }
 
@@ -299,7 +320,10 @@ fn simulated(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
     for path in &arguments.footage {
         clips.extend(footage::clips(path)?);
     }
-    let (seed, count) = (arguments.seed(), arguments.count.unwrap_or(COUNT));
+
+    let seed = arguments.seed();
+    let count = arguments.count.unwrap_or(COUNT);
+
     let set = if clips.is_empty() {
         Benchmark { seed, ..Benchmark::reference(count)? }
     } else {

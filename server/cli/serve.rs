@@ -103,11 +103,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(writer)
         .init();
+
     // Whatever the server makes holds trial data: nobody else's to read.
     rustix::process::umask(rustix::fs::Mode::RWXG | rustix::fs::Mode::RWXO);
     control::keep_policies_quiet();
+
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let outcome = runtime.block_on(serve(arguments));
+
     // A thread that hangs must not keep the process from ending.
     runtime.shutdown_background();
     drop(flush);
@@ -120,26 +123,34 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     if !priority::lock_memory() {
         tracing::debug!("memory is not locked; `parfocal serve --help` says how to allow it");
     }
+
     // First of all: what cannot be reached need not be set up, and early visitors wait in its queue.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
     let address = listener.local_addr()?;
+
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let calibration = calibration::read_or_default(arguments.calibration.as_deref())?;
     let registry = registry(arguments)?;
+
     let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
     let keys = Keys::load_or_create(&arguments.data_dir)?;
     let mut seeded = seeded(arguments)?;
     let library = protocols(arguments, &registry)?;
+
     let reconstructor = Reconstructor::new(&calibration);
     let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), seeded.random())?;
     calibration::check_camera(&calibration, rig.camera.mosaic_size())?;
     let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
+
     let (control_loop, control, records) =
         ControlLoop::spawn(Settings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY, dynamics }, rig)?;
+
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
     tokio::spawn(devices::record(store.clone(), Arc::clone(&clock), control.status.clone()));
+
     let (live, imaging) = live::start(control.clone(), reconstructor)?;
+
     let conductor = Conductor::open(Parts {
         store: store.clone(),
         control: control.clone(),
@@ -150,9 +161,11 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         practice_random: seeded,
     })
     .await?;
+
     let conducting = tokio::spawn(conductor.clone().run());
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
+
     let app = Arc::new(App {
         clock,
         live,
@@ -168,32 +181,40 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         shutdown,
         control: control.observer(),
     });
+
     let host = app.address;
     let server = tokio::spawn(http::run(listener, app));
+
     let announcement =
         announcement(host, &keys, &control.status.borrow(), &calibration, std::io::stdout().is_terminal());
+
     // The server serves whether or not anyone reads this.
     let _ = std::io::stdout().write_all(announcement.as_bytes());
+
     signals.any().await;
     tracing::info!("ending");
+
     // At once, for viewers may take their time to leave.
     control.send(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     let _ = end.send(true);
     let _ = timeout(GRACE, async { (server.await, end.closed().await) }).await;
+
     conducting.abort();
     let stopping = tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join()));
     if timeout(DEVICES, stopping).await.is_err() {
         tracing::error!("the control loop does not stop; exiting without it");
     }
+
     let last_words = async {
         let _ = tokio::join!(writer, ending.record_the_rest());
         store.close().await;
     };
     let _ = timeout(GRACE, last_words).await;
+
     Ok(())
 }
 
-/// Sees to it that a thread at real-time priority that never pauses does not keep the machine from answering.
+/// Keeps a thread at real-time priority that never pauses from freezing the machine.
 fn bound_real_time() -> std::io::Result<()> {
     let mut overrun = signal(SignalKind::from_raw(priority::OVERRUN))?;
     priority::bound_runs();
@@ -212,6 +233,7 @@ fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
     if let Some(folder) = &arguments.weights {
         registry = shipped::with_folder(registry, folder)?;
     }
+
     for name in arguments.policies.iter().map(|name| PolicyName::new(name)) {
         registry = scripted::with_file(registry, &name);
         registry.build(&name)?;
@@ -237,7 +259,7 @@ async fn open_store(
     Ok(Store::open(&arguments.data_dir, &run).await?)
 }
 
-/// What may be foreseen: nothing of a real session is drawn from it.
+/// A random source that may be predictable: nothing of a real session is drawn from it.
 fn seeded(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
     Ok(match arguments.seed {
         Some(seed) => ChaCha12Rng::seed_from_u64(seed),
@@ -248,6 +270,7 @@ fn seeded(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
 /// The shipped protocols and those of the folder asked for, or of `trial-protocols` where there is one.
 fn protocols(arguments: &Arguments, registry: &Registry) -> Result<Library, Failure> {
     let beside = Path::new("trial-protocols");
+
     let folder = arguments.protocols.as_deref().or_else(|| beside.is_dir().then_some(beside));
     let known: Vec<_> = registry.entries().into_iter().map(|entry| entry.name).collect();
     Ok(Library::load(folder, &known)?)
@@ -263,17 +286,19 @@ fn rig(
 ) -> Result<Rig, Failure> {
     let clock = Arc::clone(clock);
     let lens = lens::open(&arguments.lens, Arc::clone(&clock))?;
+
     let settings = CameraSettings { fps: arguments.fps.into(), seed, optics: lens.optics(), clock: Arc::clone(&clock) };
     let camera = camera::open(&arguments.camera, settings)?;
     Ok(Rig { camera, lens, reconstructor, registry, clock })
 }
 
-/// The dynamics measured of this very lens.
+/// The dynamics in the file `path`, which must have been measured on this very lens.
 fn dynamics(path: &Path, lens: &mut dyn Lens) -> Result<LensDynamics, Failure> {
     let named = |problem: String| format!("lens dynamics {}: {problem}", path.display());
     let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
     let measured = MeasuredDynamics::from_toml(&text).map_err(named)?;
     let info = lens.info()?;
+
     if measured.serial != info.serial {
         let problem = format!("they belong to the lens {}, but this one is {}", measured.serial, info.serial);
         return Err(named(format!("{problem}; measure it with `parfocal lens measure`")).into());

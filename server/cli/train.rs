@@ -94,12 +94,15 @@ fn train(arguments: &Training) -> Result<(), Failure> {
     let device = device(arguments.device)?;
     let mut run = if arguments.resume { resume(arguments, device)? } else { begin(arguments, device)? };
     let total = run.recipe().updates();
+
     if let Some(version) = run.other_version() {
         tell(format_args!("note: parfocal {version} made the checkpoint; the result may differ from that version's"));
     }
+
     let interrupt = Interrupt::listen(format!("saving after at most {LEG} more updates"))?;
     let bar = bar(total, run.updates());
     let mut validation = run.best();
+
     let mut tell_progress = |progress: &Progress| {
         validation = progress.validation.unwrap_or(validation);
         let epsilon = progress.epsilon.map_or(String::new(), |epsilon| format!(", epsilon {epsilon:.2}"));
@@ -111,10 +114,12 @@ fn train(arguments: &Training) -> Result<(), Failure> {
         bar.set_position(progress.updates);
         bar.set_message(message);
     };
+
     // On one of the threads that share the work: it need not wait for another to wake up whenever there is
     // some to share.
     let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| compute_on_this_thread()).build()?;
     let whole = threads.install(|| run.go(&SystemClock, &|| interrupt.asked(), &mut tell_progress))?;
+
     if !whole {
         bar.finish_and_clear();
         return print(&format!(
@@ -124,6 +129,7 @@ fn train(arguments: &Training) -> Result<(), Failure> {
             arguments.out.display()
         ));
     }
+
     interrupt.all_is_saved();
     if interrupt.asked() {
         bar.finish_and_clear();
@@ -132,6 +138,7 @@ fn train(arguments: &Training) -> Result<(), Failure> {
             arguments.out.display()
         ));
     }
+
     bar.set_message("running the best weights on the reference benchmark; Ctrl-C skips it");
     run.report()?;
     bar.finish_and_clear();
@@ -156,10 +163,13 @@ fn begin(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
         Some(recipe) => recipe,
         None => Recipe::parse(shipped(&arguments.policy).ok_or_else(unknown)?)?,
     };
+
     if let Some(updates) = arguments.updates {
         recipe = recipe.with_updates(updates);
     }
-    let (seed, from) = (arguments.seed.unwrap_or(1), arguments.from.as_deref());
+
+    let seed = arguments.seed.unwrap_or(1);
+    let from = arguments.from.as_deref();
     Ok(Run::begin(recipe, seed, &arguments.footage, &arguments.out, from, device)?)
 }
 
@@ -180,12 +190,16 @@ fn own_recipe(arguments: &Training) -> Result<Option<Recipe>, Failure> {
     let text =
         std::fs::read_to_string(file).map_err(|error| format!("cannot read the recipe {}: {error}", file.display()))?;
     let recipe = Recipe::parse(&text).map_err(|error| format!("in the recipe {}: {error}", file.display()))?;
+
     if recipe.policy != arguments.policy {
-        let (file, made, asked) = (file.display(), &recipe.policy, &arguments.policy);
+        let file = file.display();
+        let made = &recipe.policy;
+        let asked = &arguments.policy;
         return Err(
             format!("the recipe {file} makes '{made}', not '{asked}'; give that policy, or another recipe").into()
         );
     }
+
     Ok(Some(recipe))
 }
 

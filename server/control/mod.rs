@@ -53,7 +53,7 @@ pub enum Drive {
     },
 }
 
-/// What the loop is told. Sending never blocks; the loop looks between two frames.
+/// A command to the loop. Sending never blocks; the loop looks for commands between two frames.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
     /// Change who drives, and mark every later step as belonging to `segment`.
@@ -188,7 +188,7 @@ pub struct ControlStatus {
     pub priority: Standing,
 }
 
-/// What the rest of the server holds of the loop.
+/// Access to the loop for the rest of the server.
 #[derive(Clone)]
 pub struct ControlHandle {
     /// Commands in.
@@ -201,7 +201,7 @@ pub struct ControlHandle {
     pub camera: Option<Controls>,
 }
 
-/// What can be seen of the loop, without the right to command it.
+/// Access to the loop's state and frames, without the right to command it.
 #[derive(Clone)]
 pub struct ControlObserver {
     /// The loop's state.

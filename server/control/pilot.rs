@@ -133,6 +133,7 @@ impl Pilot {
                 "the policy hangs again and again; the lens is held: choose another one",
             ));
         }
+
         let runner = Runner::start(self.registry.clone(), name, self.clock.clone());
         self.runner = Some(runner.map_err(|error| {
             tracing::error!(%error, "no thread for a policy");

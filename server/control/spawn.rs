@@ -74,17 +74,22 @@ impl ControlLoop {
         let dynamics = settings.dynamics.unwrap_or(lens.dynamics());
         let stepper = Stepper::new(lens, Eye::new(reconstructor), registry, clock.clone(), settings.frame_period)
             .moving(dynamics);
+
         let controls = camera.controls();
         let source = Source::start(camera)?;
+
         let (telemetry, telemetry_out) = mpsc::channel(settings.telemetry_capacity.max(1));
         let (commands_in, commands) = mpsc::unbounded_channel();
         let frames = Arc::new(LatestSlot::default());
         let stop = Arc::new(AtomicBool::new(false));
+
         let worker = Worker::new(stepper, source, clock, telemetry, frames.clone(), controls.clone());
         let status = worker.status.subscribe();
         let handle = ControlHandle { commands: commands_in, status, frames, camera: controls };
+
         let stopping = stop.clone();
         let thread = thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &stopping))?;
+
         Ok((Self { stop, thread: Some(thread) }, handle, telemetry_out))
     }
 }
@@ -107,7 +112,7 @@ impl Drop for ControlLoop {
     }
 }
 
-/// What the loop's thread holds.
+/// The state of the loop's thread.
 struct Worker {
     stepper: Stepper,
     source: Source,
@@ -156,6 +161,7 @@ impl Worker {
             latency_p99_micros: 0,
             priority: Standing::Ordinary,
         };
+
         Self {
             stepper,
             source,
@@ -188,6 +194,7 @@ impl Worker {
                 tracing::error!(panic, "a step of the control loop failed");
             }
         }
+
         let Self { stepper, source, frames, .. } = self;
         // First of all: a camera that hangs must not keep the lens under current.
         drop(stepper);

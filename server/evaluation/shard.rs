@@ -1,5 +1,6 @@
-//! An evaluation in parts: each on some of the scans, in another process or on another machine, put together afterwards. A
-//! whole evaluation is one of a single part, so that parts put together give what one run would have, to the last digit.
+//! An evaluation in parts: each part takes some of the scans, in another process or on another
+//! machine, and the parts are merged afterwards. A whole evaluation is a single part, so that
+//! merged parts give the same figures as one run, to the last digit.
 
 use std::fmt;
 use std::str::FromStr;
@@ -102,10 +103,10 @@ pub struct Shard {
     pub outcomes: Vec<Outcome>,
 }
 
-/// Why shards do not make an evaluation.
+/// Why shards cannot be merged.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
-    /// It is something else.
+    /// The file is not a shard.
     #[error("{0} is not a shard of an evaluation; give files that `parfocal evaluate --shard` wrote")]
     NoShard(String),
     /// Two shards are of different evaluations.
@@ -118,7 +119,7 @@ pub enum MergeError {
         /// In what.
         what: &'static str,
     },
-    /// One is there twice.
+    /// The same part was given twice.
     #[error("{first} and {second} are both shard {part}; give each shard once")]
     Twice {
         /// One file.
@@ -128,7 +129,7 @@ pub enum MergeError {
         /// The part that both have.
         part: Part,
     },
-    /// Some are not there.
+    /// Some parts were not given.
     #[error("shards are missing: {0}; run `parfocal evaluate --shard` for them, with the same arguments")]
     Missing(String),
     /// There is nothing to focus on.
@@ -143,7 +144,7 @@ impl Shard {
         Self { format: FORMAT.to_owned(), software: SOFTWARE.to_owned(), part, subject, without_detail, outcomes }
     }
 
-    /// Whether it is whole: a path for each policy and each of its scans.
+    /// Whether it holds a path for each policy and each of its scans.
     fn is_whole(&self) -> bool {
         let scans = self.part.scans(self.subject.count).len();
         let Part { index, of } = self.part;
@@ -152,9 +153,10 @@ impl Shard {
             && self.outcomes.iter().all(|outcome| outcome.paths.len() == scans)
     }
 
-    /// In what this shard's evaluation differs from that of `other`.
+    /// Names the first thing in which this shard's evaluation differs from that of `other`.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let policies = |shard: &Self| shard.outcomes.iter().map(|outcome| outcome.policy.clone()).collect::<Vec<_>>();
+
         if self.software != other.software {
             return Some("the version of parfocal");
         }
@@ -164,22 +166,27 @@ impl Shard {
         if policies(self) != policies(other) {
             return Some("the policies");
         }
+
         self.subject.difference(&other.subject)
     }
 }
 
-/// The evaluation that `shards`, each with the name of its file, are the parts of: its report, and each policy's paths.
+/// Merges `shards`, each with the name of its file, into one report and each policy's paths.
 ///
 /// # Errors
-/// When they are of several evaluations, or not all there, or there was nothing to focus on.
+/// When they belong to several evaluations, some are missing, or there was nothing to focus on.
 pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>), MergeError> {
     if let Some((name, _)) = shards.iter().find(|(_, shard)| !shard.is_whole()) {
         return Err(MergeError::NoShard(name.clone()));
     }
+
     shards.sort_by_key(|(_, shard)| shard.part.index);
+
     for pair in shards.windows(2) {
         let [(first, a), (second, b)] = pair else { continue };
-        let (first, second) = (first.clone(), second.clone());
+        let first = first.clone();
+        let second = second.clone();
+
         if let Some(what) = a.difference(b) {
             return Err(MergeError::Differ { first, second, what });
         }
@@ -187,9 +194,11 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>),
             return Err(MergeError::Twice { first, second, part: a.part });
         }
     }
+
     let Some(Part { of, .. }) = shards.first().map(|(_, shard)| shard.part) else {
         return Err(MergeError::Missing("all".to_owned()));
     };
+
     let present = |part: &Part| shards.iter().any(|(_, shard)| shard.part == *part);
     let missing = (1..=of).map(|index| Part { index, of }).filter(|part| !present(part));
     let missing: Vec<String> = missing.take(100).map(|part| part.to_string()).collect();
@@ -201,9 +210,11 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>),
     let subject = shards[0].subject.clone();
     let without_detail = shards.iter().map(|shard| shard.without_detail).sum();
     warning(without_detail, subject.count)?;
+
     let outcomes: Vec<Outcome> = (0..shards[0].outcomes.len()).map(|policy| together(&shards, policy)).collect();
     let rows: Vec<_> = outcomes.iter().map(Outcome::row).collect();
     let comparisons = compare(&rows);
+
     Ok((Report { subject, without_detail, rows, comparisons }, outcomes))
 }
 
@@ -212,11 +223,13 @@ fn together(shards: &[Shard], index: usize) -> Outcome {
     let first = &shards[0];
     let count = first.subject.count;
     let mut paths = vec![Path::default(); count];
+
     for shard in shards {
         for (scan, path) in shard.part.scans(count).into_iter().zip(&shard.outcomes[index].paths) {
             paths[scan] = path.clone();
         }
     }
+
     Outcome { paths, ..first.outcomes[index].clone() }
 }
 
@@ -232,13 +245,14 @@ mod tests {
     fn parts_hold_every_scan_once() {
         let parts = ["1/3", "2/3", "3/3"].map(|text| part(text).scans(7));
         assert_eq!(parts, [vec![0, 3, 6], vec![1, 4], vec![2, 5]]);
+
         for wrong in ["0/3", "4/3", "1", "1/0", "a/b", ""] {
             assert!(wrong.parse::<Part>().is_err(), "{wrong}");
         }
     }
 
     #[test]
-    fn what_does_not_belong_together_is_told() {
+    fn shards_that_do_not_fit_together_are_rejected() {
         let shard = |text: &str, seed: u64| {
             let part = part(text);
             let subject = Subject { scans: "simulated".to_owned(), seed, count: 3, ..Subject::default() };
@@ -247,10 +261,12 @@ mod tests {
             let outcome = Outcome { policy: "fixed".to_owned(), paths, parts: 1 };
             (format!("{text} of seed {seed}"), Shard::new(part, subject, 0, vec![outcome]))
         };
+
         let told = |shards: &[(&str, u64)]| {
             let shards = shards.iter().map(|(text, seed)| shard(text, *seed)).collect();
             merge(shards).map_or_else(|error| error.to_string(), |(report, _)| report.rows[0].frames.to_string())
         };
+
         assert_eq!(told(&[("2/2", 7), ("1/2", 7)]), "3");
         assert_eq!(told(&[("1/3", 7)]).split(';').next(), Some("shards are missing: 2/3, 3/3"));
         assert!(told(&[("1/2", 7), ("1/2", 7)]).contains("are both shard 1/2"));

@@ -41,19 +41,23 @@ async fn change(
     JsonBody(change): JsonBody<Change>,
 ) -> Result<StatusCode, Error> {
     let Change { setting, value } = change;
+
     let asked = app.control.camera.as_ref().map_or(Err(ControlError::NotOffered), |camera| camera.ask(setting, value));
     asked.map_err(|error| match error {
         ControlError::NotOffered => Error::Conflict("The camera does not offer this setting now.".into()),
         ControlError::OutOfBounds { .. } => Error::Invalid(format!("{} {error}.", setting.label())),
     })?;
+
     record(&app, format!("the operator asked for {} {value:.6}", setting.label().to_lowercase())).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// A picture that changed must be explicable later.
+/// Logs the change, so that a picture that changed can be explained later.
 async fn record(app: &App, message: String) -> Result<(), Error> {
     let working = app.control.status.borrow().camera.working;
-    let (wall, at) = (app.clock.wall(), app.clock.now());
+    let wall = app.clock.wall();
+    let at = app.clock.now();
+
     let event = DeviceEvent { wall, at, device: "camera".into(), working, message };
     app.store.device_event(&event).await.map_err(|error| Error::Storage(error.to_string()))
 }

@@ -18,7 +18,8 @@ const FILE: &str = "keys.toml";
 /// Bytes of a key: 128 bits cannot be guessed.
 const KEY_BYTES: usize = 16;
 
-const HEADER: &str = "# Keys of the three roles' links. Whoever has a key has the role. Delete this file and restart to\n\
+const HEADER: &str = "# Keys of the three roles' links. Whoever has a key has the role. \
+                      Delete this file and restart to\n\
                       # make new keys; every browser then has to be let in anew.\n\n";
 
 /// Roles that have a key.
@@ -28,7 +29,8 @@ pub const ROLES: [Role; 3] = [Role::Surgeon, Role::Operator, Role::Researcher];
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file could not be read or written.
-    #[error("cannot keep the roles' keys in {}: {source}; check the folder's permissions and free space", path.display())]
+    #[error("cannot keep the roles' keys in {}: {source}; check the folder's permissions and free space",
+            path.display())]
     Io {
         /// The key file.
         path: PathBuf,
@@ -65,6 +67,7 @@ impl Keys {
     pub fn load_or_create(data_dir: &Path) -> Result<Self, KeyError> {
         let path = data_dir.join(FILE);
         let io = |source| KeyError::Io { path: path.clone(), source };
+
         match fs::read_to_string(&path) {
             Ok(text) => {
                 make_private(&path).map_err(io)?;
@@ -102,14 +105,16 @@ impl Keys {
         Ok(keys)
     }
 
-    /// Written aside and moved into place, so that a full disk leaves no half of a file.
+    /// Writes aside and moves into place, so that a full disk leaves no half-written file.
     fn write(&self, path: &Path) -> std::io::Result<()> {
         let text = toml::to_string(self).map_err(std::io::Error::other)?;
         let aside = path.with_extension("toml.new");
+
         let mut file = fs::OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&aside)?;
         file.write_all(HEADER.as_bytes())?;
         file.write_all(text.as_bytes())?;
         file.sync_all()?;
+
         fs::rename(aside, path)
     }
 
@@ -128,16 +133,19 @@ impl Keys {
     #[must_use]
     pub fn role_of(&self, key: &str) -> Option<Role> {
         let mut found = None;
+
+        // No early exit: the time must not depend on the key offered.
         for role in ROLES {
             if bool::from(self.of(role).as_bytes().ct_eq(key.as_bytes())) {
                 found = Some(role);
             }
         }
+
         found
     }
 
-    /// What the cookie of `role` holds: derived from the key one way, so that a cookie seen gives no link away, and the
-    /// same after a restart, so that a tablet stays let in.
+    /// The value of the cookie of `role`. It is derived from the key one way, so that a cookie seen
+    /// gives no link away, and stays the same after a restart, so that a tablet stays let in.
     #[must_use]
     pub fn token(&self, role: Role) -> String {
         let digest = Sha256::new().chain_update(b"parfocal cookie 1:").chain_update(self.of(role)).finalize();
@@ -169,12 +177,13 @@ mod tests {
             assert!(first.opens(role, &again.token(role)));
             assert!(!first.opens(role, first.of(role)), "the key itself is no cookie");
         }
+
         let mode = fs::metadata(dir.path().join(FILE)).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
     }
 
     #[test]
-    fn what_is_no_key_opens_nothing() {
+    fn a_wrong_key_opens_nothing() {
         let keys = Keys::random().unwrap();
         for wrong in ["", "0", &keys.of(Role::Operator)[1..], &keys.of(Role::Operator).to_uppercase()[..31]] {
             assert_eq!(keys.role_of(wrong), None);

@@ -59,7 +59,8 @@ struct ListPage {
 }
 
 /// The list of sessions, practice apart.
-#[utoipa::path(get, path = "/researcher", tag = "researcher", responses((status = 200, description = "The page", content_type = "text/html")))]
+#[utoipa::path(get, path = "/researcher", tag = "researcher",
+    responses((status = 200, description = "The page", content_type = "text/html")))]
 async fn list_page(_: Researcher, State(app): State<AppState>) -> Result<Html<String>, Error> {
     let lines = app.conductor.sessions(true).await?;
     let (practice, sessions) = lines.into_iter().partition(|line| line.practice);
@@ -115,6 +116,7 @@ impl SessionPage {
 fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
     let mut places = BTreeMap::new();
     let mut rows: Vec<QuestionRow> = Vec::new();
+
     for answer in answers {
         let place = *places.entry(&answer.question).or_insert_with(|| {
             let written = matches!(answer.value, AnswerValue::Text(_));
@@ -122,11 +124,13 @@ fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
             rows.push(QuestionRow { text: answer.text.clone(), answers, written });
             rows.len() - 1
         });
+
         let cell = answer.setting.and_then(|setting| rows[place].answers.get_mut(setting.wrapping_sub(1)));
         if let Some(cell) = cell {
             *cell = in_words(&answer.value);
         }
     }
+
     rows
 }
 
@@ -144,7 +148,8 @@ fn point_in_words(point: u8) -> String {
 }
 
 /// One session.
-#[utoipa::path(get, path = "/researcher/sessions/{session}", tag = "researcher", params(("session" = SessionId, Path)), responses(
+#[utoipa::path(get, path = "/researcher/sessions/{session}", tag = "researcher",
+    params(("session" = SessionId, Path)), responses(
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "No such session", body = ErrorBody)))]
 async fn session_page(
@@ -157,17 +162,20 @@ async fn session_page(
         ConductError::NotFound(_) => Error::NotFound("There is no such session here.".to_owned()),
         error => error.into(),
     })?;
+
     SessionPage::new(nonce, detail).render().map(Html).map_err(|_| Error::Internal)
 }
 
 /// The sessions, newest first, practice included and marked.
-#[utoipa::path(get, path = "/api/researcher/sessions", tag = "researcher", responses((status = 200, body = Vec<SessionLine>)))]
+#[utoipa::path(get, path = "/api/researcher/sessions", tag = "researcher",
+    responses((status = 200, body = Vec<SessionLine>)))]
 async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<SessionLine>>, Error> {
     Ok(Json(app.conductor.sessions(true).await?))
 }
 
 /// One session in detail; its policies once it was unblinded.
-#[utoipa::path(get, path = "/api/researcher/sessions/{session}", tag = "researcher", params(("session" = SessionId, Path)), responses(
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}", tag = "researcher",
+    params(("session" = SessionId, Path)), responses(
     (status = 200, body = SessionDetail), (status = 404, description = "No such session", body = ErrorBody)))]
 async fn session(
     _: Researcher,
@@ -178,7 +186,8 @@ async fn session(
 }
 
 /// One session over time. Its focal path may tell policies apart even before unblinding.
-#[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher", params(("session" = SessionId, Path)), responses(
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher",
+    params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
 async fn timeline(
     _: Researcher,
@@ -200,11 +209,13 @@ struct Unblind {
 }
 
 /// Tells which policies ran; on a session still under way this is emergency unblinding and marked so for good.
-#[utoipa::path(post, path = "/api/researcher/sessions/{session}/unblind", tag = "researcher", params(("session" = SessionId, Path)),
+#[utoipa::path(post, path = "/api/researcher/sessions/{session}/unblind", tag = "researcher",
+    params(("session" = SessionId, Path)),
     request_body = Unblind, responses(
     (status = 204, description = "Unblinded"),
     (status = 404, description = "No such session", body = ErrorBody),
-    (status = 409, description = "Its order would tell that of another session of its balanced set, or something may be outstanding", body = ErrorBody),
+    (status = 409, description = "Its order would tell that of another session of its balanced set, \
+                                  or something may be outstanding", body = ErrorBody),
     (status = 422, description = "No reason was given", body = ErrorBody)))]
 async fn unblind(
     _: Researcher,

@@ -1,5 +1,5 @@
-//! Security of every response and request: headers with a nonce per response, no requests from other sites, no names
-//! that are not ours.
+//! Security of every request and response: headers with a nonce per response, no requests from
+//! other sites, no host names but our own.
 
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -36,17 +36,21 @@ pub async fn headers(mut request: Request, next: Next) -> Response {
     if getrandom::fill(&mut bytes).is_err() {
         return Error::Internal.into_response();
     }
+
     let nonce = hex::encode(bytes);
     request.extensions_mut().insert(Nonce(nonce.clone()));
     let mut response = next.run(request).await;
+
     let headers = response.headers_mut();
     if let Ok(policy) = HeaderValue::from_str(&content_security_policy(&nonce)) {
         headers.insert(CONTENT_SECURITY_POLICY, policy);
     }
+
     headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
     headers.entry(CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+
     response
 }
 
@@ -58,27 +62,31 @@ fn content_security_policy(nonce: &str) -> String {
     )
 }
 
-/// Gives the connection of a request that shows a key a member's place. Turns away what another site asks for, and, on a loopback server, names that are not this machine's own: a site whose
-/// name is made to point here (DNS rebinding) has no role's cookie, and gets not even a page that says so.
+/// Gives the connection of a request that shows a key a member's place. Rejects requests from other
+/// sites and, on a loopback server, host names that are not this machine's own: a site whose name
+/// is made to point here (DNS rebinding) has no role's cookie, and does not even get an error page.
 pub async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
     if app.loopback_only && !is_loopback_name(host) {
         return Error::WrongHost.into_response();
     }
+
     let place = request.extensions().get::<Arc<Place>>();
     if place.is_some_and(|place| place.admit(headers, &app.keys).is_err()) {
         return Error::Busy.into_response();
     }
+
     let changes = !matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
     if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host) {
         return Error::CrossSite.into_response();
     }
+
     next.run(request).await
 }
 
-/// By `Sec-Fetch-Site` and `Origin`, whichever the browser sends; what sends neither is no browser, and has no cookie to
-/// be tricked out of.
+/// Judges by `Sec-Fetch-Site` and `Origin`, whichever the browser sends. A client that sends
+/// neither is not a browser, and has no cookie to be tricked out of.
 fn is_same_origin(headers: &HeaderMap, host: &str) -> bool {
     let site_fits = headers.get("sec-fetch-site").is_none_or(|site| site == "same-origin");
     let origin_fits = headers.get(ORIGIN).is_none_or(|origin| {
@@ -86,6 +94,7 @@ fn is_same_origin(headers: &HeaderMap, host: &str) -> bool {
         let authority = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
         authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host))
     });
+
     site_fits && origin_fits
 }
 

@@ -29,7 +29,8 @@ struct Page {
 }
 
 /// The surgeon's page.
-#[utoipa::path(get, path = "/surgeon", tag = "surgeon", responses((status = 200, description = "The page", content_type = "text/html")))]
+#[utoipa::path(get, path = "/surgeon", tag = "surgeon",
+    responses((status = 200, description = "The page", content_type = "text/html")))]
 async fn page(_: Surgeon, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
     Page { nonce }.render().map(Html).map_err(|_| Error::Internal)
 }
@@ -37,7 +38,8 @@ async fn page(_: Surgeon, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
 type View = Json<Option<Arc<SurgeonView>>>;
 
 /// The session under way; null when there is none.
-#[utoipa::path(get, path = "/api/surgeon/session", tag = "surgeon", responses((status = 200, body = Option<SurgeonView>)))]
+#[utoipa::path(get, path = "/api/surgeon/session", tag = "surgeon",
+    responses((status = 200, body = Option<SurgeonView>)))]
 async fn session(_: Surgeon, State(app): State<AppState>) -> View {
     Json(app.surgeon_view.borrow().clone())
 }

@@ -1,5 +1,6 @@
-//! Scenes with relief, as focal stacks: folds, slopes, steps and things that stand above the surface, each place blurred by its own
-//! distance to the focal plane, nearer things over farther ones; seen through a lens whose best picture is soft.
+//! Scenes with relief, as focal stacks: folds, slopes, steps and things that stand above the
+//! surface. Each place is blurred by its own distance to the focal plane, nearer things lie over
+//! farther ones, and the lens's best picture is soft.
 //!
 //! Heights and positions of the focal plane are in pixels of blur: a place at height `h` is blurred by a spot of standard
 //! deviation `|p - h|` with the focal plane at `p`.
@@ -80,8 +81,8 @@ pub struct StackScene {
     pub planes: PlaneStack,
     /// Positions a unit of focal power, least and most.
     pub slopes: (f64, f64),
-    /// Whether the stack's ends are the end of what was photographed: the range then stays within them, around the place that is
-    /// sharpest. Otherwise the stack blurs no more beyond them.
+    /// Whether the stack's ends are the end of what was photographed: the range then stays within
+    /// them, around the place that is sharpest. Otherwise the blur no longer grows beyond them.
     pub photographed: bool,
 }
 
@@ -122,16 +123,20 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
         // What the things do not cover must not shine through where they are blurred.
         (Layer::new(&colour, spots), Layer::new(&cover, spots), height)
     });
+
     let picture = |position: f32| {
         let mut picture = ground.at_heights(position, &heights);
         if let Some((colour, cover, height)) = &above {
-            let (colour, cover) = (colour.at(position - height), cover.at(position - height));
+            let colour = colour.at(position - height);
+            let cover = cover.at(position - height);
             for (value, (colour, cover)) in picture.iter_mut().zip(colour.iter().zip(&cover)) {
                 *value = colour + (1.0 - cover / 255.0) * *value;
             }
         }
+
         (position, finish.apply(GrayImage { width: SIDE, height: SIDE, data: picture }))
     };
+
     let mut pictures: Vec<_> = taking.positions().into_iter().map(picture).collect();
     taking.spoil(&mut pictures, &mut rng);
 
@@ -144,8 +149,9 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
 enum Taking {
     /// At so many positions, and so well, that only the scan's own noise is in the pictures.
     Ideally,
-    /// As a stack is photographed: at few positions, each picture with noise, brightness and place of its own. Seen through a lens that moves
-    /// between them, what is mixed of two pictures has less noise than either.
+    /// As a stack is photographed: at few positions, each picture with noise, brightness and place
+    /// of its own. Through a lens that moves between them, a mix of two pictures has less noise than
+    /// either.
     Photographed {
         /// Pixels of blur from one position to the next.
         spacing: f32,
@@ -164,6 +170,7 @@ impl Taking {
         if !rng.random_bool(style.photographed) {
             return Self::Ideally;
         }
+
         let noise = rng.random_range(style.least_noise..3.5);
         let flicker = if rng.random_bool(0.5) { rng.random_range(0.0f32..0.03) } else { 0.0 };
         Self::Photographed { spacing: rng.random_range(0.3f32..2.0), noise, flicker }
@@ -203,12 +210,14 @@ impl Taking {
 /// Positions of the focal plane that lie close together where blur changes what is seen most.
 fn close_positions() -> Vec<f32> {
     let steps = std::iter::repeat_n(0.25, 12).chain(std::iter::repeat_n(0.5, 6)).chain(std::iter::repeat_n(1.0, 6));
+
     let side: Vec<f32> = steps
         .scan(0.0, |at, step| {
             *at += step;
             Some(*at)
         })
         .collect();
+
     let below = side.iter().rev().map(|at| -at);
     below.chain([0.0]).chain(side.iter().copied()).collect()
 }
@@ -218,6 +227,7 @@ fn surface(split: Split, index: u64, rng: &mut impl Rng) -> GrayImage {
     let seed = split.first_seed() + index;
     let mut picture =
         if index.is_multiple_of(4) { sharp_phantom_of(split, index, SIDE) } else { texture(seed ^ 0x67_726f, SIDE) };
+
     if rng.random_bool(0.5) {
         vary_contrast(&mut picture, rng.random_range(0.2..1.2), seed);
     }
@@ -228,22 +238,28 @@ fn surface(split: Split, index: u64, rng: &mut impl Rng) -> GrayImage {
 fn heights(relief: f32, steps: f64, rng: &mut impl Rng) -> Vec<f32> {
     let mut field = Canvas::blank(SIDE);
     let middle = SIDE as f32 / 2.0;
+
     if rng.random_bool(0.7) {
         let cell = rng.random_range(40.0..160.0);
         field.add_octave(rng, cell, 1.0);
         let finer = rng.random_range(0.0..0.5);
         field.add_octave(rng, 0.5 * cell, finer);
     }
+
     if rng.random_bool(0.5) {
-        let (across, down) = (rng.random_range(-1.0f32..1.0), rng.random_range(-1.0f32..1.0));
+        let across = rng.random_range(-1.0f32..1.0);
+        let down = rng.random_range(-1.0f32..1.0);
         for (index, height) in field.data.iter_mut().enumerate() {
-            let (x, y) = ((index % SIDE) as f32 / middle - 1.0, (index / SIDE) as f32 / middle - 1.0);
+            let x = (index % SIDE) as f32 / middle - 1.0;
+            let y = (index / SIDE) as f32 / middle - 1.0;
             *height += across * x + down * y;
         }
     }
+
     if rng.random_bool(steps) {
         add_steps(&mut field, rng);
     }
+
     let most = field.data.iter().fold(1e-6f32, |most, height| most.max(height.abs()));
     field.data.iter_mut().for_each(|height| *height *= relief / most);
     field.data
@@ -252,12 +268,17 @@ fn heights(relief: f32, steps: f64, rng: &mut impl Rng) -> Vec<f32> {
 /// Flat places higher or lower than what is around them, with upright sides: blocks and discs.
 fn add_steps(field: &mut Canvas, rng: &mut impl Rng) {
     for _ in 0..rng.random_range(3..30) {
-        let (x, y) = (rng.random_range(0..SIDE), rng.random_range(0..SIDE));
-        let (wide, high) = (rng.random_range(15..110), rng.random_range(15..110));
-        let (step, round) = (rng.random_range(-1.0f32..1.0), rng.random_bool(0.4));
+        let x = rng.random_range(0..SIDE);
+        let y = rng.random_range(0..SIDE);
+        let wide = rng.random_range(15..110);
+        let high = rng.random_range(15..110);
+        let step = rng.random_range(-1.0f32..1.0);
+        let round = rng.random_bool(0.4);
+
         for row in y..(y + high).min(SIDE) {
             for column in x..(x + wide).min(SIDE) {
-                let (across, down) = ((column - x) as f32 / wide as f32 - 0.5, (row - y) as f32 / high as f32 - 0.5);
+                let across = (column - x) as f32 / wide as f32 - 0.5;
+                let down = (row - y) as f32 / high as f32 - 0.5;
                 if !round || across * across + down * down < 0.25 {
                     field.data[row * SIDE + column] = step;
                 }
@@ -277,18 +298,22 @@ struct Above {
 
 fn things_above(seed: u64, relief: f32, softness: f64, rng: &mut impl Rng) -> Above {
     let mut mask = Canvas::blank(SIDE);
+
     if rng.random_bool(0.6) {
         mask.add_winding_lines(rng, 3..14, 2.0..9.0, 1.0);
     } else {
         for _ in 0..rng.random_range(3..20) {
             let centre = (rng.random_range(0.0..SIDE as f32), rng.random_range(0.0..SIDE as f32));
-            let (radius, stretch) = (rng.random_range(5.0f32..45.0), rng.random_range(0.4f32..2.5));
+            let radius = rng.random_range(5.0f32..45.0);
+            let stretch = rng.random_range(0.4f32..2.5);
             mask.add_leaf(centre, radius, stretch, 1.0);
         }
     }
+
     let look = texture(seed ^ 0x0061_626f_7665, SIDE);
     let colour = look.data.iter().zip(&mask.data).map(|(value, cover)| value * cover).collect();
     let cover = mask.data.iter().map(|cover| 255.0 * cover).collect();
+
     let soft = |data| gaussian_blur(&GrayImage { width: SIDE, height: SIDE, data }, softness);
     Above { colour: soft(colour), cover: soft(cover), height: relief * rng.random_range(0.2f32..1.0) }
 }
@@ -334,7 +359,8 @@ impl Layer {
             let distance = position - height;
             let levels = self.side(distance);
             let (level, share) = level(distance.abs());
-            let (low, high) = (levels[level][index], levels[level + 1][index]);
+            let low = levels[level][index];
+            let high = levels[level + 1][index];
             low + share * (high - low)
         };
         heights.iter().enumerate().map(value).collect()
@@ -344,7 +370,9 @@ impl Layer {
 /// The level of [`SIGMAS`] below `sigma`, and the share of the way to the next.
 fn level(sigma: f32) -> (usize, f32) {
     let above = SIGMAS.partition_point(|&at| at <= sigma).clamp(1, SIGMAS.len() - 1);
-    let (low, high) = (SIGMAS[above - 1], SIGMAS[above]);
+    let low = SIGMAS[above - 1];
+    let high = SIGMAS[above];
+
     (above - 1, ((sigma - low) / (high - low)).min(1.0))
 }
 
@@ -408,7 +436,9 @@ mod tests {
         let picture = |position: f32| {
             (position, GrayImage { width: SIDE, height: SIDE, data: layer.at_heights(position, &heights) })
         };
+
         let stack = PlaneStack::new(&close_positions().into_iter().map(picture).collect::<Vec<_>>()).unwrap();
+
         for y in [20, 100, 200, 300] {
             assert!((stack.sharpest((60, y)) + 2.0).abs() < 0.3, "{}", stack.sharpest((60, y)));
             assert!((stack.sharpest((260, y)) - 1.5).abs() < 0.3, "{}", stack.sharpest((260, y)));
@@ -418,8 +448,10 @@ mod tests {
     #[test]
     fn a_scene_is_reproducible_and_blurs_away_from_its_optimum() {
         let scene = || scene(Split::Training, 6, Style::VARIED).unwrap();
-        let (one, other) = (scene(), scene());
+        let one = scene();
+        let other = scene();
         assert_eq!(one.planes.patch((100, 100), 0.7), other.planes.patch((100, 100), 0.7));
+
         let best = one.planes.sharpest((100, 100));
         let sharpness = |position| crate::autofocus::mgm(&one.planes.patch((100, 100), position));
         assert!(sharpness(best) > sharpness(best + 6.0) && sharpness(best) > sharpness(best - 6.0));

@@ -33,11 +33,13 @@ pub struct ScanSettings {
     pub noise: f64,
     /// Hand tremor: each frame is blurred further, by this many pixels (standard deviation) times a normal draw.
     pub tremor: f64,
-    /// Unsteady contrast (light, smoke, wet glints): each frame's is scaled by the exponential of this times a normal draw.
+    /// Unsteady contrast (light, smoke, wet glints): each frame's is scaled by the exponential of
+    /// this times a normal draw.
     pub flicker: f64,
     /// Contrast and brightness: gray becomes `gain * gray + offset`.
     pub exposure: (f64, f64),
-    /// Share of the light that comes from something in view that moves by itself, as fluids, instruments and reflections do.
+    /// Share of the light that comes from something in view that moves by itself, as fluids,
+    /// instruments and reflections do.
     pub veil: f64,
     /// Standard deviation, in gray levels, of a pattern that stays with the sensor.
     pub pattern: f64,
@@ -85,7 +87,7 @@ impl Default for ScanSettings {
     }
 }
 
-/// What a scan goes over.
+/// What a scan is taken of.
 #[derive(Debug, Clone)]
 pub enum Scene {
     /// Sharp pictures, all of which lie at one distance.
@@ -101,7 +103,8 @@ struct Optics {
     slope: f64,
     /// How far from straight the response is: 0, or the change of slope over half a unit.
     bend: f64,
-    /// Pixels that the picture moves along each axis when the position changes by one, as magnification follows focus.
+    /// Pixels that the picture moves along each axis when the position changes by one, as
+    /// magnification follows focus.
     shift: [f64; 2],
     /// The sharpest position, smoothed over the way, of a photographed stack; 0 for others.
     anchor: f64,
@@ -115,15 +118,18 @@ impl Optics {
         let (least, most) = scene.slopes;
         let size = least * (most.max(least) / least).powf(course.random::<f64>());
         let slope = if course.random_bool(0.5) { size } else { -size };
+
         if scene.photographed {
             return Self { slope, bend: 0.0, shift: [0.0; 2], anchor: start };
         }
+
         let bend = course.random_range(-0.3..0.3);
         let shift = [(); 2].map(|()| 0.15 * standard_normal(course));
         Self { slope, bend, shift, anchor: 0.0 }
     }
 
-    /// The position at focal power 0 of a photographed stack whose anchor stands at `focus`, as nearly as its ends allow.
+    /// The position at focal power 0 of a photographed stack whose anchor stands at `focus`, as
+    /// nearly as its ends allow.
     fn origin(&self, focus: f64, (first, last): (f64, f64)) -> f64 {
         let origin = self.anchor - self.slope * focus;
         let (low, high) = if self.slope > 0.0 { (first, last - self.slope) } else { (first - self.slope, last) };
@@ -135,6 +141,7 @@ impl Optics {
         if scene.photographed {
             return self.origin(focus, scene.planes.range()) + self.slope * focal_power;
         }
+
         let off = focal_power - focus;
         self.slope * (off + self.bend * off * off)
     }
@@ -144,7 +151,9 @@ impl Optics {
         if scene.photographed {
             return (position - self.origin(focus, scene.planes.range())) / self.slope;
         }
-        // off + bend off^2 = place, by the root that is 0 where place is, without dividing by a small bend.
+
+        // The root that is 0 where place is, written so that a small bend is never divided by:
+        // off + bend off^2 = place.
         let place = position / self.slope;
         let root = (1.0 + 4.0 * self.bend * place).max(0.0).sqrt();
         focus + 2.0 * place / (1.0 + root)
@@ -189,22 +198,28 @@ impl Scan {
         Self::over(Scene::Flat(clip), settings, seed)
     }
 
-    /// A scan over `scene` whose course is drawn from `seed`. Over a focal stack `settings` says nothing of blur, spot, tremor, veil
-    /// and unrest: the stack has its own.
+    /// A scan over `scene` whose course is drawn from `seed`. Over a focal stack, blur, spot,
+    /// tremor, veil and unrest of `settings` are ignored: the stack has its own.
     #[must_use]
     pub fn over(scene: Scene, settings: ScanSettings, seed: u64) -> Self {
         let mut course = ChaCha8Rng::seed_from_u64(seed);
         let sigma0 = course.random_range(settings.blur.0..=settings.blur.1);
         let focus = Walk::new((0.0, 1.0), settings.focus, &mut course);
+
         let room = scene.room();
         let crop = room.map(|room| Walk::new(room, settings.crop, &mut course));
+
         let time = match &scene {
             Scene::Flat(clip) if clip.len() > 1 => course.random_range(0..2 * clip.len()),
             _ => 0,
         };
+
+        // Each part draws from a stream of its own, so that turning one off leaves the others as
+        // they are.
         let mut noise = ChaCha8Rng::seed_from_u64(seed ^ 0x6e6f_6973_6521);
         let mut veil_course = ChaCha8Rng::seed_from_u64(seed ^ 0x7665_696c);
         let veil = (settings.veil > 0.0).then(|| room.map(|room| Walk::new(room, settings.crop, &mut veil_course)));
+
         let pixels = if settings.pattern > 0.0 { PATCH_SIDE * PATCH_SIDE } else { 0 };
         let pattern = (0..pixels).map(|_| settings.pattern as f32 * cheap_normal(&mut noise)).collect();
         let mut wider_noise = ChaCha8Rng::seed_from_u64(seed ^ 0x7769_6465_7221);
@@ -212,16 +227,20 @@ impl Scan {
             let strength = settings.pattern as f32 / scale as f32;
             (0..pixels).map(|_| strength * cheap_normal(&mut wider_noise)).collect()
         });
+
         let mut unrest_course = ChaCha8Rng::seed_from_u64(seed ^ 0x756e_7265_7374);
         let unrest = settings.unrest.map(|unrest| Unrest::new(unrest, &mut unrest_course));
         let cover = settings.covered.then(|| Cover::new(seed ^ 0x0063_6f76_6572));
+
         let tremor = settings.tremor * standard_normal(&mut course);
         let contrast = (settings.flicker * standard_normal(&mut course)).exp();
+
         let optics = match &scene {
             Scene::Flat(_) => None,
             Scene::Stack(stack) => Some(Optics::draw(stack, stack.planes.sharpest(whole(corner(&crop))), &mut course)),
         };
         let defocus = Defocus::default();
+
         Self {
             scene,
             settings,
@@ -265,17 +284,22 @@ impl Scan {
             Scene::Flat(clip) => self.look_at_flat(&clip, focal_power),
             Scene::Stack(stack) => self.look_at_stack(&stack, focal_power),
         };
-        let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
+
+        let gain = self.settings.exposure.0 as f32;
+        let offset = self.settings.exposure.1 as f32;
         let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
         expose(&mut patch, gain, (detail * self.contrast) as f32, offset);
+
         if self.settings.noise > 0.0 {
             for value in &mut patch.0 {
                 *value += self.settings.noise as f32 * cheap_normal(&mut self.noise);
             }
         }
+
         for (value, pattern) in patch.0.iter_mut().zip(&self.pattern) {
             *value += pattern;
         }
+
         digitise(&mut patch);
         patch
     }
@@ -290,30 +314,36 @@ impl Scan {
                 stack.planes.view(corner, position).wider
             }
         };
+
         let mut view = View { patch, wider };
         for (index, patch) in view.wider.iter_mut().enumerate() {
             if let Some(patch) = patch {
                 self.take_wider(patch, index);
             }
         }
+
         view
     }
 
-    /// What the camera makes of the light of a wider patch: as of the patch, but noise and rounding count for less, since a value is the
-    /// mean of many pixels.
+    /// Makes of the light of a wider patch what the camera would, as for the patch itself. Noise and
+    /// rounding count for less, since a value is the mean of many pixels.
     fn take_wider(&mut self, patch: &mut Patch, index: usize) {
-        let (gain, offset) = (self.settings.exposure.0 as f32, self.settings.exposure.1 as f32);
+        let gain = self.settings.exposure.0 as f32;
+        let offset = self.settings.exposure.1 as f32;
         let detail = self.cover.as_ref().map_or(1.0, Cover::detail);
         expose(patch, gain, (detail * self.contrast) as f32, offset);
+
         if self.settings.noise > 0.0 {
             let noise = self.settings.noise as f32 / WIDER[index] as f32;
             for value in &mut patch.0 {
                 *value += noise * cheap_normal(&mut self.wider_noise);
             }
         }
+
         for (value, pattern) in patch.0.iter_mut().zip(&self.wider_pattern[index]) {
             *value += pattern;
         }
+
         patch.0.iter_mut().for_each(|value| *value = value.clamp(0.0, 255.0));
     }
 
@@ -327,16 +357,18 @@ impl Scan {
     fn place_in_stack(&self, stack: &StackScene, focal_power: FocalPower) -> ((usize, usize), f64) {
         let (x, y) = corner(&self.crop);
         let Some(optics) = &self.optics else { return (whole((x, y)), 0.0) };
+
         let position = optics.position(stack, self.focus.position(), focal_power.get());
         let [along, down] = optics.shift.map(|shift| shift * (position - optics.anchor));
         (whole((x + along, y + down)), position)
     }
 
-    /// What the wider patches show of a sharp picture, blurred, with the veil over it if there is one. They stay within the usable part
-    /// of the picture.
+    /// The wider patches of a sharp picture, blurred, with the veil over it if there is one. They
+    /// stay within the usable part of the picture.
     fn look_widely(&mut self, clip: &Clip, patch: &Patch, focal_power: FocalPower) -> View {
         let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
         let mut view = self.view_of_flat(clip, patch, corner(&self.crop), sigma);
+
         if let Some(at) = self.veil.as_ref().map(corner) {
             let share = self.settings.veil as f32;
             let veil = self.view_of_flat(clip, patch, at, sigma);
@@ -346,6 +378,7 @@ impl Scan {
                 }
             }
         }
+
         view
     }
 
@@ -353,12 +386,14 @@ impl Scan {
         let Area { left, top, right, bottom } = clip.area();
         let (x, y) = whole(corner);
         let inside = (x.saturating_sub(left), y.saturating_sub(top));
+
         View::around(*patch, inside, (right - left, bottom - top), |square| {
             let square = Square { x: square.x + left, y: square.y + top, ..square };
             let spot = self.settings.spot;
             let Some(unrest) = &self.unrest else {
                 return self.defocus.square(clip.at(self.time), square, sigma, spot);
             };
+
             let place = [(square.x, corner.0), (square.y, corner.1)].map(|(pixel, at)| pixel as f64 + at.fract());
             let coarse = clip.coarse_at(self.time);
             self.defocus.coarse_square(square.side, sigma, spot, |_, side, out| {
@@ -371,6 +406,7 @@ impl Scan {
     fn look_at_flat(&mut self, clip: &Clip, focal_power: FocalPower) -> Patch {
         let sigma = (self.sigma0 * focal_power.distance(self.optimum())).hypot(self.tremor);
         let mut patch = self.look(clip, corner(&self.crop), sigma);
+
         if let Some(at) = self.veil.as_ref().map(corner) {
             let share = self.settings.veil as f32;
             let veil = self.look(clip, at, sigma);
@@ -378,11 +414,14 @@ impl Scan {
                 *value += share * (veiled - *value);
             }
         }
+
         patch
     }
 
     fn look(&mut self, clip: &Clip, corner: (f64, f64), sigma: f64) -> Patch {
-        let (picture, spot) = (clip.at(self.time), self.settings.spot);
+        let picture = clip.at(self.time);
+        let spot = self.settings.spot;
+
         match &self.unrest {
             None => self.defocus.patch(picture, (corner.0 as isize, corner.1 as isize), sigma, spot),
             Some(unrest) => {
@@ -399,8 +438,10 @@ impl Scan {
         self.veil.iter_mut().flatten().for_each(|walk| walk.advance(&mut self.veil_course));
         self.unrest.iter_mut().for_each(|unrest| unrest.advance(&mut self.unrest_course));
         self.cover.iter_mut().for_each(Cover::advance);
+
         self.tremor = self.settings.tremor * standard_normal(&mut self.course);
         self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
+
         if let (Scene::Stack(stack), Some(optics)) = (&self.scene, &mut self.optics)
             && stack.photographed
         {
@@ -481,12 +522,15 @@ mod tests {
 
     #[test]
     fn looking_changes_nothing_of_the_course() {
-        let (mut looked_at, mut left_alone) = (scan(5), scan(5));
+        let mut looked_at = scan(5);
+        let mut left_alone = scan(5);
+
         for _ in 0..50 {
             looked_at.observe(FocalPower::MIN);
             looked_at.advance();
             left_alone.advance();
         }
+
         assert_eq!(looked_at.optimum(), left_alone.optimum());
         assert_eq!(looked_at.observe(FocalPower::MIDDLE), left_alone.observe(FocalPower::MIDDLE));
     }
@@ -496,6 +540,7 @@ mod tests {
         let clip = Arc::new(Clip::still(texture(1, 256)).unwrap());
         let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 1).unwrap().remove(0);
         let mut rng = ChaCha8Rng::seed_from_u64(9);
+
         for scene in [Scene::Flat(clip), Scene::Stack(stack)] {
             for seed in 0..10 {
                 let settings = Variety { share: 1.0 }.draw(&scene, &mut rng);
@@ -513,6 +558,7 @@ mod tests {
     fn wider_patches_show_the_same_blur_as_the_patch() {
         let picture = texture(1, 256);
         let mut scan = Scan::new(Arc::new(Clip::still(picture.clone()).unwrap()), ScanSettings::default(), 5);
+
         for step in [0.0, 0.2, -0.4] {
             let focal_power = scan.optimum().moved(step);
             let sigma = scan.sigma0 * focal_power.distance(scan.optimum());
@@ -537,6 +583,7 @@ mod tests {
             let mut scan = Scan::over(Scene::Stack(Arc::clone(&stack)), ScanSettings::reference(), seed);
             let best = scan.optimum();
             let sharp = crate::autofocus::mgm(&scan.observe(best));
+
             for step in [-0.5, 0.5] {
                 let elsewhere = best.moved(step);
                 if elsewhere.distance(best) > 0.3 {
@@ -545,6 +592,7 @@ mod tests {
                 }
             }
         }
+
         assert!(seen > 10 && sharper == seen, "{sharper} of {seen}");
     }
 
@@ -554,6 +602,7 @@ mod tests {
         let stack = StackScene::clone(&stack);
         let photographed = StackScene { photographed: true, slopes: (8.0, 8.0), ..stack.clone() };
         let mut rng = ChaCha8Rng::seed_from_u64(1);
+
         for scene in [stack, photographed] {
             for _ in 0..20 {
                 let optics = Optics::draw(&scene, 0.3, &mut rng);
@@ -569,6 +618,7 @@ mod tests {
     fn the_patch_is_sharpest_at_the_optimum() {
         let mut scan = scan(6);
         let sharp = crate::autofocus::mgm(&scan.observe(scan.optimum()));
+
         for step in [-0.4, -0.2, 0.2, 0.4] {
             let elsewhere = scan.optimum().moved(step);
             if elsewhere.distance(scan.optimum()) > 0.1 {

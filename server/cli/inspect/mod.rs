@@ -42,7 +42,8 @@ pub struct Arguments {
     calibration: Option<PathBuf>,
 }
 
-/// Inspects every file; one that cannot be inspected is named on standard error and does not keep the others from it.
+/// Inspects every file. One that cannot be inspected is named on standard error; the others are
+/// still inspected.
 ///
 /// # Errors
 /// When a file could not be inspected, the calibration not read, or a result not written.
@@ -50,6 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut inspector = Inspector::new(arguments)?;
     let mut reports = Vec::new();
     let mut failed = 0;
+
     for path in &arguments.paths {
         match inspector.inspect(path) {
             Ok(report) if arguments.json => print(&(serde_json::to_string(&report)? + "\n"))?,
@@ -61,10 +63,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
         }
     }
+
     print(&report::table(&reports))?;
     if let Some(title) = inspector.titled.filter(|_| !arguments.json) {
         print(&format!("mosaics developed with the calibration {title}\n"))?;
     }
+
     if failed > 0 {
         return Err(format!("cannot inspect {failed} of {} files", arguments.paths.len()).into());
     }
@@ -83,7 +87,7 @@ struct Inspector<'a> {
     taken: HashSet<OsString>,
 }
 
-/// A picture as it is looked at.
+/// A picture as it is inspected.
 struct Seen {
     kind: Kind,
     rgb: RgbImage,
@@ -109,10 +113,13 @@ impl<'a> Inspector<'a> {
     fn inspect(&mut self, path: &Path) -> Result<Report, Failure> {
         let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
         let seen = self.see(path)?;
+
         let content_area = content_area::detect(&seen.gray);
-        let (width, height) = (seen.gray.width, seen.gray.height);
+        let width = seen.gray.width;
+        let height = seen.gray.height;
         let area = PatchArea::central(width, height, content_area.as_ref()).map_err(|error| named(&error))?;
         let cut_out = cut(&seen.gray, area);
+
         let report = Report {
             path: path.display().to_string(),
             width,
@@ -124,30 +131,36 @@ impl<'a> Inspector<'a> {
             mlr: mlr(&cut_out),
             calibration: self.titled.clone().filter(|_| matches!(seen.kind, Kind::Mosaic)),
         };
+
         if let Some(out) = self.out {
             let target = out.join(self.overlay_name(path));
             let failed =
                 |error: &dyn std::fmt::Display| named(&format_args!("cannot write {}: {error}", target.display()));
+
             let mut picture = Cursor::new(Vec::new());
             let drawn = overlay::draw(seen.rgb, &report).write_to(&mut picture, image::ImageFormat::Png);
             drawn.map_err(|error| failed(&error))?;
             replace(&target, picture.get_ref()).map_err(|error| failed(&error))?;
         }
+
         Ok(report)
     }
 
     fn see(&mut self, path: &Path) -> Result<Seen, Failure> {
         let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
         let bytes = fs::read(path).map_err(|error| named(&format_args!("cannot be read: {error}")))?;
+
         let raw =
             path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"));
         let picture = if raw { decode_raw(&bytes).map(Picture::Mosaic) } else { decode(&bytes, self.mosaic) };
+
         Ok(match picture.map_err(|error| named(&error))? {
             Picture::Rgb(rgb, gray) => Seen { kind: Kind::Rgb, rgb, gray },
             Picture::Gray(gray) => Seen { kind: Kind::Gray, rgb: overlay::from_gray(&gray), gray },
             Picture::Mosaic(frame) => {
                 let size = (frame.width(), frame.height());
                 calibration::check_size(&self.calibration, &path.display().to_string(), Some(size))?;
+
                 let most = frame.samples().iter().copied().max().unwrap_or(0);
                 if f32::from(most) > self.calibration.full_scale() {
                     let limit = self.calibration.full_scale();
@@ -158,6 +171,7 @@ impl<'a> Inspector<'a> {
                         ))
                     ));
                 }
+
                 let mut seen = Seen { kind: Kind::Mosaic, rgb: RgbImage::default(), gray: GrayImage::default() };
                 self.reconstructor.reconstruct(&frame, &mut seen.rgb, &mut seen.gray);
                 seen
@@ -173,6 +187,7 @@ impl<'a> Inspector<'a> {
             name.push(if number == 1 { ".overlay.png".to_owned() } else { format!(".overlay-{number}.png") });
             name
         };
+
         let mut names = (1..).map(numbered);
         names.find(|name| self.taken.insert(name.clone())).unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! `parfocal lens emulate`: an Optotune Lens Driver 4 that is not there, and what can befall it.
+//! `parfocal lens emulate`: emulates an Optotune Lens Driver 4, and its faults on request.
 
 use std::io::BufRead;
 use std::sync::Arc;
@@ -46,7 +46,13 @@ pub struct Arguments {
     #[arg(long, value_name = "DPT", default_value = "0.04", value_parser = parse_play)]
     hysteresis: f64,
     /// Temperature of the lens in °C.
-    #[arg(long, value_name = "CELSIUS", default_value = "25.5", value_parser = parse_temperature, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "CELSIUS",
+        default_value = "25.5",
+        value_parser = parse_temperature,
+        allow_negative_numbers = true
+    )]
     temperature: f64,
     /// Fault that it has from the start: none, garbage, wrong-checksum, wrong-read-back, silent, errors,
     /// drops-commands, stranger or noisy-line.
@@ -72,14 +78,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut emulator = Emulator::start(arguments.model(), Arc::new(SystemClock))?;
     emulator.set_temperature(arguments.temperature);
     emulator.set_fault(arguments.fault);
+
     print(&format!("{}\n", emulator.path().display()))?;
     tell(HELP);
+
     tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(serve(&mut emulator))
 }
 
 async fn serve(emulator: &mut Emulator) -> Result<(), Failure> {
-    let (mut interrupt, mut terminate) = (signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?);
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    let mut terminate = signal(SignalKind::terminate())?;
     let mut lines = typed_lines();
+
     loop {
         tokio::select! {
             _ = interrupt.recv() => return Ok(()),
@@ -92,9 +102,11 @@ async fn serve(emulator: &mut Emulator) -> Result<(), Failure> {
     }
 }
 
-/// Lines typed, until the terminal is closed. Its thread ends with the process: reading a terminal cannot be cut short.
+/// Lines typed until the terminal is closed. The thread ends with the process: reading a terminal
+/// cannot be interrupted.
 fn typed_lines() -> mpsc::UnboundedReceiver<String> {
     let (sender, lines) = mpsc::unbounded_channel();
+
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
             if sender.send(line).is_err() {
@@ -102,10 +114,11 @@ fn typed_lines() -> mpsc::UnboundedReceiver<String> {
             }
         }
     });
+
     lines
 }
 
-/// Does what `line` says; the answer to it, or why it was not done.
+/// Does what `line` says; returns the answer, or why it was not done.
 fn befall(emulator: &mut Emulator, line: &str) -> Result<String, String> {
     let words: Vec<_> = line.split_whitespace().collect();
     match words.as_slice() {
@@ -136,6 +149,7 @@ fn parse_serial(text: &str) -> Result<[u8; 8], String> {
     if text.is_empty() || text.len() > 4 || !text.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
         return Err("must be one to four letters and digits".into());
     }
+
     let mut serial = *b"EMUL0000";
     serial.iter_mut().rev().zip(text.bytes().rev()).for_each(|(place, byte)| *place = byte);
     Ok(serial)

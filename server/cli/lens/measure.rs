@@ -62,23 +62,29 @@ struct Times {
 /// Measures and reports.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+
     let mut lens = arguments.which.open()?;
     let info = lens.info()?;
+
     let settings =
         CameraSettings { fps: arguments.fps.into(), seed: 0, optics: lens.optics(), clock: Arc::clone(&clock) };
     let camera = camera::open(&arguments.camera, settings)?;
     let eye = Eye::new(Reconstructor::new(&Calibration::default()));
     let mut view = View::new(camera, eye, Arc::clone(&clock));
+
     let watch = Duration::from_millis(arguments.watch.into());
     let plan = Plan { repeats: arguments.repeats, watch, ..Plan::default() };
+
     let progress = ProgressBar::new_spinner().with_message("stepping the lens and watching it settle");
     progress.enable_steady_tick(Duration::from_millis(100));
     let measured = measure(lens.as_mut(), &mut view, plan, &|time| std::thread::sleep(time))?;
     progress.finish_and_clear();
+
     let report = Report::new(&measured, info, clock.as_ref());
     if let Some(folder) = &arguments.out {
         save(folder, &report, &measured)?;
     }
+
     print(&if arguments.which.json { serde_json::to_string(&report)? + "\n" } else { report.text() })
 }
 
@@ -86,6 +92,7 @@ impl Report {
     fn new(measured: &Measurement, info: LensInfo, clock: &dyn Clock) -> Self {
         let times = |fit: &Fit| Times { delay_ms: millis(fit.delay), settling_ms: millis(fit.settling) };
         let Times { delay_ms, settling_ms } = times(&measured.both);
+
         Self {
             hysteresis_dioptre: measured.hysteresis * (info.max_dioptre - info.min_dioptre),
             found: MeasuredDynamics {
@@ -106,6 +113,7 @@ impl Report {
 
     fn text(&self) -> String {
         let Self { found, up, down, between: (low, high), .. } = self;
+
         format!(
             "delay       {:6.1} ms   up {:.1}, down {:.1}\nsettling    {:6.1} ms   up {:.1}, down {:.1}\n\
              hysteresis  {:6.4}      {:.3} dpt\n\
@@ -130,6 +138,7 @@ fn millis(seconds: f64) -> f64 {
 
 fn save(folder: &Path, report: &Report, measured: &Measurement) -> Result<(), Failure> {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
+
     std::fs::create_dir_all(folder).map_err(failed)?;
     replace(&folder.join("dynamics.toml"), report.found.to_toml()?.as_bytes()).map_err(failed)?;
     replace(&folder.join("steps.svg"), plot(measured).as_bytes()).map_err(failed)?;

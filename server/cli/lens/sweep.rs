@@ -47,6 +47,7 @@ fn measure(arguments: &Arguments) -> Result<Vec<Stop>, Failure> {
     let info = lens.info()?;
     let last = arguments.steps - 1;
     let progress = ProgressBar::new(2 * u64::from(arguments.steps));
+
     (0..=last)
         .chain((0..=last).rev())
         .map(|step| {
@@ -85,21 +86,32 @@ fn plot(stops: &[Stop]) -> String {
     const SIDE: f64 = 400.0;
     const MARGIN: f64 = 50.0;
     let ends = |pick: fn(f64, f64) -> f64, start| stops.iter().map(|stop| stop.asked_dioptre).fold(start, pick);
-    let (min, max) = (ends(f64::min, f64::INFINITY), ends(f64::max, f64::NEG_INFINITY));
+    let min = ends(f64::min, f64::INFINITY);
+    let max = ends(f64::max, f64::NEG_INFINITY);
+
     let along = |value: f64| MARGIN + (value - min) / (max - min) * SIDE;
     let up = |value: f64| MARGIN + SIDE - (value - min) / (max - min) * SIDE;
-    let (low, high, middle, whole) = (MARGIN, MARGIN + SIDE, MARGIN + SIDE / 2.0, SIDE + 2.0 * MARGIN);
+    let low = MARGIN;
+    let high = MARGIN + SIDE;
+    let middle = MARGIN + SIDE / 2.0;
+    let whole = SIDE + 2.0 * MARGIN;
+
     let mut dots = String::new();
     for stop in stops {
-        let (x, y) = (along(stop.asked_dioptre), up(stop.read_back_dioptre));
+        let x = along(stop.asked_dioptre);
+        let y = up(stop.read_back_dioptre);
         let _ = writeln!(dots, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"/>");
     }
+
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {whole} {whole}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {whole} {whole}\" \
+         font-family=\"sans-serif\" font-size=\"12\">\n\
          <rect width=\"{whole}\" height=\"{whole}\" fill=\"white\"/>\n\
          <rect x=\"{low}\" y=\"{low}\" width=\"{SIDE}\" height=\"{SIDE}\" fill=\"none\" stroke=\"gray\"/>\n\
-         <line x1=\"{low}\" y1=\"{high}\" x2=\"{high}\" y2=\"{low}\" stroke=\"gray\"/>\n<g fill=\"#0a58ca\">\n{dots}</g>\n\
-         <g text-anchor=\"middle\"><text x=\"{low}\" y=\"{0}\">{min:.2}</text><text x=\"{high}\" y=\"{0}\">{max:.2}</text>\
+         <line x1=\"{low}\" y1=\"{high}\" x2=\"{high}\" y2=\"{low}\" stroke=\"gray\"/>\n\
+         <g fill=\"#0a58ca\">\n{dots}</g>\n\
+         <g text-anchor=\"middle\"><text x=\"{low}\" y=\"{0}\">{min:.2}</text>\
+         <text x=\"{high}\" y=\"{0}\">{max:.2}</text>\
          <text x=\"{middle}\" y=\"{0}\">asked, dpt</text>\
          <text x=\"20\" y=\"{middle}\" transform=\"rotate(-90 20 {middle})\">read back, dpt</text>\
          <text x=\"{middle}\" y=\"30\">largest difference {1:.3} dpt</text></g>\n</svg>\n",

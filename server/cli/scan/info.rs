@@ -82,18 +82,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let poses: Vec<_> = scan.poses().values().collect();
     let checked: Vec<_> = poses.par_iter().map(|pose| scan.check(pose)).inspect(|_| progress.inc(1)).collect();
     progress.finish_and_clear();
+
     let bytes = checked.iter().map(|(bytes, _)| bytes).sum();
     let damages: Vec<Damage> = checked.into_iter().flat_map(|(_, damages)| damages).collect();
     let info = info(&scan, bytes, &damages);
+
     if let Some(path) = &arguments.out {
         replace(path, picture(&scan).as_bytes())
             .map_err(|error| format!("cannot save the plot to {}: {error}", path.display()))?;
     }
+
     print(&if arguments.json { serde_json::to_string(&info)? + "\n" } else { text(&info) })?;
+
     if let Some(damage) = damages.first() {
         let more = if damages.len() > 1 { format!(" (and {} more)", damages.len() - 1) } else { String::new() };
         return Err(format!("{} is damaged: {}{more}", damage.file, damage.reason).into());
     }
+
     scan.whole()?;
     Ok(())
 }
@@ -140,10 +145,12 @@ fn optimum(path: &[f64]) -> Optimum {
 fn deviation(scan: &ScanFolder) -> Option<Deviation> {
     let poses = scan.poses().values();
     let known: Vec<_> = poses.filter_map(|pose| Some((pose.pose, pose.optimum.distance(pose.truth?)))).collect();
+
     let powers = &scan.header().focal_powers;
     let step = powers.windows(2).map(|pair| pair[0].distance(pair[1])).fold(0.0, f64::max);
     let &(worst_pose, max) = known.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let count = known.len() as f64;
+
     Some(Deviation {
         mean: known.iter().map(|known| known.1).sum::<f64>() / count,
         max,
@@ -168,6 +175,7 @@ fn text(info: &Info) -> String {
             format!("{:.3} to {:.3}, changes by {:.4} per pose", info.optimum.min, info.optimum.max, info.optimum.step),
         ),
     ];
+
     if let Some(Deviation { mean, max, worst_pose, within_step }) = &info.deviation {
         let share = 100.0 * within_step;
         rows.push((
@@ -175,11 +183,14 @@ fn text(info: &Info) -> String {
             format!("{mean:.4} on average, {max:.3} at most (pose {worst_pose}); {share:.1} % within a step"),
         ));
     }
+
     if !info.missing.is_empty() {
         rows.push(("missing", poses(&info.missing)));
     }
     rows.push(("damaged", if info.damaged.is_empty() { "none".to_owned() } else { info.damaged.join(", ") }));
+
     let mut text = table(&rows);
+
     if let Some(found) = &info.optics {
         text.push_str(&optics(found, "focal power"));
     }
@@ -205,6 +216,7 @@ pub(super) fn optics(optics: &Optics, unit: &str) -> String {
     if let Some(growth) = optics.magnification {
         rows.push(("magnification", format!("changes by {:+.2} % from the first {unit} to the last", 100.0 * growth)));
     }
+
     let mut text = table(&rows);
     for place in &optics.places {
         let name = format!("{},{}", place.x, place.y);
@@ -231,6 +243,7 @@ fn optics_of(scan: &ScanFolder) -> Option<Optics> {
         };
         FocalStack::new(pose.images.iter().map(plane).collect::<Option<_>>()?).ok()
     });
+
     let found: Vec<Optics> = stacks.map(|stack| Optics::of(&stack)).collect();
     (!found.is_empty()).then(|| Optics::together(found))
 }

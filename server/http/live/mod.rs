@@ -1,10 +1,11 @@
 //! `/live`: the WebSocket that carries pictures and state to one page.
 //!
-//! Binary messages are frames: a header's length (u16, little-endian), the header (JSON), the JPEG. Text messages are
-//! JSON with a `type`: `session` when the session changes, `status` when the devices' state does, `beat` now and then, so that a
-//! page can tell a link that broke without a word from one with nothing to say. The page answers each
-//! frame that it has drawn, and only then gets the next, which is by then the latest: so no queue forms anywhere, however
-//! slow the link. A page that says it is hidden gets no frames.
+//! Binary messages are frames: a header's length (u16, little-endian), the header (JSON), the JPEG.
+//! Text messages are JSON with a `type`: `session` when the session changes, `status` when the
+//! devices' state does, `beat` now and then, so that a page can tell a silently broken link from one
+//! with nothing to say. The page answers each frame that it has drawn, and only then gets the next,
+//! which is by then the latest: so no queue forms anywhere, however slow the link. A page that says
+//! it is hidden gets no frames.
 
 mod audience;
 mod operator;
@@ -103,7 +104,7 @@ async fn attend<A: Audience>(mut socket: WebSocket, app: AppState) {
 /// The page has left.
 struct Left;
 
-/// What is known of one page, and what it has yet to be told.
+/// The connection to one page: what is known of it, and what it must still be sent.
 struct Desk<A: Audience> {
     app: AppState,
     /// Set while the page can be seen.
@@ -128,8 +129,10 @@ impl<A: Audience> Desk<A> {
         heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut sessions = A::sessions(&app);
         sessions.mark_changed();
+
         let mut statuses = app.control.status.clone();
         statuses.mark_changed();
+
         Self {
             watcher: Some(app.live.watch()),
             in_flight: None,
@@ -149,6 +152,7 @@ impl<A: Audience> Desk<A> {
         if let Some(message) = self.next.take() {
             return Ok(Some(message));
         }
+
         loop {
             let message = tokio::select! {
                 () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
@@ -175,6 +179,7 @@ impl<A: Audience> Desk<A> {
             Message::Binary(_) => return Ok(Some(close(close_code::UNSUPPORTED, "text is expected"))),
             Message::Ping(_) | Message::Pong(_) => return Ok(None),
         };
+
         match serde_json::from_str(text) {
             Ok(Said::Drawn { frame }) if self.in_flight == Some(frame) => self.in_flight = None,
             Ok(Said::Drawn { .. }) => {}
@@ -200,6 +205,7 @@ impl<A: Audience> Desk<A> {
         if self.told.as_ref() == Some(&status) {
             return None;
         }
+
         let message = tell(&Told::<&A::Session, _>::Status(&status));
         self.told = Some(status);
         message
@@ -210,8 +216,10 @@ impl<A: Audience> Desk<A> {
             self.watcher = None;
             return None;
         };
+
         let age = self.app.clock.now().since(frame.picture.exposed_at);
         let message = pack(&A::header(frame, tenth_millis(age), &self.app), &frame.picture.jpeg)?;
+
         self.in_flight = Some(frame.picture.number);
         self.app.metrics.frames_sent.inc();
         self.app.metrics.bytes_sent.inc_by(message.len() as u64);
@@ -229,7 +237,7 @@ impl<A: Audience> Desk<A> {
     }
 }
 
-/// The next frame of a page that can be seen; of one that cannot, none ever.
+/// Waits for the next frame of a visible page; waits forever for a hidden one.
 async fn next_frame(watcher: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
     match watcher {
         Some(watcher) => watcher.next().await,
@@ -278,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn an_age_is_told_in_tenths_of_a_millisecond() {
+    fn an_age_is_given_in_tenths_of_a_millisecond() {
         assert!((tenth_millis(Duration::from_micros(1_260)) - 1.3).abs() < 1e-9);
     }
 }

@@ -1,5 +1,5 @@
-//! A recorded scan out of a focal stack: windows that drift over it, in each of which the optimum walks as the paper's
-//! simulation lets it walk. Every picture shown was really taken.
+//! Cuts a recorded scan out of a focal stack: windows drift over the stack, and in each of them the
+//! optimum walks as in the paper's simulation. Every picture shown was really taken.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::path::Path;
@@ -21,7 +21,8 @@ const DRIFT: Motion = Motion { speed: 5.0 * FRAC_1_SQRT_2, memory: 30.0 };
 /// How the optimum walks, in focal power a frame, and within what.
 const FOCUS: Motion = Motion { speed: 0.012, memory: 60.0 };
 const WITHIN: (f64, f64) = (0.03, 0.97);
-/// Frames over which the sharpest plane is smoothed before the window of planes follows it (standard deviation).
+/// Standard deviation, in frames, by which the sharpest plane is smoothed before the window of
+/// planes follows it.
 const SMOOTH: f64 = 12.0;
 
 /// How a scan is cut out of a stack.
@@ -43,7 +44,8 @@ pub struct Cut {
 #[derive(Debug, thiserror::Error)]
 pub enum CutError {
     /// More planes are asked for than there are.
-    #[error("a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; give --planes at most {}", of - 1)]
+    #[error("a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; \
+             give --planes at most {}", of - 1)]
     Planes {
         /// Planes asked for.
         planes: usize,
@@ -52,7 +54,8 @@ pub enum CutError {
     },
     /// The window does not fit.
     #[error(
-        "a window of {size}x{size} pixels does not fit into pictures of {width}x{height}; give a smaller --size or --scale"
+        "a window of {size}x{size} pixels does not fit into pictures of {width}x{height}; \
+         give a smaller --size or --scale"
     )]
     Size {
         /// Side of the window.
@@ -84,7 +87,8 @@ pub struct Window {
 /// When stack or pictures are too small.
 pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     let Cut { planes, size, poses, .. } = *cut;
-    let ((width, height), of) = (stack.size(), stack.planes().len());
+    let (width, height) = stack.size();
+    let of = stack.planes().len();
     if planes >= of {
         return Err(CutError::Planes { planes, of });
     }
@@ -97,6 +101,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     let mut focus = Walk::starting(0.5, WITHIN, FOCUS, &mut rng);
     let mut corners = Vec::with_capacity(poses);
     let mut optima = Vec::with_capacity(poses);
+
     for _ in 0..poses {
         corners.push((x.position() as usize, y.position() as usize));
         optima.push(focus.position());
@@ -107,10 +112,12 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
 
     let sharpest: Vec<f64> = corners.iter().map(|&corner| sharpest(stack, corner, size) as f64).collect();
     let followed = smoothed(&sharpest, SMOOTH);
+
     let window = |((&(left, top), optimum), at): ((&(usize, usize), &f64), &f64)| {
         let first = (at - optimum * (planes - 1) as f64).round().clamp(0.0, (of - planes) as f64);
         Window { left, top, plane: first as usize }
     };
+
     Ok(corners.iter().zip(&optima).zip(&followed).map(window).collect())
 }
 
@@ -121,6 +128,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
 pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()) -> Result<(), CutError> {
     let windows = windows(stack, cut)?;
     let powers = evenly_spread(cut.planes);
+
     let header = Header {
         format: FORMAT.to_owned(),
         version: VERSION,
@@ -139,8 +147,10 @@ pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()
         poses: cut.poses,
         focal_powers: powers.clone(),
     };
+
     let patch = middle(cut.size);
     let mut recording = Recording::open(out, &header)?;
+
     for (pose, window) in (1..).zip(windows) {
         if !recording.folder().poses().contains_key(&pose) {
             let planes = &stack.planes()[window.plane..window.plane + cut.planes];
@@ -149,6 +159,7 @@ pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()
         }
         progress();
     }
+
     Ok(())
 }
 
@@ -196,6 +207,7 @@ mod tests {
         let stack = stack(21, 160);
         let windows = windows(&stack, &cut(9, 96)).unwrap();
         assert!(windows.iter().all(|w| w.left <= 64 && w.top <= 64 && w.plane <= 12));
+
         // Sharpest in plane 10: the optimum within the window is wherever the walk put it.
         let optima: Vec<usize> = windows.iter().map(|w| 10usize.saturating_sub(w.plane)).collect();
         let (least, most) = (optima.iter().min().unwrap(), optima.iter().max().unwrap());
@@ -205,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused() {
+    fn a_cut_that_does_not_fit_is_refused() {
         let stack = stack(7, 100);
         assert!(windows(&stack, &cut(7, 96)).unwrap_err().to_string().contains("give --planes at most 6"));
         assert!(

@@ -1,4 +1,5 @@
-//! A batch of windows of consecutive frames, and what the action values of its states are fitted to.
+//! A batch of windows of consecutive frames, and the targets that the values of its states are
+//! fitted to.
 
 use tch::{Device, Tensor};
 
@@ -12,7 +13,8 @@ use crate::lens::FocalPower;
 pub(super) struct Batch {
     /// All windows' frames.
     pub frames: Frames,
-    /// `[8 S]`: of each state its latest eight frames, oldest first; before eight were seen, the first for those missing.
+    /// `[8 S]`: each state's latest eight frames, oldest first; before eight were seen, the first
+    /// stands for those missing.
     pub history: Tensor,
     /// `[S, 8]`: the scaled focal powers at these.
     pub focal_powers: Tensor,
@@ -25,16 +27,20 @@ impl Batch {
     /// A batch of `frames`, `window` of them in each window, for a network on `device`.
     pub fn new(frames: Frames, transitions: Vec<Transition>, window: usize, device: Device) -> Self {
         let states: Vec<usize> = (0..transitions.len()).filter(|&at| at % window >= reach(&transitions[at])).collect();
+
         let latest = |&at: &usize| {
             let reach = reach(&transitions[at]);
             (0..HISTORY).rev().map(move |back| at - back.min(reach))
         };
+
         let history: Vec<usize> = states.iter().flat_map(latest).collect();
         let focal_powers: Vec<f32> =
             history.iter().map(|&at| scaled_focal_power(f64::from(transitions[at].focal_power))).collect();
+
         let history: Vec<i64> = history.into_iter().map(|at| at as i64).collect();
         let history = Tensor::from_slice(&history).to_device(device);
         let focal_powers = Tensor::from_slice(&focal_powers).view([-1, HISTORY as i64]).to_device(device);
+
         Self { frames, history, focal_powers, transitions, states }
     }
 }
@@ -44,24 +50,30 @@ fn reach(transition: &Transition) -> usize {
     usize::from(transition.age).min(HISTORY - 1)
 }
 
-/// What moving earns by itself, in steps: the fields of [`crate::training::recipe::dqn::Target::Lookahead`].
+/// What moving earns by itself, in steps: fields of
+/// [`crate::training::recipe::dqn::Target::Lookahead`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bonus {
     pub restless: f64,
     pub turning: f64,
 }
 
-/// What each action would gain at the frame after the last of `transitions` over standing still, in steps; and what moving earns by itself
-/// where the picture is well out of focus: only who moves learns where to go.
+/// What each action would gain over standing still at the frame after the last of `transitions`, in
+/// steps. Well out of focus, moving earns something by itself: only a policy that moves learns where
+/// to go.
 pub(super) fn gains(transitions: &[Transition], bonus: Bonus) -> [f32; ACTIONS] {
     let Some(transition) = transitions.last() else { return [0.0; ACTIONS] };
-    let (stands, best) = (FocalPower::nearest(f64::from(transition.focal_power)), f64::from(transition.next_optimum));
+    let stands = FocalPower::nearest(f64::from(transition.focal_power));
+    let best = f64::from(transition.next_optimum);
+
     let error = (stands.get() - best).abs();
     let lost = (error / IN_FOCUS - 0.5).clamp(0.0, 1.0);
     let heading = heading(transitions);
+
     std::array::from_fn(|action| {
         let goes = stands.moved(action_step(action)).get();
         let moved = goes - stands.get();
+
         let earns = if moved == 0.0 {
             0.0
         } else if moved * heading < 0.0 {
@@ -69,6 +81,7 @@ pub(super) fn gains(transitions: &[Transition], bonus: Bonus) -> [f32; ACTIONS] 
         } else {
             bonus.restless
         };
+
         ((error - (goes - best).abs()) / STEP + earns * lost) as f32
     })
 }
@@ -80,7 +93,8 @@ fn heading(transitions: &[Transition]) -> f64 {
     changes.find(|change| change.abs() > 1e-6).unwrap_or(0.0)
 }
 
-/// How Bellman's equation is applied: the fields of [`crate::training::recipe::dqn::Target::Bellman`] that rewards depend on.
+/// How Bellman's equation is applied: those fields of
+/// [`crate::training::recipe::dqn::Target::Bellman`] that rewards depend on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Returns {
     pub discount: f64,
@@ -92,74 +106,87 @@ impl Returns {
     /// The return of the frames from `at` on, up to the state `steps` later, whose value is `next_value`.
     fn of(&self, transitions: &[Transition], at: usize, next_value: f64) -> f64 {
         let end = at + self.steps;
+
         let mut sum = 0.0;
         for (ahead, pair) in transitions[at..=end].windows(2).enumerate() {
             let error = f64::from((pair[0].next_optimum - pair[1].focal_power).abs());
             sum -= self.discount.powi(ahead as i32) * error;
         }
+
         let later = self.discount.powi(self.steps as i32);
         if !self.regret {
             return later.mul_add(next_value, sum);
         }
+
         let shaped = sum + later * self.oracle(&transitions[end]) - self.oracle(&transitions[at]);
         // Mean regret a frame, roughly, whatever the horizon.
         later.mul_add(next_value, shaped * (1.0 - self.discount) / STEP)
     }
 
-    /// What an oracle that steps towards the optimum would yet get from where `transition` stands, were the optimum to stay.
+    /// What an oracle that steps towards the optimum would still get from where `transition` stands
+    /// if the optimum stayed.
     fn oracle(&self, transition: &Transition) -> f64 {
         let mut error = f64::from((transition.next_optimum - transition.focal_power).abs());
-        let (mut sum, mut weight) = (0.0, 1.0);
+        let mut sum = 0.0;
+        let mut weight = 1.0;
+
         while error > STEP {
             error -= STEP;
             sum -= weight * error;
             weight *= self.discount;
         }
+
         sum
     }
 }
 
-/// What values should be: `None` where nothing is known of an action's.
+/// The values to fit, by state and action; `None` where an action's is unknown.
 pub(super) type Targets = Vec<[Option<f32>; ACTIONS]>;
 
-/// What the lookahead wants of each state: all actions' [`gains`].
+/// The lookahead's targets for each state: all actions' [`gains`].
 pub(super) fn lookahead(batch: &Batch, bonus: Bonus) -> Targets {
     batch.states.iter().map(|&at| gains(&batch.transitions[..=at], bonus).map(Some)).collect()
 }
 
-/// What Bellman's equation wants of the action taken in each state whose successor some steps on is in the batch.
-/// `next_values` are the states' own, by row.
+/// Bellman's targets: the value of the action taken in each state whose successor some steps on is
+/// in the batch. `next_values` are the states' own, by row.
 pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Returns, window: usize) -> Targets {
     let mut row_of = vec![None; batch.transitions.len()];
     for (row, &at) in batch.states.iter().enumerate() {
         row_of[at] = Some(row);
     }
+
     let targets = |&at: &usize| {
         let mut targets = [None; ACTIONS];
         let end = at + returns.steps;
         let same_scan = end / window == at / window
             && usize::from(batch.transitions[end].age) == usize::from(batch.transitions[at].age) + returns.steps;
+
         if let Some(last) = same_scan.then(|| row_of[end]).flatten() {
             let value = returns.of(&batch.transitions, at, f64::from(next_values[last]));
             targets[usize::from(batch.transitions[at].action)] = Some(value as f32);
         }
+
         targets
     };
+
     batch.states.iter().map(targets).collect()
 }
 
-/// The mean smooth L1 loss of `values` (`[S, 3]`, row by row) where something is targets of them, and its gradient by them:
-/// Huber's (1964), quadratic within 1.
+/// The mean smooth L1 loss (Huber 1964, quadratic within 1) of `values` (`[S, 3]`, row by row) where
+/// they have targets, and its gradient with respect to them.
 pub(super) fn smooth_l1(values: &[f32], targets: &Targets) -> (f64, Vec<f32>) {
     let targets = targets.as_flattened();
     let count = targets.iter().flatten().count().max(1) as f64;
     let mut loss = 0.0;
+
     let slope = |(value, targets): (&f32, &Option<f32>)| {
         let difference = targets.map_or(0.0, |targets| f64::from(value - targets));
         let size = difference.abs();
         loss += if size < 1.0 { 0.5 * size * size } else { size - 0.5 };
         (difference.clamp(-1.0, 1.0) / count) as f32
     };
+
     let grad_output = values.iter().zip(targets).map(slope).collect();
     (loss / count, grad_output)
 }
@@ -208,10 +235,12 @@ mod tests {
     #[test]
     fn returns_by_hand() {
         let mut transitions = transitions(&[0.5, 0.55, 0.6], 0.6);
-        (transitions[0].next_optimum, transitions[1].next_optimum) = (0.62, 0.5);
+        transitions[0].next_optimum = 0.62;
+        transitions[1].next_optimum = 0.5;
         let plain = Returns { discount: 0.5, steps: 2, regret: false };
         // -(0.62 - 0.55) - 0.5 * (0.6 - 0.5), and a quarter of what the last state is worth.
         assert_eq!(rounded(plain.of(&transitions, 0, 4.0)), 8800);
+
         // An oracle at 0.5 is 0.07, then 0.02 away from 0.62; at the end, 0. In steps, over the horizon of two frames.
         let regret = Returns { regret: true, ..plain };
         assert_eq!(rounded(regret.of(&transitions, 0, 4.0)), 6000);
@@ -230,12 +259,14 @@ mod tests {
         let transitions: Vec<Transition> = ages.into_iter().enumerate().map(transition).collect();
         let batch = Batch::new(Frames::default(), transitions, 4, Device::Cpu);
         assert_eq!(batch.states, [0, 1, 2, 3, 4, 5, 6, 7]);
+
         let values = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
         let targets = bellman(&batch, &values, Returns { discount: 0.5, steps: 1, regret: false }, 4);
         let told: Vec<_> = targets
             .iter()
             .map(|row| row.iter().enumerate().find_map(|(action, value)| value.map(|v| (action, rounded(v.into())))))
             .collect();
+
         let by_hand = [
             Some((1, 100_000)), // 0 + 20 / 2
             None,               // the scan ends
@@ -246,6 +277,7 @@ mod tests {
             Some((1, 394_000)), // -0.6 + 80 / 2
             None,
         ];
+
         assert_eq!(told, by_hand);
         assert!(targets.iter().all(|row| row.iter().flatten().count() <= 1), "of the action taken alone");
     }

@@ -1,5 +1,6 @@
-//! Deep Q-learning on simulated focal-time scans (Mnih et al. 2015; double: van Hasselt et al. 2016), on windows of
-//! consecutive frames, so that each patch is encoded once for all the states that hold it.
+//! Deep Q-learning on simulated focal-time scans (Mnih et al. 2015; double: van Hasselt et al.
+//! 2016), on windows of consecutive frames, so that each patch is encoded once for all the states
+//! that hold it.
 
 mod batch;
 mod encoder;
@@ -56,15 +57,29 @@ impl DqnTrainer {
     pub fn new(sight: Sight, recipe: DqnRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
-        let (online, mut target) = (Values::new(sight, device), Values::new(sight, device));
+        let online = Values::new(sight, device);
+        let mut target = Values::new(sight, device);
         target.store.freeze();
+
         let optimiser = Optimiser::new(recipe.optimiser, &online.store);
         let mut target_variables = Flat::of(&target.store);
         target_variables.approach(optimiser.flat(), 1.0);
+
         let replay = Replay::new(recipe.replay, recipe.scans);
-        let (actors, updates, frames) = (Vec::new(), 0, 0);
-        let mut trainer =
-            Self { recipe, scenery, online, target, target_variables, optimiser, actors, replay, rng, updates, frames };
+        let mut trainer = Self {
+            recipe,
+            scenery,
+            online,
+            target,
+            target_variables,
+            optimiser,
+            actors: Vec::new(),
+            replay,
+            rng,
+            updates: 0,
+            frames: 0,
+        };
+
         trainer.begin_leg(seed);
         trainer
     }
@@ -84,27 +99,33 @@ impl DqnTrainer {
                 sight.metric(&patch).map_or_else(|| Seen::patch(&patch), |metric| Seen::Metric(sight.scaled(metric)))
             })
             .collect();
+
         let mut frames = Frames::default();
         for seen in &seen {
             frames.push(seen);
         }
+
         let encodings = self.online.encode(&frames);
         let count = self.actors.len() as i64;
         for (actor, encoding) in self.actors.iter_mut().zip(floats(&encodings).chunks_exact(sight.width())) {
             actor.remember(encoding);
         }
+
         let device = self.device();
         let gather = |part: fn(&Actor) -> &Vec<f32>| {
             let all: Vec<f32> = self.actors.iter().flat_map(|actor| part(actor).iter().copied()).collect();
             Tensor::from_slice(&all).view([count, -1]).to_device(device)
         };
+
         let values = self.online.network.values(&gather(|actor| &actor.history), &gather(|actor| &actor.focal_powers));
+
         let epsilon = self.recipe.epsilon(self.frames);
         for (index, values) in floats(&values).chunks_exact(ACTIONS).enumerate() {
             let explore = self.rng.random_bool(epsilon);
             let action = if explore { self.rng.random_range(0..ACTIONS) } else { best_action(values) };
             self.finish_frame(index, &seen[index], action);
         }
+
         self.frames += self.actors.len() as u64;
     }
 
@@ -115,10 +136,13 @@ impl DqnTrainer {
         if actor.environment.wanders {
             target = lead_astray(target, &mut self.rng);
         }
+
         actor.environment.advance(target);
         let next_optimum = actor.environment.optimum().get() as f32;
-        let (focal_power, age) = (stood.get() as f32, actor.age);
+        let focal_power = stood.get() as f32;
+        let age = actor.age;
         self.replay.push(index, seen, Transition { focal_power, next_optimum, action: action as u8, age });
+
         actor.age += 1;
         actor.frames_left -= 1;
         if actor.frames_left == 0 {
@@ -128,7 +152,8 @@ impl DqnTrainer {
 
     fn batch(&mut self) -> Batch {
         let length = self.recipe.window;
-        let (mut frames, mut transitions) = (Frames::default(), Vec::new());
+        let mut frames = Frames::default();
+        let mut transitions = Vec::new();
         let mut left = self.recipe.windows;
         while left > 0 {
             if let Some(window) = self.replay.draw(length, &mut self.rng) {
@@ -136,17 +161,20 @@ impl DqnTrainer {
                 left -= 1;
             }
         }
+
         Batch::new(frames, transitions, length, self.device())
     }
 
-    /// What the values of the batch's states, which are `values` (`[S, 3]`, row by row), should be.
+    /// The targets of the batch's states, whose present values are `values` (`[S, 3]`, row by row).
     fn targets(&self, batch: &Batch, values: &[f32]) -> Targets {
         match self.recipe.target {
             Target::Lookahead { restless, turning } => lookahead(batch, Bonus { restless, turning }),
             Target::Bellman { discount, steps, double, regret } => {
                 let encodings = tch::no_grad(|| self.target.encode(&batch.frames));
                 let later = floats(&self.target.pass(batch, &encodings).values);
-                let (later, pickers) = (later.as_chunks::<ACTIONS>().0, values.as_chunks::<ACTIONS>().0);
+                let later = later.as_chunks::<ACTIONS>().0;
+                let pickers = values.as_chunks::<ACTIONS>().0;
+
                 let next = |(row, values): (usize, &[f32; ACTIONS])| {
                     values[best_action(if double { &pickers[row] } else { values })]
                 };
@@ -168,6 +196,7 @@ impl Trainer for DqnTrainer {
 
     fn begin_leg(&mut self, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
+
         let mut draw = |_| {
             let mut actor = Actor::draw(&self.recipe, &self.scenery, &mut self.rng);
             // Scans end one after another, not all at once.
@@ -182,18 +211,22 @@ impl Trainer for DqnTrainer {
         while self.frames < goal {
             tch::no_grad(|| self.play_a_frame());
         }
+
         let batch = self.batch();
         let encodings = self.online.encode(&batch.frames);
         let pass = self.online.pass(&batch, &encodings);
         let values = floats(&pass.values);
+
         let (loss, grad_output) = smooth_l1(&values, &self.targets(&batch, &values));
         let grad_output = Tensor::from_slice(&grad_output).view_as(&pass.values).to_device(self.device());
         let gradient = self.online.gradient(self.optimiser.flat(), &batch, &encodings, pass, &grad_output);
+
         let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.descend(gradient, self.recipe.clip, rate);
         if matches!(self.recipe.target, Target::Bellman { .. }) {
             self.target_variables.approach(self.optimiser.flat(), self.recipe.target_share);
         }
+
         self.updates += 1;
         loss
     }

@@ -1,4 +1,5 @@
-//! Replay memory: the latest frames of every actor, patches as bytes, from which windows of consecutive frames are drawn.
+//! Replay memory: the latest frames of every actor, patches as bytes, from which windows of
+//! consecutive frames are drawn.
 
 use rand::{Rng, RngExt};
 
@@ -82,8 +83,8 @@ pub struct Window {
 }
 
 impl Ring {
-    /// Makes room for `more` frames like those held: growing bit by bit would hold all twice at times. What is never filled
-    /// costs no memory.
+    /// Makes room for `more` frames like those held: growing bit by bit would hold all of them twice
+    /// at times. Room that is never filled costs no memory.
     fn reserve(&mut self, more: usize) {
         self.transitions.reserve_exact(more);
         if self.metrics.is_empty() {
@@ -128,6 +129,7 @@ impl Replay {
             }
             return;
         }
+
         let at = ring.head;
         ring.transitions[at] = transition;
         match seen {
@@ -137,11 +139,13 @@ impl Replay {
         ring.head = (at + 1) % capacity;
     }
 
-    /// Adds all frames to a checkpoint: patches as they lie in memory, since a copy of them would take as much again.
+    /// Adds all frames to a checkpoint. Patches are borrowed, since a copy would take as much memory
+    /// again.
     pub fn save<'a>(&'a self, checkpoint: &mut Checkpoint<'a>) {
         for (index, ring) in self.actors.iter().enumerate() {
             let name = |part: &str| format!("replay.{index}.{part}");
             let transitions = || ring.transitions.iter();
+
             checkpoint.put_floats(&name("focal_power"), transitions().map(|transition| transition.focal_power));
             checkpoint.put_floats(&name("next_optimum"), transitions().map(|transition| transition.next_optimum));
             checkpoint
@@ -156,7 +160,7 @@ impl Replay {
         }
     }
 
-    /// Takes back what [`Replay::save`] added, patches out of the checkpoint.
+    /// Restores what [`Replay::save`] added; patches are moved out of the checkpoint.
     ///
     /// # Errors
     /// When the checkpoint is damaged or of another training.
@@ -168,11 +172,15 @@ impl Replay {
             let optima = checkpoint.floats(&name("next_optimum"))?;
             let patches = checkpoint.take_bytes(&name("patches"))?;
             let metrics = checkpoint.floats(&name("metrics"))?;
-            // Of a actor that had not wrapped, and in checkpoints older than the note: the oldest is the first.
+
+            // The oldest frame is the first where the ring had not wrapped, and in checkpoints
+            // older than this note.
             let head =
                 if checkpoint.notes.contains_key(&name("head")) { checkpoint.number(&name("head"))? } else { 0 };
-            let (actions, ages) = (checkpoint.bytes(&name("action"))?, checkpoint.bytes(&name("age"))?);
+            let actions = checkpoint.bytes(&name("action"))?;
+            let ages = checkpoint.bytes(&name("age"))?;
             let ages = ages.as_chunks::<2>().0;
+
             let count = focal_powers.len();
             let seen =
                 [patches.len(), metrics.len()] == [count * PIXELS, 0] || [patches.len(), metrics.len()] == [0, count];
@@ -181,6 +189,7 @@ impl Replay {
             if !(seen && known && fits && actions.iter().all(|&action| usize::from(action) < ACTIONS)) {
                 return Err(checkpoint.damaged(format!("frames of actor {index} are missing")));
             }
+
             let transitions = focal_powers.into_iter().zip(optima).zip(actions.iter().zip(ages)).map(
                 |((focal_power, next_optimum), (&action, &age))| Transition {
                     focal_power,
@@ -189,6 +198,7 @@ impl Replay {
                     age: u16::from_le_bytes(age),
                 },
             );
+
             *ring = Ring { transitions: transitions.collect(), patches, metrics, head };
             if count > 0 {
                 ring.reserve(capacity - count);
@@ -230,11 +240,13 @@ mod tests {
             replay.push(0, &Seen::Metric(f32::from(time)), Transition { age: time, ..Transition::default() });
         }
         assert_eq!(replay.len(), 10);
+
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let mut oldest = u16::MAX;
         for _ in 0..200 {
             let Some(window) = replay.draw(4, &mut rng) else { continue };
-            let (mut frames, mut transitions) = (Frames::default(), Vec::new());
+            let mut frames = Frames::default();
+            let mut transitions = Vec::new();
             replay.read(window, 4, &mut frames, &mut transitions);
             assert!(transitions.windows(2).all(|pair| pair[1].age == pair[0].age + 1));
             let mut pairs = transitions.iter().zip(&frames.metrics);
@@ -243,13 +255,15 @@ mod tests {
         }
         assert_eq!(oldest, 27);
     }
-    /// Eleven frames a actor, so that rings of ten have wrapped; and what a replay memory restored from it holds.
+
+    /// A replay memory whose first ring has wrapped, and the folder of its checkpoint.
     fn saved(seen: impl Fn(u16) -> Seen) -> (Replay, tempfile::TempDir) {
         let mut replay = Replay::new(20, 2);
         for time in 0..13u16 {
             replay.push(0, &seen(time), Transition { age: time, ..Transition::default() });
         }
         replay.push(1, &seen(40), Transition { age: 40, ..Transition::default() });
+
         let folder = tempfile::tempdir().unwrap();
         let mut checkpoint = Checkpoint::default();
         replay.save(&mut checkpoint);
@@ -266,14 +280,17 @@ mod tests {
                 if patches { Seen::Patch(vec![time as u8; PIXELS].into()) } else { Seen::Metric(f32::from(time)) }
             };
             let (mut replay, folder) = saved(seen);
+
             let mut back = Replay::new(20, 2);
             back.restore(&mut Checkpoint::read(&folder.path().join("a")).unwrap()).unwrap();
+
             for time in 50..53 {
                 for memory in [&mut replay, &mut back] {
                     memory.push(1, &seen(time), Transition { age: time, ..Transition::default() });
                     memory.push(0, &seen(time), Transition { age: time, ..Transition::default() });
                 }
             }
+
             for (one, other) in replay.actors.iter().zip(&back.actors) {
                 assert_eq!((&one.transitions, one.head), (&other.transitions, other.head));
                 assert!(one.patches == other.patches && one.metrics == other.metrics);
@@ -283,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_memory_is_told() {
+    fn a_damaged_memory_is_rejected() {
         let (_replay, folder) = saved(|_| Seen::Patch(vec![1; PIXELS].into()));
         let path = folder.path().join("a");
         let damage: [fn(&mut Checkpoint<'_>); 4] = [

@@ -17,7 +17,7 @@ use dqn::DqnRecipe;
 /// Updates between two moments at which a training may stop. All scans begin anew at each, so that none need be saved.
 pub const LEG: u64 = 100;
 
-/// All that a training is made by, besides its seed and its footage.
+/// Every choice of a training except its seed and its footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
@@ -58,8 +58,8 @@ const fn whole_benchmark() -> usize {
     COUNT
 }
 
-/// The recipes that ship: ours by the policy's name, what comes after it with `-refined` or `-relief` behind it, the paper's
-/// with `-paper`.
+/// The recipes that ship: ours under the policy's name, those that train it further with `-refined`
+/// or `-relief` appended, the paper's with `-paper`.
 const SHIPPED: [(&str, &str); 10] = [
     ("mgm-learned", include_str!("../../../policies/mgm-learned.toml")),
     ("mlr-learned", include_str!("../../../policies/mlr-learned.toml")),
@@ -96,7 +96,7 @@ impl Recipe {
     /// What the policy is made of.
     ///
     /// # Errors
-    /// When it is none that is learned, or the recipe's section is another's.
+    /// When it is not a learned policy, or the recipe's section is another policy's.
     pub fn design(&self) -> Result<Design, TrainError> {
         let unknown = || {
             TrainError::Recipe(format!(
@@ -104,11 +104,14 @@ impl Recipe {
                 self.policy
             ))
         };
+
         let design = design(&self.policy).ok_or_else(unknown)?;
+
         let fits = match design {
             Design::Values(_) => self.dqn.is_some(),
             Design::Belief => self.belief.is_some(),
         };
+
         if fits {
             Ok(design)
         } else {
@@ -137,6 +140,7 @@ impl Recipe {
 
 fn difference(section: &str, one: &toml::Table, other: &toml::Table) -> Option<(String, String, String)> {
     let nothing = || "not given".to_owned();
+
     one.keys().chain(other.keys()).find_map(|key| {
         let name = format!("{section}{key}");
         match (one.get(key), other.get(key)) {
@@ -167,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_is_told_with_its_line() {
+    fn an_unknown_key_is_reported_with_its_line() {
         let text = shipped("parfocal").unwrap().replace("clip = 1.0", "clipp = 1.0");
         let error = Recipe::parse(&text).unwrap_err();
         assert!(error.starts_with("line ") && error.contains("clipp") && !error.contains('\n'), "{error}");
@@ -179,6 +183,7 @@ mod tests {
     fn two_recipes_differ_in_a_key() {
         let one = Recipe::parse(shipped("mgm-learned").unwrap()).unwrap();
         assert_eq!(one.difference(&one), None);
+
         let other = one.clone().with_updates(7);
         let (key, one, other) = one.difference(&other).unwrap();
         assert_eq!([key, one, other], ["dqn.updates", "24000", "7"]);

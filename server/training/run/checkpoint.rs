@@ -1,5 +1,5 @@
-//! Checkpoints: everything a training needs to go on exactly as if it had never stopped, in one safetensors file that is
-//! replaced whole or not at all.
+//! Checkpoints: everything a training needs to continue exactly as if it had never stopped, in one
+//! safetensors file that is replaced whole or not at all.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
@@ -62,7 +62,7 @@ impl<'a> Checkpoint<'a> {
         self.arrays.insert(name.to_owned(), (Dtype::U8, bytes.into()));
     }
 
-    /// Adds a tensor's values; its shape is known to whoever takes it back.
+    /// Adds a tensor's values, without its shape, which the reader knows.
     pub fn put_tensor(&mut self, name: &str, tensor: &Tensor) {
         self.put_floats(name, floats(tensor));
     }
@@ -128,7 +128,7 @@ impl<'a> Checkpoint<'a> {
     /// A number among the notes.
     ///
     /// # Errors
-    /// When it is missing or no number.
+    /// When it is missing or not a number.
     pub fn number<N: std::str::FromStr>(&self, name: &str) -> Result<N, CheckpointError> {
         let text = self.notes.get(name).and_then(|text| text.parse().ok());
         text.ok_or_else(|| self.damaged(format!("'{name}' is missing")))
@@ -140,7 +140,8 @@ impl<'a> Checkpoint<'a> {
         CheckpointError::Damaged { path: self.path.clone(), reason: reason.into() }
     }
 
-    /// Writes to `path` by way of a file beside it, so that what lies there is always whole; array by array, without a copy.
+    /// Writes a file beside `path` and moves it into place, so that a reader always finds a whole
+    /// one. The arrays are written one by one, without a copy.
     ///
     /// # Errors
     /// When the disk is full or the folder cannot be written.
@@ -148,6 +149,7 @@ impl<'a> Checkpoint<'a> {
         // Larger types first, as safetensors' own writer has it: each array is aligned.
         let mut arrays: Vec<_> = self.arrays.iter().collect();
         arrays.sort_by_key(|(_, (kind, _))| std::cmp::Reverse(kind.bitsize()));
+
         let mut end = 0;
         let info = |&(name, (kind, bytes)): &(&String, &(Dtype, Cow<[u8]>))| {
             let begin = end;
@@ -155,12 +157,15 @@ impl<'a> Checkpoint<'a> {
             let shape = vec![8 * bytes.len() / kind.bitsize()];
             (name.clone(), TensorInfo { dtype: *kind, shape, data_offsets: (begin, end) })
         };
+
         let infos = arrays.iter().map(info).collect();
         let notes: HashMap<String, String> = self.notes.clone().into_iter().collect();
+
         // A header of no notes is not written as JSON (safetensors 0.8.0).
         let header = Metadata::new((!notes.is_empty()).then_some(notes), infos).map_err(io::Error::other)?;
         let mut header = serde_json::to_vec(&header)?;
         header.resize(header.len().next_multiple_of(8), b' ');
+
         files::replace_with(path, |writer| {
             writer.write_all(&(header.len() as u64).to_le_bytes())?;
             writer.write_all(&header)?;
@@ -193,22 +198,27 @@ impl Checkpoint<'static> {
             io::ErrorKind::UnexpectedEof => damaged("it is cut short".to_owned()),
             _ => failed(error),
         };
+
         let file = File::open(path).map_err(failed)?;
         let size = file.metadata().map_err(failed)?.len();
         let mut file = BufReader::new(file);
+
         let mut length = [0; 8];
         file.read_exact(&mut length).map_err(cut)?;
         let length = u64::from_le_bytes(length);
         if length > MAX_HEADER.min(size) {
             return Err(damaged("it is not a safetensors file".to_owned()));
         }
+
         let mut header = Vec::new();
         file.by_ref().take(length).read_to_end(&mut header).map_err(failed)?;
         let header: Metadata = serde_json::from_slice(&header).map_err(|error| damaged(error.to_string()))?;
+
         let data = header.data_len() as u64;
         if size.checked_sub(8 + length) != Some(data) {
             return Err(damaged("it is cut short or has something behind it".to_owned()));
         }
+
         let mut arrays = BTreeMap::new();
         for name in header.offset_keys().into_iter().filter(|_| with_arrays) {
             let Some(info) = header.info(&name) else { continue };
@@ -216,6 +226,7 @@ impl Checkpoint<'static> {
             file.read_exact(&mut bytes).map_err(cut)?;
             arrays.insert(name, (info.dtype, bytes.into()));
         }
+
         let notes = header.metadata().clone().unwrap_or_default().into_iter().collect();
         Ok(Self { arrays, notes, path: path.to_owned() })
     }
@@ -230,20 +241,25 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.safetensors");
         let patches = vec![7u8; 13];
+
         let mut checkpoint = Checkpoint::default();
         checkpoint.put_bytes("a", &patches);
         checkpoint.put_floats("b", [0.5, -2.0]);
         checkpoint.notes.insert("updates".to_owned(), "3".to_owned());
         checkpoint.write(&path).unwrap();
+
         let bytes = std::fs::read(&path).unwrap();
         let seen = safetensors::SafeTensors::deserialize(&bytes).unwrap();
         assert_eq!(seen.tensor("a").unwrap().data(), patches);
         assert_eq!(seen.tensor("b").unwrap().shape(), [2]);
+
         let mut back = Checkpoint::read(&path).unwrap();
         assert_eq!((back.take_bytes("a").unwrap(), back.floats("b").unwrap()), (patches, vec![0.5, -2.0]));
         assert_eq!(back.number::<u64>("updates").unwrap(), 3);
+
         let notes = Checkpoint::read_notes(&path).unwrap();
         assert_eq!((notes.number::<u64>("updates").unwrap(), notes.floats("b").is_err()), (3, true));
+
         // Anyone may read it who may read the rest of the run folder.
         let mode =
             |path: &Path| std::os::unix::fs::PermissionsExt::mode(&std::fs::metadata(path).unwrap().permissions());
@@ -252,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_told_with_the_file() {
+    fn damage_is_reported_with_the_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.safetensors");
         let mut checkpoint = Checkpoint::default();
@@ -273,6 +289,7 @@ mod tests {
                 assert!(error.contains("a.safetensors is damaged"), "{error}");
             }
         }
+
         let error = checkpoint.floats("c").unwrap_err().to_string();
         assert!(error.contains("'c' is missing"), "{error}");
     }

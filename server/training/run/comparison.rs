@@ -1,4 +1,4 @@
-//! Trainings side by side: what their run folders say, for sweeps of recipes and seeds.
+//! Compares trainings by what their run folders hold, for sweeps of recipes and seeds.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -44,7 +44,7 @@ impl BenchmarkFigures {
     }
 }
 
-/// What a run folder says of its training.
+/// A training as its run folder describes it.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrainedRun {
     /// The folder.
@@ -63,7 +63,7 @@ pub struct TrainedRun {
     pub benchmark: Option<BenchmarkFigures>,
 }
 
-/// Why a run folder cannot be looked at.
+/// Why a run folder cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// It holds no training.
@@ -92,12 +92,16 @@ impl TrainedRun {
         if !file.is_file() {
             return Err(CompareError::NoRun(folder.to_owned()));
         }
+
         let checkpoint = Checkpoint::read_notes(&file)?;
+
         let note = |name: &str| checkpoint.notes.get(name).map_or("", String::as_str);
         let recipe =
             Recipe::parse(note("recipe")).map_err(|error| checkpoint.damaged(format!("its recipe: {error}")))?;
+
         let best: f64 = checkpoint.number("best")?;
         let curve = curves::parse(note("curve"));
+
         Ok(Self {
             run: folder.to_owned(),
             seed: checkpoint.number("seed")?,
@@ -130,13 +134,14 @@ fn flat(recipe: &Recipe) -> BTreeMap<String, toml::Value> {
             }
         }
     }
+
     let mut values = BTreeMap::new();
     gather("", toml::Table::try_from(recipe).unwrap_or_default(), &mut values);
     values
 }
 
-/// `runs` as a Markdown table, with a column for each value in which their recipes differ; the best validation first, those
-/// without one last.
+/// `runs` as a Markdown table, with a column for each value in which their recipes differ. The best
+/// validation comes first, runs without one last.
 #[must_use]
 pub fn markdown(runs: &[TrainedRun]) -> String {
     let mut runs: Vec<&TrainedRun> = runs.iter().collect();
@@ -150,7 +155,9 @@ pub fn markdown(runs: &[TrainedRun]) -> String {
     let mut heads = vec!["run", POLICY];
     heads.extend(differing.iter().map(|key| key.as_str()));
     heads.extend(["seed", "updates", "best validation", "benchmark: MAE ± sd", "in focus"]);
+
     let mut text = format!("| {} |\n|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
+
     for run in runs {
         let value = |key: &str| run.recipe.get(key).map_or_else(|| "–".to_owned(), plain);
         let mut cells = vec![run.run.display().to_string(), value(POLICY)];
@@ -158,11 +165,14 @@ pub fn markdown(runs: &[TrainedRun]) -> String {
         cells.push(run.seed.to_string());
         cells.push(if run.updates < run.of { format!("{} of {}", run.updates, run.of) } else { run.of.to_string() });
         cells.push(run.best_validation.map_or_else(|| "–".to_owned(), |mae| format!("{mae:.4}")));
+
         let benchmark = run.benchmark.as_ref();
         cells.push(benchmark.map_or_else(|| "–".to_owned(), |b| format!("{:.4} ± {:.4}", b.mae, b.sd)));
         cells.push(benchmark.map_or_else(|| "–".to_owned(), |b| format!("{:.1} %", 100.0 * b.in_focus)));
+
         let _ = writeln!(text, "| {} |", cells.join(" | "));
     }
+
     text
 }
 
@@ -197,6 +207,7 @@ mod tests {
                 }),
             }
         };
+
         let text = markdown(&[run("a", 300, 1, None), run("b", 300, 2, Some(0.2)), run("c", 100, 3, Some(0.1))]);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(

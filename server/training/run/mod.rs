@@ -1,5 +1,5 @@
-//! One training from beginning to end: legs of updates, validations, checkpoints, and the best weights so far, in a run
-//! folder.
+//! One training from beginning to end, in a run folder: legs of updates, validations, checkpoints,
+//! and the best weights so far.
 
 mod begin;
 pub mod checkpoint;
@@ -41,7 +41,7 @@ const RECIPE: &str = "recipe.toml";
 const CARD: &str = "MODEL_CARD.md";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What a caller is told after each leg.
+/// Progress of a training, reported after each leg.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
     /// Updates done.
@@ -71,11 +71,13 @@ pub struct Run {
 }
 
 impl Run {
-    /// A training by `recipe` in `folder`, new or empty, on `footage`, or on drawn pictures where there is none, from the
-    /// weights in the file `from` (safetensors) on, or from random ones, with its networks on `device`.
+    /// A new training by `recipe` in `folder`, which is new or empty. It trains on `footage`, or on
+    /// drawn pictures if there is none, from the weights in the file `from` (safetensors), or from
+    /// random ones, with its networks on `device`.
     ///
     /// # Errors
-    /// When the recipe fits no policy, the folder cannot be written, or what it should begin with cannot be used.
+    /// When the recipe fits no policy, the folder cannot be written, or the weights or footage
+    /// cannot be used.
     pub fn begin(
         recipe: Recipe,
         seed: u64,
@@ -84,38 +86,45 @@ impl Run {
         from: Option<&Path>,
         device: Device,
     ) -> Result<Self, TrainError> {
-        // Drawing pictures takes a while: all that can be wrong is looked at before.
+        // Drawing pictures takes a while: check first all that can be wrong.
         let design = recipe.design()?;
         let weights = from.map(|file| beginning(design, file)).transpose()?;
         let folder = RunFolder::begin(folder)?;
+
         let material = Material::open(footage, recipe.pictures)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
+
         if let (Some(bytes), Some(file)) = (weights, from) {
             run.trainer.begin_from(&bytes).map_err(|error| unfit(file, &error))?;
             run.origin = Some(file.display().to_string());
         }
+
         run.folder.write(RECIPE, run.recipe_text().as_bytes())?;
         Ok(run)
     }
 
-    /// The training in `folder` from its checkpoint on, which must be the one of `request`.
+    /// Resumes the training in `folder` from its checkpoint; it must match `request`.
     ///
     /// # Errors
-    /// When there is no checkpoint, it is damaged or of another training, or its footage is no more.
+    /// When there is no checkpoint, it is damaged or of another training, or its footage is gone.
     pub fn resume(folder: &Path, request: &ResumeRequest, device: Device) -> Result<Self, TrainError> {
         let (folder, mut checkpoint) = RunFolder::go_on(folder)?;
         let text = checkpoint.notes.get("recipe").map_or("", String::as_str);
         let recipe = Recipe::parse(text).map_err(|error| checkpoint.damaged(format!("its recipe: {error}")))?;
+
         let seed = checkpoint.number("seed")?;
         request.check(folder.path(), &recipe, seed)?;
+
         let design = recipe.design()?;
         let material = Material::again(&checkpoint, &request.footage, recipe.pictures)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
+
         let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
         run.other_version = (version != VERSION).then(|| version.to_owned());
         run.best = checkpoint.number("best")?;
         run.origin = checkpoint.notes.get("origin").cloned();
         run.curve = curves::parse(checkpoint.notes.get("curve").map_or("", String::as_str));
+
         run.trainer.restore(&mut checkpoint)?;
         Ok(run)
     }
@@ -130,8 +139,20 @@ impl Run {
     ) -> Result<Self, TrainError> {
         let validation = validation(&recipe)?;
         let trainer = trainer(design, &recipe, material.scenery(&recipe)?, seed, device)?;
-        let (curve, best, other_version, origin) = (Vec::new(), f64::INFINITY, None, None);
-        Ok(Self { recipe, design, seed, folder, trainer, validation, curve, best, other_version, material, origin })
+
+        Ok(Self {
+            recipe,
+            design,
+            seed,
+            folder,
+            trainer,
+            validation,
+            curve: Vec::new(),
+            best: f64::INFINITY,
+            other_version: None,
+            material,
+            origin: None,
+        })
     }
 
     /// What it is made by.
@@ -152,8 +173,8 @@ impl Run {
         self.best
     }
 
-    /// The version of parfocal that made the checkpoint this training goes on from, where it is not this one: what follows
-    /// may differ from what would have followed there.
+    /// The version of parfocal that made the checkpoint this training resumes from, if it is not
+    /// this one: the result may differ from that version's.
     #[must_use]
     pub fn other_version(&self) -> Option<&str> {
         self.other_version.as_deref()
@@ -174,21 +195,26 @@ impl Run {
         let file = |source| TrainError::writing(&folder, source);
         let mut events = EventFile::create(&folder, clock, self.updates()).map_err(file)?;
         let end = self.recipe.updates();
+
         while self.updates() < end && !stop() {
             let loss = self.leg(end);
             let updates = self.updates();
             events.scalar(clock, updates, "loss", loss as f32).map_err(file)?;
+
             let due = updates.is_multiple_of(self.recipe.validate_every) || updates >= end;
             let validation = if due { Some(self.validate()?) } else { None };
             if let Some(mae) = validation {
                 events.scalar(clock, updates, "validation/mae", mae as f32).map_err(file)?;
             }
+
             self.curve.push((updates, loss, validation));
             if due {
                 self.save()?;
             }
+
             tell(&Progress { updates, loss, epsilon: self.trainer.epsilon(), validation });
         }
+
         let complete = self.updates() >= end;
         if !complete {
             self.save()?;
@@ -199,10 +225,13 @@ impl Run {
     /// One leg: as many updates as lie before the next multiple of [`LEG`], on scans that begin anew.
     fn leg(&mut self, end: u64) -> f64 {
         let goal = (self.updates() / LEG + 1).saturating_mul(LEG).min(end);
+
         // A stream of its own for each leg: what follows depends on the seed and on how far the training is, no more.
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(self.updates());
         self.trainer.begin_leg(seed);
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut count = 0.0;
+
         while self.updates() < goal {
             sum += self.trainer.update();
             count += 1.0;
@@ -221,6 +250,7 @@ impl Run {
     fn validate(&mut self) -> Result<f64, TrainError> {
         let bytes = self.weights()?;
         let row = self.figures(bytes.clone(), &self.validation)?;
+
         if row.mae < self.best {
             self.best = row.mae;
             self.folder.write(&self.weights_file(), &bytes)?;
@@ -233,6 +263,7 @@ impl Run {
             };
             self.folder.write(CARD, model_card::validated(&made, &row, self.validation.count).as_bytes())?;
         }
+
         Ok(row.mae)
     }
 
@@ -245,15 +276,19 @@ impl Run {
         if count == 0 || !self.best.is_finite() {
             return Ok(());
         }
+
         let card = String::from_utf8_lossy(&self.folder.read(CARD)?).into_owned();
         if model_card::is_benchmarked(&card) {
             return Ok(());
         }
+
         let weights = beginning(self.design, &self.folder.path().join(self.weights_file()))?;
         let benchmark = Benchmark::reference(count).map_err(|error| TrainError::Recipe(error.to_string()))?;
         let row = self.figures(weights, &benchmark)?;
+
         let figures = serde_json::to_vec_pretty(&BenchmarkFigures::new(&row, count)).unwrap_or_default();
         self.folder.write(BENCHMARK, &figures)?;
+
         // Last: a card with these figures says that all is done.
         self.folder.write(CARD, model_card::benchmarked(&card, &row, count).as_bytes())
     }
@@ -263,10 +298,12 @@ impl Run {
         let diverged = |error: &dyn std::fmt::Display| TrainError::Diverged(error.to_string());
         let design = self.design;
         shipped::build(design, &bytes).map_err(|error| diverged(&error))?;
+
         let name = PolicyName::new(&self.recipe.policy);
         let registry = Registry::default().with(name.as_str(), "in training", move || {
             shipped::build(design, &bytes).unwrap_or_else(|_| Box::new(crate::autofocus::Fixed::default()))
         });
+
         let outcomes = evaluate(&registry, &[name], scans, &|_| ()).map_err(|error| diverged(&error))?;
         outcomes.last().map(Outcome::row).ok_or_else(|| diverged(&"nothing was evaluated"))
     }
@@ -282,6 +319,7 @@ impl Run {
     fn save(&self) -> Result<(), TrainError> {
         let mut checkpoint = Checkpoint::default();
         self.trainer.save(&mut checkpoint);
+
         let mut note = |name: &str, value: String| checkpoint.notes.insert(name.to_owned(), value);
         note("version", VERSION.to_owned());
         note("recipe", self.recipe_text());
@@ -290,25 +328,30 @@ impl Run {
         if let Some(origin) = &self.origin {
             note("origin", origin.clone());
         }
+
         let points = curves::text(&self.curve);
         self.folder.write("curves.csv", format!("updates,loss,validation_mae\n{points}\n").as_bytes())?;
         self.folder.write("curves.svg", curves::svg(&self.curve).as_bytes())?;
+
         note("curve", points);
         self.material.note(&mut checkpoint);
         self.folder.save(&checkpoint)
     }
 }
 
-/// The scans that the best weights are chosen by: as the reference benchmark's and as varied as training's can be over the same pictures;
-/// and, where the recipe trains on relief, as many over scenes with relief.
+/// The scans by which the best weights are chosen: over the same pictures, scans like the reference
+/// benchmark's and scans as varied as training's can be; where the recipe trains on relief, as many
+/// over scenes with relief.
 fn validation(recipe: &Recipe) -> Result<Benchmark, TrainError> {
     let unfit = |error: &dyn std::fmt::Display| TrainError::Recipe(error.to_string());
     let flat = varied(Split::Validation, recipe.pictures.min(60)).map_err(|error| unfit(&error))?;
     let flat: Vec<Scene> = flat.into_iter().map(Scene::Flat).collect();
     let relief = relief::scenes(Split::Validation, recipe.reliefs.min(60)).map_err(|error| unfit(&error))?;
+
     let plain = flat.len();
     let scenes: Vec<Scene> =
         flat.iter().cloned().chain(flat.clone()).chain(relief.into_iter().map(Scene::Stack)).collect();
+
     let count = scenes.len();
     Ok(Benchmark { scenes, conditions: Conditions::VariedFrom(plain), seed: 1, count, frames: FRAMES })
 }
