@@ -1,5 +1,5 @@
-//! The policy `parfocal`: tracks a belief about where the optimum is, goes where the lens is most likely in focus, and looks around
-//! where that is in doubt.
+//! The policy `parfocal`: tracks a belief about where the optimum is, goes where the lens is most
+//! likely in focus, and looks around where that is in doubt.
 
 use std::sync::LazyLock;
 
@@ -16,9 +16,11 @@ use crate::imaging::{Patch, View, WIDER};
 pub const MAX_MOVE: f64 = 0.1;
 /// Moves below this are not worth the eye's attention.
 pub const LEAST_MOVE: f64 = 0.02;
-/// A tracker that believes itself in focus with less than this looks for the optimum: who stands still learns little.
+/// A tracker less sure than this of being in focus looks for the optimum: standing still reveals
+/// little.
 const ASSURANCE: f64 = 0.85;
-/// Focal power a frame that looking takes at least: enough for a change of blur to show, and not out of focus by itself.
+/// Least focal power a frame when looking: enough for a change of blur to show, and not enough to go
+/// out of focus.
 const LOOK: f64 = 0.06;
 /// Focal power that a test of the belief moves the lens by.
 const TEST: f64 = 0.1;
@@ -48,7 +50,8 @@ struct Stand {
 impl Stand {
     /// Share of the smoothed sharpness that each frame brings.
     const FRESH: f32 = 0.3;
-    /// Frames that the lens may stand still though the picture gets worse: a second at the 25 frames a second of scans.
+    /// Frames that the lens may stand still though the picture gets worse: a second at the 25 frames
+    /// a second of scans.
     const PATIENCE: u32 = 25;
     /// How much worse, as a difference of logarithms.
     const LOSS: f32 = 0.15;
@@ -64,7 +67,8 @@ impl Stand {
         self.sharpest = self.sharpest.max(self.sharpness);
     }
 
-    /// Whether the lens has stood still long enough, while the picture got worse, for the belief to be put to the test.
+    /// Whether the lens has stood still long enough, while the picture got worse, for the belief to
+    /// be put to the test.
     fn is_doubtful(&self) -> bool {
         self.frames >= Self::PATIENCE && self.sharpest - self.sharpness > Self::LOSS
     }
@@ -77,7 +81,7 @@ struct Frame {
     focal_power: f32,
 }
 
-/// One patch and what it tells.
+/// One patch and what is measured on it.
 #[derive(Debug, Clone)]
 struct Look {
     patch: Patch,
@@ -91,17 +95,20 @@ impl Look {
         Self { patch: *patch, features: features(patch, &spectrum), spectrum }
     }
 
-    /// Puts the features of this patch, how they differ from those of the patch `before`, and how the blur changed over what both
-    /// show, into `input`; returns the rest of it.
+    /// Puts the features of this patch, how they differ from those of the patch `before`, and how
+    /// the blur changed over what both show, into `input`; returns the rest of it.
     fn describe<'a>(&self, before: &Self, input: &'a mut [f32]) -> &'a mut [f32] {
         let (appearance, rest) = input.split_at_mut(FEATURES);
         appearance.copy_from_slice(&self.features);
+
         let (difference, rest) = rest.split_at_mut(FEATURES);
         for (index, change) in difference.iter_mut().enumerate() {
             *change = 4.0 * (self.features[index] - before.features[index]);
         }
+
         let (registered, rest) = rest.split_at_mut(CHANGES);
         registered.copy_from_slice(&changes((&before.patch, &before.spectrum), (&self.patch, &self.spectrum)));
+
         rest
     }
 }
@@ -121,6 +128,7 @@ impl Trace {
         let look = |patch: &Patch| Look::at(patch);
         let wider = view.wider.each_ref().map(|patch| patch.as_ref().map(look));
         let now = Box::new(Frame { near: look(&view.patch), wider, focal_power });
+
         let before = self.last.as_ref().unwrap_or(&now);
         let moved = self.last.is_none() || (focal_power - before.focal_power).abs() > STILL;
         self.stand.see(now.near.features[SHARPNESS], moved);
@@ -142,18 +150,20 @@ impl Trace {
                 rest[0] = 1.0;
             }
         }
+
         self.last = Some(now);
         input
     }
 
-    /// Where to go from `focal_power` under `belief` (see [`target`]); nowhere while the latest frame shows nothing that focus
-    /// could be told by, such as a glove or glare.
+    /// Where to go from `focal_power` under `belief` (see [`target`]); nowhere while the latest frame
+    /// shows nothing that focus could be told by, such as a glove or glare.
     #[must_use]
     pub fn aim(&self, focal_power: f64, belief: &[f32]) -> f64 {
         let blind = self.last.as_ref().is_some_and(|frame| !frame.shows_detail());
         if blind {
             return focal_power;
         }
+
         let aim = target(focal_power, belief);
         let stands = (aim - focal_power).abs() < f64::from(STILL);
         if stands && self.stand.is_doubtful() { look_aside(focal_power, belief) } else { aim }
@@ -178,8 +188,9 @@ pub fn spread_over_bins(place: f64, bins: &mut [f32]) {
 const FINENESS: usize = 10;
 const PLACES: usize = (BINS - 1) * FINENESS + 1;
 
-/// What it is worth to stand `distance` from the optimum: 1 in focus, 0 out of it, with a soft edge, and less the farther, so
-/// that who does not know where the optimum is goes to the middle of where it may be.
+/// What it is worth to stand `distance` from the optimum: 1 in focus, 0 out of it, with a soft edge.
+/// It falls with distance, so that a tracker that does not know where the optimum is goes to the
+/// middle of where it may be.
 fn worth(distance: f64) -> f64 {
     const SOFTNESS: f64 = 0.04;
     const SLOPE: f64 = 0.3;
@@ -194,8 +205,9 @@ static WORTH: LazyLock<[f32; 2 * PLACES - 1]> = LazyLock::new(|| {
     })
 });
 
-/// The focal power that is worth most in expectation under `belief`, whose bin `i` of [`BINS`] stands for `i / (BINS - 1)`. Beside
-/// the belief's median this turns less often, and is in focus as often or more: where the belief has two peaks, it goes to one.
+/// The focal power that is worth most in expectation under `belief`, whose bin `i` of [`BINS`] stands
+/// for `i / (BINS - 1)`. Compared with the belief's median this turns less often, and is in focus as
+/// often or more: where the belief has two peaks, it goes to one.
 #[must_use]
 pub fn best(belief: &[f32]) -> f64 {
     let mut values = [0.0f32; PLACES];
@@ -205,31 +217,37 @@ pub fn best(belief: &[f32]) -> f64 {
             *value += share * worth;
         }
     }
+
     let top = (0..PLACES).max_by(|&a, &b| values[a].total_cmp(&values[b]));
     top.unwrap_or(PLACES / 2) as f64 / (PLACES - 1) as f64
 }
 
-/// A place [`TEST`] away from `focal_power` to test the belief at: on the side where the optimum is likelier under `belief`, or on the
-/// other where the range ends.
+/// A place [`TEST`] away from `focal_power` to test the belief at: on the side where the optimum is
+/// likelier under `belief`, or on the other where the range ends.
 fn look_aside(focal_power: f64, belief: &[f32]) -> f64 {
-    let (mut below, mut above) = (0.0, 0.0);
+    let mut below = 0.0;
+    let mut above = 0.0;
     for (bin, share) in belief.iter().enumerate() {
         let side = if (bin as f64 / (BINS - 1) as f64) < focal_power { &mut below } else { &mut above };
         *side += f64::from(*share);
     }
+
     let fits = |up: bool| if up { focal_power + TEST <= 1.0 } else { focal_power >= TEST };
     let likelier = above > below;
     let up = if fits(likelier) { likelier } else { !likelier };
     if up { focal_power + TEST } else { focal_power - TEST }
 }
 
-/// Where to go from `focal_power` under `belief` (see [`best`]): to the best place, at most [`MAX_MOVE`] a frame and not for less than
-/// [`LEAST_MOVE`]; or, where the tracker is not assured of being in focus, [`LOOK`] at least, towards the likelier side.
+/// Where to go from `focal_power` under `belief` (see [`best`]): to the best place, at most
+/// [`MAX_MOVE`] a frame and not for less than [`LEAST_MOVE`]; or, where the tracker is not assured of
+/// being in focus, [`LOOK`] at least, towards the likelier side.
 #[must_use]
 fn target(focal_power: f64, belief: &[f32]) -> f64 {
     let step = (best(belief) - focal_power).clamp(-MAX_MOVE, MAX_MOVE);
     if step.abs() < LOOK {
-        let (mut below, mut here, mut above) = (0.0, 0.0, 0.0);
+        let mut below = 0.0;
+        let mut here = 0.0;
+        let mut above = 0.0;
         for (bin, share) in belief.iter().enumerate() {
             let distance = bin as f64 / (BINS - 1) as f64 - focal_power;
             let side = if distance.abs() < IN_FOCUS {
@@ -241,6 +259,7 @@ fn target(focal_power: f64, belief: &[f32]) -> f64 {
             };
             *side += f64::from(*share);
         }
+
         if here < ASSURANCE {
             let look = if above > below { LOOK } else { -LOOK };
             return (focal_power + look).clamp(0.0, 1.0);
@@ -249,8 +268,9 @@ fn target(focal_power: f64, belief: &[f32]) -> f64 {
     if step.abs() < LEAST_MOVE { focal_power } else { focal_power + step }
 }
 
-/// Fills `store`, which holds a belief network, from safetensors `bytes`. Weights of a network that saw the patch alone are taken too:
-/// what is seen of wider patches then counts for nothing, and the network computes what it computed before.
+/// Fills `store`, which holds a belief network, from safetensors `bytes`. Also takes weights of a
+/// network that saw the patch alone: what is seen of wider patches then counts for nothing, and the
+/// network computes what it computed before.
 ///
 /// # Errors
 /// When the bytes are damaged or another network's.
@@ -283,8 +303,10 @@ impl BeliefTracker {
     fn believe(&mut self, seen: &Observation<'_>) -> Vec<f32> {
         let input = self.trace.input(seen.view, seen.focal_power.get());
         let input = Tensor::from_slice(&input).view([1, 1, BELIEF_INPUT as i64]);
+
         let (logits, memory) = tch::no_grad(|| self.network.forward(&input, &self.memory));
         self.memory = memory;
+
         let mut belief = vec![0.0; BINS];
         logits.view([-1]).softmax(0, Kind::Float).copy_data(&mut belief, BINS);
         belief

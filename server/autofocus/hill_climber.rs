@@ -32,9 +32,11 @@ impl Policy for HillClimber {
         let metric = (self.metric)(&seen.view.patch);
         let focal_power = seen.focal_power.get();
         let inside = focal_power > ON_BOUND && focal_power < 1.0 - ON_BOUND;
+
         if !(inside && metric > self.last_metric) {
             self.direction = -self.direction;
         }
+
         self.last_metric = metric;
         let target = seen.focal_power.moved(self.direction * STEP).get();
         Decision { target, metric: Some(metric), belief: None }

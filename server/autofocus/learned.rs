@@ -123,6 +123,7 @@ impl Learned {
         if let Some(metric) = metric {
             return vec![self.network.sight.scaled(metric)];
         }
+
         let encoding = self.network.encode(&Tensor::from_slice(&patch.0).view([1, -1]));
         let mut values = vec![0.0; ENCODING];
         encoding.view([-1]).copy_data(&mut values, ENCODING);
@@ -135,6 +136,7 @@ impl Learned {
             self.encodings.push_back(encoding.to_vec());
             self.focal_powers.push_back(focal_power);
         }
+
         while self.encodings.len() > HISTORY {
             self.encodings.pop_front();
             self.focal_powers.pop_front();
@@ -148,11 +150,14 @@ impl Policy for Learned {
             let metric = self.network.sight.metric(&seen.view.patch);
             let encoding = self.encode(&seen.view.patch, metric);
             self.remember(&encoding, scaled_focal_power(seen.focal_power.get()));
+
             let encodings: Vec<f32> = self.encodings.iter().flatten().copied().collect();
             let focal_powers: Vec<f32> = self.focal_powers.iter().copied().collect();
+
             let row = |values: &[f32]| Tensor::from_slice(values).view([1, -1]);
             let mut values = [0.0f32; ACTIONS];
             self.network.values(&row(&encodings), &row(&focal_powers)).view([-1]).copy_data(&mut values, ACTIONS);
+
             let step = action_step(best_action(&values));
             Decision { target: seen.focal_power.moved(step).get(), metric, belief: None }
         })

@@ -17,8 +17,9 @@ pub const ENCODING: usize = 8;
 pub const BINS: usize = 41;
 /// Units of the belief tracker's memory.
 pub const MEMORY: usize = 192;
-/// What the belief tracker sees of the patch: features, their change, the change over what this frame and the last have in common;
-/// then where the lens stood (softly, one in [`BINS`]), and three numbers on how it moved.
+/// What the belief tracker sees of the patch: features, their change, the change over what this frame
+/// and the last have in common; then where the lens stood (softly, one in [`BINS`]), and three
+/// numbers on how it moved.
 pub const NEAR_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
 /// What it sees of a wider patch: features and changes as of the patch, and whether there is one at all.
 pub const WIDER_INPUT: usize = 2 * FEATURES + CHANGES + 1;
@@ -28,8 +29,9 @@ pub const BELIEF_INPUT: usize = NEAR_INPUT + WIDER.len() * WIDER_INPUT;
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;
 
-/// Keeps libtorch's work for this thread on this thread, also what its matrix libraries would share out: each thread has that
-/// setting of its own, and handing on so little costs more than doing it.
+/// Keeps libtorch's work for this thread on this thread, including what its matrix libraries would
+/// share out. The setting is each thread's own, and handing on so little work costs more than doing
+/// it.
 pub fn compute_on_this_thread() {
     tch::set_num_threads(1);
 }
@@ -80,13 +82,16 @@ impl Encoder {
         let centred = &patches - patches.mean_dim(1, true, Kind::Float);
         // 2 gray levels: what noise alone would give counts as flat.
         let spread = centred.square().mean_dim(1, true, Kind::Float).sqrt() + 2.0;
+
         let mut x = (centred / spread).view([-1, 1, SIDE, SIDE]);
+
         for (index, convolution) in self.convolutions.iter().enumerate() {
             x = convolution.forward_t(&x, false);
             if index < 3 {
                 x = x.relu();
             }
         }
+
         x.view([-1, ENCODING as i64])
     }
 }

@@ -24,7 +24,8 @@ const FARTHEST: isize = 15;
 const FINEST: usize = 10;
 /// Cross-power below which a frequency's phase is mostly that of noise and rounding.
 const FAINT: f32 = 300.0;
-/// Energy a pixel that rounding to whole gray levels gives a second difference: (1 + 4 + 1) / 12; as much again for noise.
+/// Energy a pixel that rounding to whole gray levels gives a second difference: (1 + 4 + 1) / 12; as
+/// much again for noise.
 const FLOOR: f32 = 1.0;
 
 type Square = [[f32; PATCH_SIDE]; PATCH_SIDE];

@@ -1,8 +1,9 @@
 //! Policies from elsewhere, as TorchScript files: `file:PATH` in the place of a policy's name.
 //!
-//! The module's `forward` takes the latest eight frames, oldest first, as two float tensors: gray patches `[8, 32, 32]` (0..=255)
-//! and the focal powers that they were exposed at, `[8]` (0..=1). It returns the values of the three actions, `[3]`: a step
-//! down, none, a step up. Before eight frames were seen, the first stands for those missing. Each instance has a module of its own, in
+//! The module's `forward` takes the latest eight frames, oldest first, as two float tensors: gray
+//! patches `[8, 32, 32]` (0..=255) and the focal powers that they were exposed at, `[8]` (0..=1). It
+//! returns the values of the three actions, `[3]`: a step down, none, a step up. Before eight frames
+//! were seen, the first stands for those missing. Each instance has a module of its own, in
 //! evaluation mode.
 
 use std::collections::VecDeque;
@@ -21,12 +22,13 @@ use crate::imaging::PATCH_SIDE;
 pub const PREFIX: &str = "file:";
 const SIDE: i64 = PATCH_SIDE as i64;
 
-/// `registry` with the policy that `name` stands for, if it is a file's; a file that is no such policy is listed with the reason and
-/// not available.
+/// Adds the policy that `name` stands for to `registry`, if it is a file's; a file that is no such
+/// policy is listed as unavailable, with the reason.
 #[must_use]
 pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
     const SUMMARY: &str = "action values from a TorchScript file";
     let Some(path) = name.as_str().strip_prefix(PREFIX) else { return registry };
+
     match load(Path::new(path)) {
         Ok(bytes) => {
             let source = Arc::clone(&bytes);
@@ -47,8 +49,10 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
 fn load(path: &Path) -> Result<Arc<[u8]>, String> {
     let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let module = parse(&bytes).map_err(|reason| format!("{} is not TorchScript: {reason}", path.display()))?;
+
     let textured = |index: usize| f32::from((index * 7919 + index * index * 31) as u8);
     let probes: [&dyn Fn(usize) -> f32; 2] = [&|_| 128.0, &textured];
+
     for probe in probes {
         let patches: Vec<f32> = (0..HISTORY * PATCH_SIDE * PATCH_SIDE).map(probe).collect();
         values(&module, &patches, &[0.5; HISTORY]).map_err(|reason| {
@@ -57,6 +61,7 @@ fn load(path: &Path) -> Result<Arc<[u8]>, String> {
             format!("{} is not a policy: {reason}; it must have {signature}, all float32", path.display())
         })?;
     }
+
     Ok(bytes.into())
 }
 
@@ -70,9 +75,11 @@ fn parse(bytes: &[u8]) -> Result<CModule, String> {
 fn values(module: &CModule, patches: &[f32], focal_powers: &[f32]) -> Result<[f32; ACTIONS], String> {
     let inputs = [Tensor::from_slice(patches).view([-1, SIDE, SIDE]), Tensor::from_slice(focal_powers)];
     let output = tch::no_grad(|| module.forward_ts(&inputs)).map_err(|error| first_line(&error.to_string()))?;
+
     if output.kind() != Kind::Float || output.size() != [ACTIONS as i64] {
         return Err(format!("it returned {:?} of shape {:?}", output.kind(), output.size()));
     }
+
     let mut values = [0.0f32; ACTIONS];
     output.copy_data(&mut values, ACTIONS);
     if values.iter().all(|value| value.is_finite()) { Ok(values) } else { Err("it returned no numbers".to_owned()) }
@@ -101,6 +108,7 @@ impl Scripted {
             self.patches.extend(&seen.view.patch.0);
             self.focal_powers.push_back(seen.focal_power.get() as f32);
         }
+
         if self.focal_powers.len() > HISTORY {
             self.patches.drain(..PATCH_SIDE * PATCH_SIDE);
             self.focal_powers.pop_front();
@@ -116,8 +124,8 @@ impl Policy for Scripted {
                 let target = seen.focal_power.moved(action_step(best_action(&values))).get();
                 Decision { target, metric: None, belief: None }
             }
-            // It worked when it was loaded; now it fails on what it sees: the live loop's watchdog takes a target that is none,
-            // and an evaluation ends.
+            // It worked when it was loaded and fails on what it sees now. The live loop's watchdog
+            // rejects the invalid target and takes over; an evaluation ends.
             Err(_) => Decision { target: f64::NAN, metric: None, belief: None },
         }
     }

@@ -24,8 +24,8 @@ const HALF: usize = PATCH_SIDE / 2;
 
 /// Energy far below that of a gray level's noise, so that an empty band has a finite logarithm.
 const ROUNDING: f32 = 30.0;
-/// How many times as much energy the lower third of the bands must have as the upper third for a patch to show anything. White
-/// noise has more than 2.5 times as much in one patch of a thousand.
+/// How many times as much energy the lower third of the bands must have as the upper third for a
+/// patch to show anything. White noise has more than 2.5 times as much in one patch of a thousand.
 const LEAST_FALL: f32 = 2.5;
 
 type Matrix = [[f32; COLUMNS]; PATCH_SIDE];
@@ -64,14 +64,17 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     let window: [f32; PATCH_SIDE] =
         std::array::from_fn(|i| (0.5 - 0.5 * (TAU * (i as f64 + 0.5) / PATCH_SIDE as f64).cos()) as f32);
     let wave = |row: usize, column: usize| TAU * (row * column % PATCH_SIDE) as f64 / PATCH_SIDE as f64;
+
     let table = |f: fn(f64) -> f64| -> Matrix {
         std::array::from_fn(|row| std::array::from_fn(|column| window[row] * f(wave(row, column)) as f32))
     };
     let full = |f: fn(f64) -> f64| -> [[f32; PATCH_SIDE]; PATCH_SIDE] {
         std::array::from_fn(|k| std::array::from_fn(|row| window[row] * f(wave(row, k)) as f32))
     };
+
     let band: [[usize; COLUMNS]; PATCH_SIDE] = std::array::from_fn(|ky| std::array::from_fn(|kx| band(ky, kx)));
     let members = |which| band.iter().flatten().filter(|&&band| band == which).count() as f32;
+
     Tables {
         cos: table(f64::cos),
         sin: table(f64::sin),
@@ -89,6 +92,7 @@ fn band(ky: usize, kx: usize) -> usize {
     }
     let ky = ky.min(PATCH_SIDE - ky) as f64;
     let radius = ky.hypot(kx as f64);
+
     let edges = [1.5, 2.2, 3.0, 3.8, 4.7, 5.7, 6.8, 8.0, 9.4, 11.0, 12.8, 14.6, 16.5, 18.5, 20.5];
     edges.windows(2).position(|pair| (pair[0]..pair[1]).contains(&radius)).unwrap_or(BANDS)
 }
@@ -98,9 +102,11 @@ fn band(ky: usize, kx: usize) -> usize {
 pub fn features(patch: &Patch, spectrum: &Spectrum) -> [f32; FEATURES] {
     let energy = &spectrum.energy;
     let mut out = [0.0; FEATURES];
+
     for band in 0..BANDS {
         out[band] = 0.25 * ((energy[band] / TABLES.count[band] + ROUNDING).ln() - 9.0);
     }
+
     out[BANDS] = 0.5 * ((spectrum.variance + 0.1).ln() - 5.0);
     out[SHARPNESS] = ((mgm(patch) + 0.5).ln() - 3.5) as f32;
     out[BANDS + 2] = 0.5 * ((mlr(patch) - 1.0 + 1e-4).ln() as f32 + 3.5);
@@ -115,8 +121,8 @@ impl Spectrum {
         self.variance.sqrt()
     }
 
-    /// Whether the patch shows more than noise: tissue has far more energy at low frequencies than at high ones however sharp it
-    /// is, the sensor's noise and rounding have as much at all.
+    /// Whether the patch shows more than noise. Tissue has far more energy at low frequencies than
+    /// at high ones however sharp it is; the sensor's noise and rounding have as much at all.
     #[must_use]
     pub fn shows_detail(&self) -> bool {
         let mean = |bands: Range<usize>| {
@@ -131,9 +137,11 @@ impl Spectrum {
 pub fn spectrum(patch: &Patch) -> Spectrum {
     let mean = column_sums(patch, |value| value).iter().sum::<f32>() / patch.0.len() as f32;
     let variance = column_sums(patch, |value| (value - mean).powi(2)).iter().sum::<f32>() / patch.0.len() as f32;
+
     let mut spectrum = transform(&patch.0, mean, &TABLES);
     spectrum.variance = variance;
     spectrum.energy = band_energies(&spectrum);
+
     spectrum
 }
 
@@ -161,18 +169,23 @@ fn transform(patch: &[f32; PATCH_SIDE * PATCH_SIDE], mean: f32, tables: &Tables)
             }
         }
     }
+
     let blank = [[0.0; COLUMNS]; PATCH_SIDE];
     let mut out = Spectrum { real: blank, imaginary: blank, mean, variance: 0.0, energy: [0.0; BANDS] };
+
     for ky in 0..PATCH_SIDE {
-        let (re, im) = (&mut out.real[ky], &mut out.imaginary[ky]);
+        let re = &mut out.real[ky];
+        let im = &mut out.imaginary[ky];
         for row in 0..PATCH_SIDE {
-            let (cos, sin) = (tables.full_cos[ky][row], tables.full_sin[ky][row]);
+            let cos = tables.full_cos[ky][row];
+            let sin = tables.full_sin[ky][row];
             for k in 0..COLUMNS {
                 re[k] += real[row][k] * cos - imaginary[row][k] * sin;
                 im[k] += real[row][k] * sin + imaginary[row][k] * cos;
             }
         }
     }
+
     out
 }
 
@@ -180,11 +193,13 @@ fn band_energies(spectrum: &Spectrum) -> [f32; BANDS] {
     // One more than there are bands takes what belongs to none.
     let mut energy = [0.0f32; BANDS + 1];
     for (ky, bands) in TABLES.band.iter().enumerate() {
-        let (real, imaginary) = (&spectrum.real[ky], &spectrum.imaginary[ky]);
+        let real = &spectrum.real[ky];
+        let imaginary = &spectrum.imaginary[ky];
         for kx in 0..=HALF {
             energy[bands[kx]] += real[kx] * real[kx] + imaginary[kx] * imaginary[kx];
         }
     }
+
     std::array::from_fn(|band| energy[band])
 }
 

@@ -57,12 +57,14 @@ impl Runner {
         let (answers_out, answers) = sync_channel(1);
         let id = Arc::new(OnceLock::new());
         let id_of_thread = id.clone();
+
         let thread = std::thread::Builder::new().name(THREAD.into()).spawn(move || {
             let _ = id_of_thread.set(gettid());
             priority::prefer();
             networks::compute_on_this_thread();
             serve(&registry, &name, &*clock, &questions_in, &answers_out);
         })?;
+
         Ok(Self { questions, answers, thread, id, urgent: false, asked_at: None, proven: false })
     }
 

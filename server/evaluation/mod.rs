@@ -17,6 +17,7 @@ use statistics::{Method, SignedRank, bootstrap_interval, deviation, holm, mean, 
 
 /// Name of the row that knows the next optimum.
 pub const ORACLE: &str = "oracle";
+
 /// One policy's paths over the scans of a set.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Outcome {
@@ -62,7 +63,7 @@ pub struct Comparison {
     pub b: String,
     /// The test's name.
     pub test: &'static str,
-    /// How p was had.
+    /// How p was computed.
     pub method: Method,
     /// Its two-sided p.
     pub p: f64,
@@ -88,24 +89,28 @@ pub enum EvaluateError {
     },
 }
 
-/// Runs the named policies, and the oracle first, over `scans`, several at once where there are cores for it. `progress` is
-/// told after each policy's scan.
+/// Runs the named policies, and the oracle first, over `scans`, several at once where there are cores
+/// for it. `progress` is called after each policy's scan.
 ///
 /// # Errors
-/// When a policy is unknown or cannot run, or answers what is no focal power.
+/// When a policy is unknown or cannot run, or returns an invalid focal power.
 pub fn evaluate(
     registry: &Registry,
     policies: &[PolicyName],
     scans: &dyn ScanSet,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Vec<Outcome>, EvaluateError> {
-    let (count, parts) = (scans.count(), scans.parts());
+    let count = scans.count();
+    let parts = scans.parts();
+
     let perfect = |index| {
         let (mut scan, frames) = scans.scan(index);
         roll_out_oracle(scan.as_mut(), frames)
     };
+
     let paths = (0..count).into_par_iter().map(perfect).collect();
     let mut outcomes = vec![Outcome { policy: ORACLE.to_owned(), paths, parts }];
+
     for name in policies {
         let run = |index| {
             compute_on_this_thread();
@@ -114,11 +119,13 @@ pub fn evaluate(
             progress(name.as_str());
             path.map_err(|error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error })
         };
+
         // All of them first: of several that failed, the first is told, however the cores took turns.
         let paths: Vec<Result<_, EvaluateError>> = (0..count).into_par_iter().map(run).collect();
         let paths = paths.into_iter().collect::<Result<_, _>>()?;
         outcomes.push(Outcome { policy: name.to_string(), paths, parts });
     }
+
     Ok(outcomes)
 }
 
@@ -133,6 +140,7 @@ impl Outcome {
         let column = |of: &[PathFigures], value: fn(&PathFigures) -> f64| of.iter().map(value).collect::<Vec<_>>();
         let errors: Vec<f64> = self.paths.iter().flat_map(Path::errors).collect();
         let scan_mae = column(&parts, |f| f.mae);
+
         Row {
             policy: self.policy.clone(),
             frames: errors.len(),
@@ -154,6 +162,7 @@ pub fn compare(rows: &[Row]) -> Vec<Comparison> {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.policy != ORACLE).collect();
     let pairs = rows.iter().enumerate().flat_map(|(index, a)| rows[index + 1..].iter().map(move |b| (*a, *b)));
     let pairs: Vec<(&Row, &Row)> = pairs.collect();
+
     let tests: Vec<SignedRank> = pairs.iter().map(|(a, b)| wilcoxon(&a.scan_mae, &b.scan_mae)).collect();
     let corrected = holm(&tests.iter().map(|test| test.p).collect::<Vec<_>>());
 

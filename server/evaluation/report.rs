@@ -99,6 +99,7 @@ impl Report {
             "| policy | MAE ± sd | 95 % CI | in focus | travel / frame | reversals / s | paper: MAE ± sd | in focus |\n\
              |---|---|---|---|---|---|---|---|\n",
         );
+
         let paper = if self.subject.between.is_some() { ROBOTIC } else { SIMULATED };
         for row in &self.rows {
             let paper = paper
@@ -118,6 +119,7 @@ impl Report {
                 row.reversals,
             );
         }
+
         text.push_str(&self.tests());
         let _ = writeln!(text, "\n{}", self.about());
         text

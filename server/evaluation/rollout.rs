@@ -23,8 +23,8 @@ pub struct Path {
 pub struct PathFigures {
     /// Mean absolute focal power error.
     pub mae: f64,
-    /// Share of frames with an error below [`IN_FOCUS`]. On a grid of focal powers, rounding decides on which side errors
-    /// of exactly that fall; `docs/notebook.md` says how much depends on it.
+    /// Share of frames with an error below [`IN_FOCUS`]. On a grid of focal powers, rounding decides
+    /// on which side errors of exactly that fall; `docs/notebook.md` says how much depends on it.
     pub in_focus: f64,
     /// Mean absolute change of focal power a frame.
     pub travel: f64,
@@ -56,6 +56,7 @@ impl Path {
         let steps: Vec<f64> =
             self.focal_power.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| step.abs() > 1e-9).collect();
         let turns = steps.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+
         PathFigures {
             mae: self.errors().sum::<f64>() / count,
             in_focus: self.errors().filter(|&error| error < IN_FOCUS).count() as f64 / count,
@@ -65,7 +66,7 @@ impl Path {
     }
 }
 
-/// What a policy answered that is no number.
+/// A policy's answer that is not a number.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("at frame {frame} it returned {target}, which is not a focal power")]
 pub struct NoTarget {
@@ -75,11 +76,12 @@ pub struct NoTarget {
     pub target: f64,
 }
 
-/// Runs `policy` over `frames` frames of `scan`, starting in the middle of the lens's range. What the policy asks for is
-/// what the next frame is seen at.
+/// Runs `policy` over `frames` frames of `scan`, starting in the middle of the lens's range. The next
+/// frame is seen at the focal power that the policy asks for.
 ///
 /// # Errors
-/// When it asks for what is no number. In the live loop the watchdog would take over; its path is not the policy's.
+/// When it asks for something that is not a number: in the live loop the watchdog would take over,
+/// and the rest of the path would not be the policy's.
 pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: usize) -> Result<Path, NoTarget> {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();
@@ -87,10 +89,12 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: u
         let view = scan.observe(focal_power);
         course.focal_power.push(focal_power.get());
         course.optimum.push(scan.optimum().get());
+
         let target = policy.step(&Observation { view: &view, focal_power }).target;
         if !target.is_finite() {
             return Err(NoTarget { frame, target });
         }
+
         focal_power = FocalPower::nearest(target);
         scan.advance();
     }

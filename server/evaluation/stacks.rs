@@ -91,6 +91,7 @@ fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, UnfitStack>
     let stack = FocalStack::load(&source.folder, None, 1)?;
     let planes = source.planes.unwrap_or((2 * stack.planes().len() / 5).max(6));
     let (width, _) = stack.size();
+
     let item = |(scale, wide): (&'static str, usize)| {
         let side = ((width as f64 / wide as f64).round() as usize).max(1);
         let pictures = stack.planes().iter().map(|plane| in_blocks(&plane.picture, side));
@@ -166,14 +167,18 @@ pub fn bench(
     if !policies.contains(&baseline) {
         policies.insert(0, baseline);
     }
+
     let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed)).collect::<Result<_, _>>()?;
-    let (mut stacks, mut all) = (Vec::new(), Vec::new());
+    let mut stacks = Vec::new();
+    let mut all = Vec::new();
+
     for item in items.into_iter().flatten() {
         let outcomes = evaluate(registry, &policies, &item.scans, progress)?;
         let rows = outcomes.iter().map(Outcome::row).collect();
         stacks.push(StackResult { stack: item.stack, scale: item.scale, planes: item.planes, rows });
         all.push(outcomes);
     }
+
     let standings = policies.iter().filter_map(|policy| standing(policy.as_str(), &stacks)).collect();
     Ok((StackReport { seed, stacks, standings }, all))
 }
@@ -194,10 +199,12 @@ fn standing(policy: &str, stacks: &[StackResult]) -> Option<Standing> {
     let row = |result: &StackResult, name: &str| result.rows.iter().find(|row| row.policy == name).cloned();
     let pairs: Vec<(Row, Row)> =
         stacks.iter().map(|result| Some((row(result, policy)?, row(result, BASELINE)?))).collect::<Option<_>>()?;
+
     let logs: Vec<f64> = pairs.iter().map(|(own, base)| (own.mae / base.mae).ln()).collect();
     let count = logs.len().max(1) as f64;
     let worst = (0..logs.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]))?;
     let turns = |which: fn(&(Row, Row)) -> f64| pairs.iter().map(which).sum::<f64>();
+
     Some(Standing {
         policy: policy.to_owned(),
         ratio: (logs.iter().sum::<f64>() / count).exp(),
@@ -209,7 +216,8 @@ fn standing(policy: &str, stacks: &[StackResult]) -> Option<Standing> {
     })
 }
 
-/// The 95 % percentile-bootstrap interval of the geometric mean, drawing whole stacks: a stack's two scales are no two witnesses.
+/// The 95 % percentile-bootstrap interval of the geometric mean, drawing whole stacks: the two scales
+/// of a stack are not independent.
 fn ratio_interval(stacks: &[StackResult], logs: &[f64]) -> (f64, f64) {
     const RESAMPLES: usize = 2000;
     let mut groups: Vec<(&str, Vec<f64>)> = Vec::new();
@@ -219,15 +227,18 @@ fn ratio_interval(stacks: &[StackResult], logs: &[f64]) -> (f64, f64) {
             None => groups.push((&result.stack, vec![*log])),
         }
     }
+
     if groups.is_empty() {
         return (0.0, 0.0);
     }
+
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut resample = |_| {
         let drawn: Vec<f64> =
             (0..groups.len()).flat_map(|_| groups[rng.random_range(0..groups.len())].1.clone()).collect();
         (drawn.iter().sum::<f64>() / drawn.len() as f64).exp()
     };
+
     let mut means: Vec<f64> = (0..RESAMPLES).map(&mut resample).collect();
     means.sort_by(f64::total_cmp);
     (means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40])
@@ -242,10 +253,12 @@ impl StackReport {
         std::fs::create_dir_all(folder)?;
         replace(&folder.join("stacks.json"), serde_json::to_string_pretty(self)?.as_bytes())?;
         replace(&folder.join("stacks.md"), self.markdown().as_bytes())?;
+
         for (result, outcomes) in self.stacks.iter().zip(outcomes) {
             let name = format!("{}-{}.svg", result.stack, result.scale);
             replace(&folder.join(name), figure(outcomes, 0).as_bytes())?;
         }
+
         Ok(())
     }
 
@@ -255,16 +268,20 @@ impl StackReport {
         let Some(first) = self.stacks.first() else { return String::new() };
         let names: Vec<&str> = first.rows.iter().map(|row| row.policy.as_str()).collect();
         let mut text = format!("| MAE / in focus | {} |\n|{}\n", names.join(" | "), "---|".repeat(names.len() + 1));
+
         for result in &self.stacks {
             let cells: Vec<String> =
                 result.rows.iter().map(|row| format!("{:.3} / {:.0} %", row.mae, 100.0 * row.in_focus)).collect();
             let _ = writeln!(text, "| {} {} | {} |", result.stack, result.scale, cells.join(" | "));
         }
+
         let _ = write!(
             text,
-            "\n| beside {BASELINE} | MAE, geometric mean | 95 % CI over stacks | worse on | worst | in focus, mean | turns |\n\
+            "\n| beside {BASELINE} | MAE, geometric mean | 95 % CI over stacks | worse on | worst | \
+             in focus, mean | turns |\n\
              |---|---|---|---|---|---|---|\n"
         );
+
         for standing in self.standings.iter().filter(|standing| standing.policy != ORACLE) {
             let _ = writeln!(
                 text,
@@ -280,9 +297,11 @@ impl StackReport {
                 standing.turns,
             );
         }
+
         let _ = writeln!(
             text,
-            "\nEach stack at two scales (about 500 and 1000 pixels wide), seeds {} to {}; pictures between two planes are mixed.",
+            "\nEach stack at two scales (about 500 and 1000 pixels wide), seeds {} to {}; \
+             pictures between two planes are mixed.",
             self.seed,
             self.seed.wrapping_add(SEEDS as u64 - 1)
         );

@@ -87,11 +87,13 @@ fn exact(ranks: &[usize], positive: usize) -> f64 {
     // Number of patterns of signs for each sum: below 2^50, exact as floating point.
     let mut patterns = vec![0.0; ranks.iter().sum::<usize>() + 1];
     patterns[0] = 1.0;
+
     for &rank in ranks {
         for sum in (rank..patterns.len()).rev() {
             patterns[sum] += patterns[sum - rank];
         }
     }
+
     let all: f64 = patterns.iter().sum();
     let below: f64 = patterns[..=positive].iter().sum();
     let above: f64 = patterns[positive..].iter().sum();
@@ -103,36 +105,43 @@ fn approximate(ranks: &[usize], positive: usize) -> f64 {
     let ranks: Vec<f64> = ranks.iter().map(|&rank| 0.5 * rank as f64).collect();
     let expected = 0.5 * ranks.iter().sum::<f64>();
     let variance = 0.25 * ranks.iter().map(|rank| rank * rank).sum::<f64>();
+
     let z = (0.5 * positive as f64 - expected) / variance.sqrt();
     complementary_error(z.abs() / std::f64::consts::SQRT_2)
 }
 
-/// Each p corrected by Holm's method (1979) for the number of comparisons: below 0.05 where the chance of any false finding
-/// among all of them is below 0.05.
+/// Each p corrected by Holm's method (1979) for the number of comparisons: below 0.05 where the
+/// chance of any false finding among all of them is below 0.05.
 #[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
+
     let mut corrected = vec![0.0; p.len()];
     let mut least: f64 = 0.0;
+
     for (rank, index) in order.into_iter().enumerate() {
         least = least.max((p.len() - rank) as f64 * p[index]).min(1.0);
         corrected[index] = least;
     }
+
     corrected
 }
 
 /// erfc(x) for x >= 0: Taylor series below 2, continued fraction above (Abramowitz and Stegun 7.1.6 and 7.1.14).
 fn complementary_error(x: f64) -> f64 {
     let scale = (-x * x).exp();
+
     if x < 2.0 {
-        let (mut term, mut sum) = (x, x);
+        let mut term = x;
+        let mut sum = x;
         for k in 1..80 {
             term *= 2.0 * x * x / f64::from(2 * k + 1);
             sum += term;
         }
         return 1.0 - 2.0 / std::f64::consts::PI.sqrt() * scale * sum;
     }
+
     let tail = (1..80).rev().fold(x, |tail, k| x + 0.5 * f64::from(k) / tail);
     scale / (tail * std::f64::consts::PI.sqrt())
 }

@@ -36,7 +36,8 @@ pub enum ClipError {
     Empty,
     /// A patch and its surroundings do not fit.
     #[error(
-        "pictures must show at least 64x64 pixels to scan, in the square within their content area where they have one; these show {width}x{height}"
+        "pictures must show at least 64x64 pixels to scan, in the square within their content area \
+         where they have one; these show {width}x{height}"
     )]
     TooSmall {
         /// Usable width in pixels.
@@ -60,15 +61,19 @@ impl Clip {
     pub fn new(frames: Vec<Arc<GrayImage>>, area: Option<Area>) -> Result<Self, ClipError> {
         let first = frames.first().ok_or(ClipError::Empty)?;
         let size = (first.width, first.height);
+
         if let Some(index) = frames.iter().position(|frame| (frame.width, frame.height) != size) {
             return Err(ClipError::SizesDiffer { index });
         }
+
         let area = area.unwrap_or(Area { left: 0, top: 0, right: size.0, bottom: size.1 });
         let area = Area { right: area.right.min(size.0), bottom: area.bottom.min(size.1), ..area };
-        let (width, height) = (area.right.saturating_sub(area.left), area.bottom.saturating_sub(area.top));
+        let width = area.right.saturating_sub(area.left);
+        let height = area.bottom.saturating_sub(area.top);
         if width < 64 || height < 64 {
             return Err(ClipError::TooSmall { width, height });
         }
+
         let coarse = vec![OnceLock::new(); frames.len()];
         Ok(Self { frames, area, coarse })
     }
@@ -117,6 +122,7 @@ impl Clip {
         for number in [self.frames.len(), left, top, right, bottom] {
             hash.update((number as u64).to_le_bytes());
         }
+
         for frame in &self.frames {
             hash.update((frame.width as u64).to_le_bytes());
             frame.data.iter().for_each(|value| hash.update(value.to_le_bytes()));

@@ -30,8 +30,8 @@ pub enum FootageError {
     },
 }
 
-/// The clips in `path`: one of a video or an image; one of each image of a folder. What of a video is left out, since it is
-/// longer than 1500 frames or damaged, is told on the standard error.
+/// The clips in `path`: one of a video or an image; one of each image of a folder. A note on standard
+/// error says what is left out of a video that is longer than 1500 frames or damaged.
 ///
 /// # Errors
 /// When it cannot be read, holds no picture, or its pictures are too small.
@@ -40,12 +40,14 @@ pub fn clips(path: &Path) -> Result<Vec<Arc<Clip>>, FootageError> {
         let path = path.to_owned();
         move |source| FootageError::Unusable { path, source }
     };
+
     if path.is_dir() {
         return footage::pictures_in(path)?
             .iter()
             .map(|file| clip(vec![Arc::new(image(file)?)]).map(Arc::new).map_err(unusable(file)))
             .collect();
     }
+
     let frames = if is_picture(path) { vec![Arc::new(image(path)?)] } else { video(path)? };
     Ok(vec![Arc::new(clip(frames).map_err(unusable(path))?)])
 }
@@ -58,9 +60,11 @@ fn image(path: &Path) -> Result<GrayImage, FootageError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = decode(&bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
     let gray = picture.into_gray(&mut Reconstructor::new(&Calibration::default()));
+
     if gray.height <= LINES {
         return Ok(gray);
     }
+
     let width = gray.width * LINES / gray.height;
     Ok(reduced(&gray, width, LINES))
 }
@@ -69,21 +73,25 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     if !path.is_file() {
         return Err(unreadable(path, "there is no such file"));
     }
+
     let output = ffmpeg(path)
         // One more, to know whether there are more.
         .args(["-frames:v", &(FRAMES + 1).to_string(), "-vf", &format!("scale=-2:'min({LINES},ih)'")])
         .args(["-f", "image2pipe", "-pix_fmt", "gray", "-c:v", "pgm", "-"])
         .output()
         .map_err(footage::FootageError::NoDecoder)?;
+
     let told = String::from_utf8_lossy(&output.stderr);
     let told = told.lines().last();
     if !output.status.success() {
         return Err(unreadable(path, &format!("ffmpeg: {}", told.unwrap_or("failed"))));
     }
+
     let mut frames: Vec<Arc<GrayImage>> = pictures(&output.stdout).map(Arc::new).collect();
     if frames.is_empty() {
         return Err(unreadable(path, "it holds no frames"));
     }
+
     if let Some(told) = told {
         tell(format_args!(
             "note: {} is damaged (ffmpeg: {told}); {} frames of it could be read",
@@ -91,6 +99,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
             frames.len()
         ));
     }
+
     if frames.len() > FRAMES {
         frames.truncate(FRAMES);
         tell(format_args!(
@@ -98,6 +107,7 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
             path.display()
         ));
     }
+
     Ok(frames)
 }
 
@@ -114,12 +124,14 @@ fn pictures(mut bytes: &[u8]) -> impl Iterator<Item = GrayImage> + '_ {
 fn picture(bytes: &[u8]) -> Option<(GrayImage, &[u8])> {
     let mut rest = bytes.strip_prefix(b"P5")?;
     let mut header = [0usize; 3];
+
     for number in &mut header {
         rest = rest.trim_ascii_start();
         let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
         *number = std::str::from_utf8(&rest[..digits]).ok()?.parse().ok()?;
         rest = &rest[digits..];
     }
+
     let [width, height, _] = header;
     let pixels = rest.get(1..1 + width.checked_mul(height)?)?;
     let data = pixels.iter().map(|&byte| f32::from(byte)).collect();

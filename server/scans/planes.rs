@@ -36,7 +36,8 @@ pub enum PlanesError {
 }
 
 impl PlaneStack {
-    /// A stack of `pictures`, each with the position of its focal plane, which rise. Gray levels beyond 0..=255 are clipped.
+    /// A stack of `pictures`, each with the position of its focal plane, which rise. Gray levels
+    /// beyond 0..=255 are clipped.
     ///
     /// # Errors
     /// When there are fewer than three, sizes differ, or they are smaller than 64x64 pixels.
@@ -44,7 +45,8 @@ impl PlaneStack {
         let (Some((_, first)), 3..) = (pictures.first(), pictures.len()) else {
             return Err(PlanesError::TooFew(pictures.len()));
         };
-        let (width, height) = (first.width, first.height);
+        let width = first.width;
+        let height = first.height;
         if width < 64 || height < 64 {
             return Err(PlanesError::TooSmall(width, height));
         }
@@ -59,13 +61,16 @@ impl PlaneStack {
         let positions: Vec<f32> = pictures.iter().map(|picture| picture.0).collect();
         let sharpness: Vec<Vec<f32>> = pictures.iter().map(|(_, picture)| sharpness(picture)).collect();
         let count = sharpness[0].len();
+
         let peak_at = |place: usize| {
             let curve: Vec<f32> = sharpness.iter().map(|plane| plane[place]).collect();
             peak(&positions, &curve)
         };
         let sharpest = (0..count).map(peak_at).collect();
+
         let bytes = |picture: &GrayImage| picture.data.iter().map(|value| value.round() as u8).collect();
         let planes = pictures.iter().map(|(_, picture)| bytes(picture)).collect();
+
         Ok(Self { width, height, positions, planes, sharpest })
     }
 
@@ -81,18 +86,20 @@ impl PlaneStack {
         (f64::from(self.positions[0]), f64::from(self.positions[self.positions.len() - 1]))
     }
 
-    /// The position at which the patch with its corner at `(x, y)` is sharpest: where its mean gradient magnitude peaks, refined
-    /// by a parabola through the peak and its neighbours.
+    /// The position at which the patch with its corner at `(x, y)` is sharpest: where its mean
+    /// gradient magnitude peaks, refined by a parabola through the peak and its neighbours.
     #[must_use]
     pub fn sharpest(&self, (x, y): (usize, usize)) -> f64 {
         let (columns, rows) = grid(self.width, self.height);
         let column = ((x + STRIDE / 2) / STRIDE).min(columns - 1);
         let row = ((y + STRIDE / 2) / STRIDE).min(rows - 1);
+
         f64::from(self.sharpest[row * columns + column])
     }
 
-    /// The patch with its corner at `(x, y)` with the focal plane at `position`: a mix of the two pictures around it. Beyond the
-    /// first and the last picture, those; beyond the borders, the nearest patch within them.
+    /// The patch with its corner at `(x, y)` with the focal plane at `position`: a mix of the two
+    /// pictures around it. Beyond the first and the last picture, those; beyond the borders, the
+    /// nearest patch within them.
     #[must_use]
     pub fn patch(&self, corner: (usize, usize), position: f64) -> Patch {
         let (x, y) = self.inside(corner);
@@ -121,7 +128,8 @@ impl PlaneStack {
         let position = position as f32;
         let last = self.positions.len() - 1;
         let above = self.positions.partition_point(|&at| at <= position).clamp(1, last);
-        let (low, high) = (self.positions[above - 1], self.positions[above]);
+        let low = self.positions[above - 1];
+        let high = self.positions[above];
         let share = ((position - low) / (high - low)).clamp(0.0, 1.0);
         mix(&self.planes[above - 1], &self.planes[above], share, self.width, square, out);
     }
@@ -147,7 +155,8 @@ const fn grid(width: usize, height: usize) -> (usize, usize) {
 /// The mean gradient magnitude of each patch of the [`grid`], row after row.
 fn sharpness(picture: &GrayImage) -> Vec<f32> {
     let magnitudes = gradient_magnitudes(picture);
-    let (width, height) = (picture.width, picture.height);
+    let width = picture.width;
+    let height = picture.height;
     let (columns, rows) = grid(width, height);
 
     // Sums over the columns of each patch first, then over its rows.
@@ -158,23 +167,29 @@ fn sharpness(picture: &GrayImage) -> Vec<f32> {
             *sum = blocks[column..column + PATCH_SIDE / STRIDE].iter().sum();
         }
     }
+
     let mut out = vec![0.0f32; columns * rows];
     for (row, sums) in out.chunks_exact_mut(columns).enumerate() {
         for line in across.chunks_exact(columns).skip(row * STRIDE).take(PATCH_SIDE) {
             sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += value);
         }
     }
+
     out
 }
 
 /// The length of the 3x3 Sobel gradient at each pixel; borders replicate.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
 fn gradient_magnitudes(picture: &GrayImage) -> Vec<f32> {
-    let (width, height) = (picture.width, picture.height);
+    let width = picture.width;
+    let height = picture.height;
     let mut out = vec![0.0f32; width * height];
     let line = |y: usize| &picture.data[y * width..][..width];
     for (y, out) in out.chunks_exact_mut(width).enumerate() {
-        let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(height - 1)));
+        let above = line(y.saturating_sub(1));
+        let here = line(y);
+        let below = line((y + 1).min(height - 1));
+
         for x in 1..width - 1 {
             let left = above[x - 1] + 2.0 * here[x - 1] + below[x - 1];
             let right = above[x + 1] + 2.0 * here[x + 1] + below[x + 1];
@@ -182,9 +197,11 @@ fn gradient_magnitudes(picture: &GrayImage) -> Vec<f32> {
             let down = below[x - 1] + 2.0 * below[x] + below[x + 1];
             out[x] = ((right - left).powi(2) + (down - up).powi(2)).sqrt();
         }
+
         out[0] = out[1];
         out[width - 1] = out[width - 2];
     }
+
     out
 }
 
@@ -194,9 +211,11 @@ fn peak(positions: &[f32], curve: &[f32]) -> f32 {
     if top == 0 || top + 1 == curve.len() {
         return positions[top];
     }
+
     // Newton's divided differences, since positions need not be evenly spread.
     let [x0, x1, x2] = [positions[top - 1], positions[top], positions[top + 1]];
     let [y0, y1, y2] = [curve[top - 1], curve[top], curve[top + 1]];
+
     let first = (y1 - y0) / (x1 - x0);
     let bend = ((y2 - y1) / (x2 - x1) - first) / (x2 - x0);
     if bend >= 0.0 { x1 } else { (0.5 * (x0 + x1) - first / (2.0 * bend)).clamp(x0, x2) }

@@ -73,7 +73,8 @@ impl Coarse {
 
     fn mixed(&self, high: &Self, part: f64) -> Patch {
         let part = part as f32;
-        let (low, high) = (self.patch(), high.patch());
+        let low = self.patch();
+        let high = high.patch();
         Patch(std::array::from_fn(|i| low.0[i] + part * (high.0[i] - low.0[i])))
     }
 }
@@ -194,18 +195,22 @@ fn frozen(
     (powers, order): (&[FocalPower], &[usize]),
 ) -> Stack {
     let mut views = vec![View::from(Patch([0.0; PIXELS])); powers.len()];
+
     for (number, &position) in (0..).zip(order) {
         still.expose_view(number, powers[position], samples);
+
         // The size is the sensor's own.
         let Ok(mosaic) = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, std::mem::take(samples)) else { continue };
         let mut picture = GrayImage { width: mosaic.band_width(), height: mosaic.band_height(), data: Vec::new() };
         picture.data.resize(picture.width * picture.height, 0.0);
         put_square(&mut picture, still.seen(), &reconstructor.gray_square(&mosaic, still.seen()));
+
         // As it would be stored: in whole gray levels.
         picture.data.iter_mut().for_each(|value| *value = value.round());
         views[position] = gray_view(&picture, still.patch());
         *samples = mosaic.into_samples();
     }
+
     let patches = views.iter().map(|view| Box::new(as_levels(&view.patch))).collect();
     Stack::new(powers, patches).with_wider_of(&views)
 }
@@ -222,7 +227,8 @@ pub(super) fn put_square(picture: &mut GrayImage, square: Square, levels: &[f32]
 #[must_use]
 pub fn levels_at(picture: &GrayImage, area: PatchArea) -> [u8; PIXELS] {
     std::array::from_fn(|i| {
-        let (x, y) = (area.x + i % PATCH_SIDE, area.y + i / PATCH_SIDE);
+        let x = area.x + i % PATCH_SIDE;
+        let y = area.y + i / PATCH_SIDE;
         let value = if x < picture.width { picture.data.get(y * picture.width + x) } else { None };
         value.map_or(0, |value| value.round() as u8)
     })

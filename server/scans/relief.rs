@@ -2,7 +2,8 @@
 //! surface. Each place is blurred by its own distance to the focal plane, nearer things lie over
 //! farther ones, and the lens's best picture is soft.
 //!
-//! Heights and positions of the focal plane are in pixels of blur: a place at height `h` is blurred by a spot of standard
+//! Heights and positions of the focal plane are in pixels of blur: a place at height `h` is blurred
+//! by a spot of standard
 //! deviation `|p - h|` with the focal plane at `p`.
 
 use std::sync::Arc;
@@ -61,7 +62,8 @@ impl Style {
         least_noise: 0.0,
     };
 
-    /// As hard for the hill-climbers as photographed stacks: relief that takes most of the range. `docs/notebook.md` says
+    /// As hard for the hill-climbers as photographed stacks: relief that takes most of the range.
+    /// `docs/notebook.md` says
     /// how it was calibrated.
     const DEEP: Self = Self {
         flat: 0.0,

@@ -50,7 +50,8 @@ pub struct ScanSettings {
 }
 
 impl ScanSettings {
-    /// The reference benchmark's scans: over still pictures, on which the crop moves as fast as crop and scene together do
+    /// The reference benchmark's scans: over still pictures, on which the crop moves as fast as crop
+    /// and scene together do
     /// in footage. `docs/notebook.md` says how they were calibrated.
     #[must_use]
     pub fn reference() -> Self {

@@ -54,9 +54,11 @@ impl BeliefTrainer {
     pub fn new(recipe: BeliefRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         let rng = ChaCha8Rng::seed_from_u64(seed);
+
         let store = nn::VarStore::new(device);
         let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
         let optimiser = Optimiser::new(recipe.optimiser, &store);
+
         let actors = Vec::new();
         let memory = network.blank(recipe.scans, device);
         let mut trainer = Self { recipe, scenery, store, network, optimiser, actors, memory, rng, updates: 0 };
@@ -65,11 +67,14 @@ impl BeliefTrainer {
     }
 
     fn collect(&mut self) -> Batch {
-        let (count, window, device) = (self.actors.len(), self.recipe.window, self.store.device());
+        let count = self.actors.len();
+        let window = self.recipe.window;
+        let device = self.store.device();
         let mut inputs = vec![0.0f32; count * window * BELIEF_INPUT];
         let mut beliefs = vec![0.0f32; count * window * BINS];
         let mut now = vec![0.0f32; count * BELIEF_INPUT];
         let mut believed = vec![0.0f32; count * BINS];
+
         for t in 0..window {
             // Each scan has random sources of its own, so how they are shared among cores changes nothing.
             self.actors
@@ -80,10 +85,12 @@ impl BeliefTrainer {
                     now.copy_from_slice(&actor.see());
                     inputs[t * BELIEF_INPUT..][..BELIEF_INPUT].copy_from_slice(now);
                 });
+
             let tensor = Tensor::from_slice(&now).view([count as i64, 1, BELIEF_INPUT as i64]).to_device(device);
             let (logits, memory) = tch::no_grad(|| self.network.forward(&tensor, &self.memory));
             self.memory = memory;
             logits.view([-1, BINS as i64]).softmax(-1, Kind::Float).copy_data(&mut believed, count * BINS);
+
             for (index, actor) in self.actors.iter_mut().enumerate() {
                 let stands = actor.environment.focal_power().get();
                 let mut aim = actor.trace.aim(stands, &believed[index * BINS..][..BINS]);
@@ -96,7 +103,9 @@ impl BeliefTrainer {
                 spread_over_bins(place, &mut beliefs[(index * window + t) * BINS..][..BINS]);
             }
         }
-        let (count, window) = (count as i64, window as i64);
+
+        let count = count as i64;
+        let window = window as i64;
         Batch {
             inputs: Tensor::from_slice(&inputs).view([count, window, BELIEF_INPUT as i64]).to_device(device),
             beliefs: Tensor::from_slice(&beliefs).view([count, window, BINS as i64]).to_device(device),
@@ -125,12 +134,14 @@ impl Trainer for BeliefTrainer {
 
     fn begin_leg(&mut self, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
+
         let mut draw = |index| {
             let mut actor = Actor::draw(&self.recipe, &self.scenery, &mut self.rng);
             // Scans end one after another, not all at once.
             actor.windows_left = 1 + index % self.recipe.windows_a_scan;
             actor
         };
+
         self.actors = (0..self.recipe.scans).map(&mut draw).collect();
         self.memory = self.network.blank(self.recipe.scans, self.store.device());
     }
@@ -142,12 +153,15 @@ impl Trainer for BeliefTrainer {
     fn update(&mut self) -> f64 {
         let before = self.memory.shallow_clone();
         let batch = self.collect();
+
         let (logits, _) = self.network.forward(&batch.inputs, &before);
         let loss = -(logits.log_softmax(-1, Kind::Float) * batch.beliefs).sum_dim_intlist(-1, false, Kind::Float);
         let loss = loss.mean(Kind::Float);
+
         let warm = (self.updates as f64 / 200.0).min(1.0);
         let rate = half_cosine(self.updates as f64 / self.recipe.updates as f64, self.recipe.final_rate);
         self.optimiser.minimise(&loss, self.recipe.clip, warm * rate);
+
         self.updates += 1;
         self.replace_finished();
         loss.double_value(&[])

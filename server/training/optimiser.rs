@@ -1,4 +1,5 @@
-//! Optimisers whose whole state can be saved, so that training resumed goes on exactly as training never stopped.
+//! Optimisers whose whole state can be saved, so that a resumed training continues exactly as if it
+//! had never stopped.
 
 use tch::{Tensor, nn};
 
@@ -28,7 +29,8 @@ pub fn half_cosine(done: f64, floor: f64) -> f64 {
     floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos())
 }
 
-/// A store's variables as views of one tensor, in the order of their names: what is done to all of them is one operation.
+/// A store's variables as views of one tensor, in the order of their names: what is done to all of
+/// them is one operation.
 #[derive(Debug)]
 pub struct Flat {
     /// The variables.
@@ -44,10 +46,12 @@ impl Flat {
         let mut named: Vec<(String, Tensor)> = store.variables().into_iter().collect();
         named.sort_by(|a, b| a.0.cmp(&b.0));
         let mut variables: Vec<Tensor> = named.into_iter().map(|(_, tensor)| tensor).collect();
+
         let values = tch::no_grad(|| joined(&variables));
         for (part, variable) in parts(&values, &variables).iter().zip(&mut variables) {
             variable.set_data(part);
         }
+
         Self { variables, values }
     }
 
@@ -118,6 +122,7 @@ impl Optimiser {
             if shrink < 1.0 {
                 let _ = gradient.g_mul_scalar_(shrink);
             }
+
             self.steps += 1;
             let [squared, averaged] = &mut self.state;
             apply(self.rule, self.steps, scale, &mut self.flat.values, &gradient, squared, averaged);
@@ -132,7 +137,7 @@ impl Optimiser {
         checkpoint.notes.insert("steps".to_owned(), self.steps.to_string());
     }
 
-    /// Takes back what [`Optimiser::save`] added.
+    /// Restores what [`Optimiser::save`] added.
     ///
     /// # Errors
     /// When the checkpoint is of another network.
@@ -169,7 +174,9 @@ fn apply(
         Rule::Adam { learning_rate } => {
             let _ = squared.lerp_(&gradient.square(), 0.001);
             let _ = averaged.lerp_(gradient, 0.1);
-            let (first, second) = (1.0 - 0.9f64.powi(steps), 1.0 - 0.999f64.powi(steps));
+            let first = 1.0 - 0.9f64.powi(steps);
+            let second = 1.0 - 0.999f64.powi(steps);
+
             // The step is averaged / first / sqrt(squared / second + epsilon²), its factors drawn together.
             let rate = learning_rate * scale * second.sqrt() / first;
             let _ = variables.addcmul_(&(&*averaged * -rate), &inverse_root(squared, 1e-8 * second.sqrt()));
@@ -177,7 +184,8 @@ fn apply(
     }
 }
 
-/// 1 / sqrt(`squared`), hardly more than 1 / `least`: with `least` under the root, not beside it, libtorch takes half as long.
+/// 1 / sqrt(`squared`), hardly more than 1 / `least`: with `least` under the root, not beside it,
+/// libtorch takes half as long.
 fn inverse_root(squared: &Tensor, least: f64) -> Tensor {
     (squared + least * least).rsqrt_()
 }

@@ -62,17 +62,22 @@ pub struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let interrupt = Interrupt::listen("stopping after this pose".to_owned())?;
     let progress = bar(arguments.poses, 0);
+
     let (mut bench, header) = match &arguments.lens {
         None if arguments.camera == "phantom" => phantom(arguments),
         None => Err(format!("name the lens in front of `{}` with --lens", arguments.camera).into()),
         Some(lens) => devices(arguments, lens, &interrupt, &progress),
     }?;
+
     let mut recording = Recording::open(&arguments.out, &header)?;
     progress.set_position(recording.folder().poses().len() as u64);
     progress.reset_eta();
+
     let outcome = record(&mut recording, bench.as_mut(), &|| interrupt.asked(), &|| progress.inc(1));
     progress.finish_and_clear();
-    let (done, out) = (recording.folder().poses().len(), arguments.out.display());
+    let done = recording.folder().poses().len();
+    let out = arguments.out.display();
+
     match outcome {
         Ok(()) => print(&format!("{done} poses in {out}; check them with `parfocal scan info {out}`\n")),
         // The stepper's command is interrupted by the same key.
@@ -89,6 +94,7 @@ fn phantom(arguments: &Arguments) -> Result<(Box<dyn Bench>, Header), Failure> {
     if arguments.calibration.is_some() {
         return Err("the phantom's sensor needs no calibration: leave out --calibration, or give a --lens".into());
     }
+
     let trajectory = Trajectory::new(arguments.seed, arguments.poses, HASTE);
     let header = header(arguments, "brain phantom, held still at each pose (simulated)", None, true);
     Ok((Box::new(PhantomBench::new(trajectory)), header))
@@ -110,15 +116,19 @@ fn devices(
         optics: lens.optics(),
         clock: Arc::clone(&clock) as _,
     };
+
     let camera = camera::open(&arguments.camera, settings)?;
     if let Some(calibration) = &calibration {
         calibration::check_camera(calibration, camera.mosaic_size())?;
     }
+
     let stepper = match &arguments.stepper {
         Some(command) => Stepper::Command(command.clone()),
         None => Stepper::Asked(Box::new(asker(arguments.poses, interrupt.clone(), progress.clone()))),
     };
-    let (health, simulated) = (camera.health(), camera.health().simulated || lens.health().simulated);
+
+    let health = camera.health();
+    let simulated = camera.health().simulated || lens.health().simulated;
     let mut header = header(arguments, &health.name, Some(lens.health().name.to_string()), simulated);
     header.calibration = calibration.as_ref().map(Calibration::title);
     let reconstructor = Reconstructor::new(&calibration.unwrap_or_default());

@@ -1,6 +1,7 @@
-//! What the operator's and the researcher's pages get on `/live`: the surgeon's, and what the loop does. While a session
-//! is under way not even they are told which policy runs, nor what gives it away: how the focal power moves (fixed never,
-//! hill-climbers by 0.05 each frame), how long a step takes, the metric, by its scale, and the belief, which few have.
+//! What the operator's and the researcher's pages get on `/live`: the surgeon's, and what the loop
+//! does. While a session is under way not even they are told which policy runs, nor what gives it
+//! away: how the focal power moves (fixed never, hill-climbers by 0.05 each frame), how long a step
+//! takes, the metric, by its scale, and the belief, which few have.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -114,19 +115,21 @@ impl OperatorStatus {
     }
 }
 
-/// A hold that lasts as long is no slow start, but a fault that the operator must know of.
+/// A hold that lasts this long is not a slow start, but a fault that the operator must know of.
 const LASTING: Duration = Duration::from_secs(3);
 
-/// What may be told of a hold, and its words, while a session is under way; it has lasted `held_for`.
-/// A hold caused by the policy is told only when it lasts, and then in the same words whatever went
-/// wrong: only learned policies take time to start and to compute.
+/// A hold that has lasted for `held_for`, and the words for it, as far as they may be told while a
+/// session is under way. A hold by the policy is told only when it lasts, and then in the same words
+/// whatever went wrong: only learned policies take time to start and to think.
 fn told_blinded(hold: Hold, held_for: Duration, message: Option<&Arc<str>>) -> (Option<Hold>, Option<Arc<str>>) {
     if !hold.caused_by_policy() {
         return (Some(hold), message.cloned());
     }
+
     if held_for < LASTING {
         return (None, None);
     }
+
     (
         Some(Hold::PolicySlow),
         Some(Arc::from("the focus has been held for some time; if it stays so, abort the session")),
@@ -143,6 +146,7 @@ impl Audience for ForOperator {
         let blinded = app.blinded();
         let (age, seen) = if blinded { (coarse(age_ms), Seen::default()) } else { (age_ms, Seen::new(&frame.insight)) };
         let held = frame.insight.held.filter(|hold| !(blinded && hold.caused_by_policy()));
+
         OperatorFrame { picture: SurgeonFrame::new(&frame.picture, age, app), held, seen }
     }
 

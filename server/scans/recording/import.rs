@@ -33,6 +33,7 @@ impl Imported {
                 Some(Ok((pose, power))) => poses.entry(pose).or_default().push((power, path)),
             }
         }
+
         for stack in poses.values_mut() {
             stack.sort_by(|a, b| a.0.get().total_cmp(&b.0.get()));
             if let Some(pair) = stack.windows(2).find(|pair| pair[0].0 == pair[1].0) {
@@ -40,16 +41,20 @@ impl Imported {
                 return Err(ImportError::Name { path: pair[1].1.clone(), reason });
             }
         }
+
         let (Some(&first), Some(&last)) = (poses.keys().next(), poses.keys().next_back()) else {
             return Err(ImportError::Empty(folder.to_owned()));
         };
+
         let missing: Vec<usize> = (first..=last).filter(|number| !poses.contains_key(number)).take(10_000).collect();
         if !missing.is_empty() {
             return Err(ImportError::MissingPoses { folder: folder.to_owned(), missing });
         }
+
         if poses.len() > MOST_POSES {
             return Err(ImportError::TooMany { folder: folder.to_owned(), poses: poses.len() });
         }
+
         let imported = Self { poses };
         imported.check_powers()?;
         Ok(imported)
@@ -90,8 +95,8 @@ impl Imported {
     }
 }
 
-/// Stores `imported` as a scan in `out`; poses are numbered from 1 there. Poses that `out` holds already must show the same
-/// pictures. `progress` is told after each.
+/// Stores `imported` as a scan in `out`; poses are numbered from 1 there. Poses that `out` holds
+/// already must show the same pictures. `progress` is called after each.
 ///
 /// # Errors
 /// When a picture cannot be used, `out` holds another scan, or it cannot be written.
@@ -109,13 +114,16 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
         poses: imported.len(),
         focal_powers: imported.powers(),
     };
+
     let mut reader = Reader { reconstructor: Reconstructor::new(&Calibration::default()), first: None };
     // Before anything is written.
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
+
     let mut recording = Recording::open(out, &header)?;
     for (pose, stack) in (1..).zip(imported.poses.values()) {
         let powers: Vec<FocalPower> = stack.iter().map(|(power, _)| *power).collect();
         let pictures = stack.iter().map(|(_, path)| reader.read(path)).collect::<Result<Vec<_>, _>>()?;
+
         if recording.folder().poses().contains_key(&pose) {
             if !shows(recording.folder(), pose, &pictures)? {
                 let difference = format!("with other pictures of pose {pose}");
@@ -130,12 +138,13 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
     Ok(())
 }
 
-/// Whether what is stored of `pose` are these pictures, which rise in focal power as the scan's do.
+/// Whether the stored pictures of `pose` are `pictures`, which rise in focal power as the scan's do.
 fn shows(scan: &ScanFolder, pose: usize, pictures: &[GrayImage]) -> Result<bool, ScanError> {
     let Some(stored) = scan.poses().get(&pose) else { return Ok(false) };
     for (power, picture) in scan.header().focal_powers.iter().zip(pictures) {
         let Some(image) = stored.images.iter().find(|image| image.focal_power == *power) else { return Ok(false) };
         let kept = scan.picture(stored, image)?;
+
         // Levels are rounded when they are stored.
         let mut levels = kept.data.iter().zip(&picture.data);
         let alike = levels.all(|(kept, level)| (kept - level).abs() <= 0.5);
@@ -143,6 +152,7 @@ fn shows(scan: &ScanFolder, pose: usize, pictures: &[GrayImage]) -> Result<bool,
             return Ok(false);
         }
     }
+
     Ok(true)
 }
 
@@ -152,7 +162,7 @@ fn patch(pictures: &[GrayImage]) -> Option<PatchArea> {
     PatchArea::central(first.width, first.height, content_area::detect(first).as_ref()).ok()
 }
 
-/// Reads pictures and sees to it that all are of one size.
+/// Reads pictures and checks that all are of one size.
 struct Reader {
     reconstructor: Reconstructor,
     first: Option<(PathBuf, (usize, usize))>,
@@ -174,10 +184,12 @@ impl Reader {
         if size.0 < LEAST_SIDE || size.1 < LEAST_SIDE {
             return Err(ImportError::TooSmall { path: path.to_owned(), size });
         }
+
         match &self.first {
             None => self.first = Some((path.to_owned(), size)),
             Some((first, first_size)) if *first_size != size => {
-                let (first, other) = (first.clone(), path.to_owned());
+                let first = first.clone();
+                let other = path.to_owned();
                 return Err(ImportError::Sizes { first, size: *first_size, other, other_size: size });
             }
             Some(_) => {}
@@ -200,10 +212,12 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
         let entries = std::fs::read_dir(folder).map_err(unreadable)?;
         entries.map(|entry| entry.map(|entry| entry.path()).map_err(unreadable)).collect()
     };
+
     let (folders, mut files): (Vec<_>, Vec<_>) = entries(folder)?.into_iter().partition(|path| path.is_dir());
     for folder in folders {
         files.extend(entries(&folder)?);
     }
+
     files.sort();
     Ok(files)
 }
@@ -214,6 +228,7 @@ fn parse(name: &str) -> Option<Result<(usize, FocalPower), String>> {
     if !["png", "jpg", "jpeg", "tif", "tiff"].iter().any(|known| extension.eq_ignore_ascii_case(known)) {
         return None;
     }
+
     let (pose, power) = stem.strip_prefix("pose")?.split_once("_f")?;
     let number = pose.parse::<usize>().map_err(|_| format!("'{pose}' is not the number of a pose"));
     let power = power

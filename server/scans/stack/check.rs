@@ -186,9 +186,11 @@ pub fn shift(a: &GrayImage, b: &GrayImage, farthest: isize) -> (f64, f64) {
         }
         f64::from(sum)
     };
+
     let places = (-farthest..=farthest).flat_map(|dy| (-farthest..=farthest).map(move |dx| (dx, dy)));
     let found = places.map(|(dx, dy)| (dx, dy, difference(dx, dy))).min_by(|a, b| a.2.total_cmp(&b.2));
     let Some((dx, dy, least)) = found else { return (0.0, 0.0) };
+
     let inside = |value: isize| value.abs() < farthest;
     // The vertex of the parabola through three differences.
     let vertex = |before: f64, after: f64| {
@@ -204,14 +206,19 @@ pub fn shift(a: &GrayImage, b: &GrayImage, farthest: isize) -> (f64, f64) {
 fn sharpness(stack: &FocalStack) -> Vec<Vec<f64>> {
     let (width, height) = stack.size();
     let tile = TILE.min(width.min(height) / 8).max(8);
-    let (across, down) = (width / tile, height / tile);
+    let across = width / tile;
+    let down = height / tile;
     let mut curves = vec![Vec::with_capacity(stack.planes().len()); across * down];
+
     for plane in stack.planes() {
         let mut sums = vec![0.0; across * down];
         let data = &plane.picture.data;
         for y in 1..(down * tile).min(height - 1) {
             let row = |offset: usize| &data[(y + offset - 1) * width..(y + offset) * width];
-            let (above, at, below) = (row(0), row(1), row(2));
+            let above = row(0);
+            let at = row(1);
+            let below = row(2);
+
             for x in 1..(across * tile).min(width - 1) {
                 let dx = above[x + 1] - above[x - 1] + 2.0 * (at[x + 1] - at[x - 1]) + below[x + 1] - below[x - 1];
                 let dy = below[x - 1] - above[x - 1] + 2.0 * (below[x] - above[x]) + below[x + 1] - above[x + 1];
@@ -235,7 +242,10 @@ fn best(curve: &[f64]) -> usize {
 fn peaks(curve: &[f64]) -> usize {
     let (least, most) = least_and_most(curve);
     let enough = PROMINENCE * (most - least);
-    let (mut rising, mut extreme, mut count) = (true, f64::NEG_INFINITY, 0);
+    let mut rising = true;
+    let mut extreme = f64::NEG_INFINITY;
+    let mut count = 0;
+
     for &value in curve {
         if rising {
             extreme = extreme.max(value);
@@ -250,6 +260,7 @@ fn peaks(curve: &[f64]) -> usize {
             }
         }
     }
+
     count + usize::from(rising)
 }
 
@@ -262,10 +273,14 @@ fn median(values: &[f64]) -> f64 {
 /// Correlation of two pictures; nothing where one hardly varies.
 fn correlation(a: &[f32], b: &[f32]) -> Option<f64> {
     let [a, b] = [a, b].map(|values| values.iter().map(|&value| f64::from(value)).collect::<Vec<f64>>());
-    let (mean_a, mean_b) = (mean(&a), mean(&b));
+    let mean_a = mean(&a);
+    let mean_b = mean(&b);
+
     let products: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a - mean_a) * (b - mean_b)).collect();
     let variance = |values: &[f64], centre: f64| mean(&values.iter().map(|v| (v - centre).powi(2)).collect::<Vec<_>>());
-    let (variance_a, variance_b) = (variance(&a, mean_a), variance(&b, mean_b));
+    let variance_a = variance(&a, mean_a);
+    let variance_b = variance(&b, mean_b);
+
     (variance_a > 4.0 && variance_b > 4.0).then(|| mean(&products) / (variance_a * variance_b).sqrt())
 }
 

@@ -34,7 +34,7 @@ pub struct FocalStack {
     planes: Vec<Plane>,
 }
 
-/// Why pictures are no focal stack.
+/// Why pictures are not a focal stack.
 #[derive(Debug, thiserror::Error)]
 pub enum StackError {
     /// The folder cannot be read, or has no pictures.
@@ -48,7 +48,7 @@ pub enum StackError {
         /// Why.
         source: std::io::Error,
     },
-    /// A file is no picture.
+    /// A file is not a picture.
     #[error("{}: {source}", path.display())]
     Picture {
         /// The file.
@@ -66,11 +66,13 @@ pub enum StackError {
     },
     /// Too few pictures.
     #[error(
-        "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {0}; take more between them"
+        "a focal stack needs at least {LEAST_PLANES} pictures at different positions, but has {0}; \
+         take more between them"
     )]
     TooFew(usize),
     /// Pictures of different sizes.
-    #[error("{other} is {}x{} pixels, but {first} is {}x{}; all pictures of a stack must have one size", sizes[1].0, sizes[1].1, sizes[0].0, sizes[0].1)]
+    #[error("{other} is {}x{} pixels, but {first} is {}x{}; all pictures of a stack must have one size",
+            sizes[1].0, sizes[1].1, sizes[0].0, sizes[0].1)]
     Sizes {
         /// The first picture.
         first: String,
@@ -91,8 +93,8 @@ pub enum StackError {
     },
     /// Positions that no regular grid holds.
     #[error(
-        "the positions are too uneven: with steps of {step}, the least between two pictures, {found} of {of} places would have a \
-         picture; take pictures at even distances"
+        "the positions are too uneven: with steps of {step}, the least between two pictures, {found} \
+         of {of} places would have a picture; take pictures at even distances"
     )]
     Uneven {
         /// Least distance of two pictures.
@@ -117,6 +119,7 @@ impl FocalStack {
         if planes.len() < LEAST_PLANES {
             return Err(StackError::TooFew(planes.len()));
         }
+
         for pair in planes.windows(2) {
             let [first, second] = [&pair[0], &pair[1]].map(|plane| plane.name.clone());
             let sizes = [&pair[0], &pair[1]].map(|plane| (plane.picture.width, plane.picture.height));
@@ -141,6 +144,7 @@ impl FocalStack {
             Some(list) => listed(folder, list)?,
             None => named(files),
         };
+
         let mut reconstructor = Reconstructor::new(&Calibration::default());
         let read = |(path, position): (PathBuf, f64)| {
             let bytes = std::fs::read(&path).map_err(|source| StackError::File { path: path.clone(), source })?;
@@ -148,6 +152,7 @@ impl FocalStack {
             let gray = picture.into_gray(&mut reconstructor);
             Ok(Plane { name: file_name(&path), position, picture: in_blocks(&gray, scale) })
         };
+
         Self::new(placed.into_iter().map(read).collect::<Result<_, StackError>>()?)
     }
 
@@ -163,8 +168,8 @@ impl FocalStack {
         self.planes.first().map_or((0, 0), |plane| (plane.picture.width, plane.picture.height))
     }
 
-    /// The stack at even distances, the least between two of its pictures, and the number of places where a mix of the two
-    /// pictures around fills a gap.
+    /// The stack at even distances, the least between two of its pictures, and the number of places
+    /// where a mix of the two pictures around fills a gap.
     ///
     /// # Errors
     /// When most places would have no picture.
@@ -206,10 +211,12 @@ impl FocalStack {
 #[must_use]
 pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
     let scale = scale.max(1);
-    let (width, height) = (picture.width / scale, picture.height / scale);
+    let width = picture.width / scale;
+    let height = picture.height / scale;
     if scale == 1 || width == 0 || height == 0 {
         return picture.clone();
     }
+
     let rows = picture.data.chunks_exact(picture.width).take(height * scale);
     let data = rows.flat_map(|row| row[..width * scale].iter().copied()).collect();
     reduced(&GrayImage { width: width * scale, height: height * scale, data }, width, height)
@@ -234,6 +241,7 @@ fn listed(folder: &Path, list: &Path) -> Result<Vec<(PathBuf, f64)>, StackError>
     let wrong = |reason: String| StackError::List { path: list.to_owned(), reason };
     let text = std::fs::read_to_string(list).map_err(|error| wrong(format!("cannot read the list: {error}")))?;
     let mut placed = Vec::new();
+
     for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()) {
         let entry = line.rsplit_once(',').map(|(name, position)| (name.trim(), position.trim().parse::<f64>()));
         match entry {
@@ -242,6 +250,7 @@ fn listed(folder: &Path, list: &Path) -> Result<Vec<(PathBuf, f64)>, StackError>
             _ => return Err(wrong(format!("line {number} must be a file's name, a comma and a position"))),
         }
     }
+
     Ok(placed)
 }
 
@@ -249,10 +258,12 @@ fn listed(folder: &Path, list: &Path) -> Result<Vec<(PathBuf, f64)>, StackError>
 fn named(mut files: Vec<PathBuf>) -> Vec<(PathBuf, f64)> {
     files.sort_by(|a, b| natural(&file_name(a), &file_name(b)));
     let numbers: Vec<Vec<f64>> = files.iter().map(|file| numbers(&stem(file))).collect();
+
     let count = numbers.iter().map(Vec::len).min().unwrap_or(0);
     let alike = numbers.iter().all(|found| found.len() == count);
     let differs = |which: &usize| numbers.iter().any(|found| (found[*which] - numbers[0][*which]).abs() > 0.0);
     let differing: Vec<usize> = if alike { (0..count).filter(differs).collect() } else { Vec::new() };
+
     match differing[..] {
         [one] => files.into_iter().zip(&numbers).map(|(file, found)| (file, found[one])).collect(),
         _ => files.into_iter().zip(0..).map(|(file, place)| (file, f64::from(place))).collect(),
@@ -279,6 +290,7 @@ fn pieces(name: &str) -> Vec<&str> {
                 char.is_ascii_digit() != digit && !point
             })
             .map_or(rest.len(), |(index, _)| index);
+
         let (piece, after) = rest.split_at(end);
         pieces.push(piece);
         rest = after;
@@ -297,6 +309,7 @@ fn numbers(name: &str) -> Vec<f64> {
         let sign = before.strip_suffix('-').is_some_and(|before| !before.ends_with(char::is_alphanumeric));
         Some(if sign && !alone { -value } else { value })
     };
+
     let pieces_with_place = pieces.iter().enumerate();
     pieces_with_place
         .filter(|(_, piece)| piece.starts_with(|char: char| char.is_ascii_digit()))
@@ -306,7 +319,8 @@ fn numbers(name: &str) -> Vec<f64> {
 
 /// Names as people order them: numbers by value.
 fn natural(a: &str, b: &str) -> Ordering {
-    let (a_pieces, b_pieces) = (pieces(a), pieces(b));
+    let a_pieces = pieces(a);
+    let b_pieces = pieces(b);
     for (a, b) in a_pieces.iter().zip(&b_pieces) {
         let order = match (a.parse::<f64>(), b.parse::<f64>()) {
             (Ok(a), Ok(b)) => a.total_cmp(&b),

@@ -1,5 +1,5 @@
-//! What a focal stack shows of its optic: focus curves of several places, how fast blur grows with the distance to the focus,
-//! how soft the sharpest picture is, and how magnification changes.
+//! What a focal stack shows of its optic: focus curves of several places, how fast blur grows with
+//! the distance to the focus, how soft the sharpest picture is, and how magnification changes.
 
 use serde::Serialize;
 
@@ -61,7 +61,8 @@ impl Optics {
         let corners = corners.map(|(column, row)| (corner(width, column), corner(height, row)));
 
         let mut optics = Self { magnification: magnification(stack), ..Self::default() };
-        let (mut rates, mut softnesses) = (Vec::new(), Vec::new());
+        let mut rates = Vec::new();
+        let mut softnesses = Vec::new();
         for (x, y) in corners {
             let (place, best) = curve(stack, x, y);
             let (least, most) = place
@@ -72,8 +73,10 @@ impl Optics {
                 rates.extend(rate(stack, &place, best));
                 softnesses.extend(softness(&stack.planes()[best].picture, x, y));
             }
+
             optics.places.push(place);
         }
+
         optics.blur_per_unit = median(rates);
         optics.softness = median(softnesses);
         optics
@@ -104,16 +107,19 @@ fn curve(stack: &FocalStack, x: usize, y: usize) -> (Place, usize) {
     (Place { x, y, best: stack.planes()[best].position, sharpness }, best)
 }
 
-/// Pixels of blur a unit of position: by what each picture's sharpness says when the sharpest one is blurred to the same.
+/// Pixels of blur a unit of position: each picture's sharpness is compared with the sharpest one's,
+/// blurred until it is the same.
 fn rate(stack: &FocalStack, place: &Place, best: usize) -> Vec<f64> {
     let (around, x, y) = surroundings(&stack.planes()[best].picture, place.x, place.y);
     let blurred: Vec<f64> = BLURS.iter().map(|&blur| metric(&gaussian_blur(&around, blur), x, y)).collect();
+
     let blur = |sharpness: f64| {
         let after = blurred.iter().position(|&value| value <= sharpness)?;
         let before = after.checked_sub(1)?;
         let part = (blurred[before] - sharpness) / (blurred[before] - blurred[after]).max(1e-9);
         Some(BLURS[before] + part * (BLURS[after] - BLURS[before]))
     };
+
     // The pictures beside the sharpest one are hardly blurred: rounding and noise decide there.
     let far = |index: &usize| index.abs_diff(best) >= 2;
     let numbers = (0..place.sharpness.len()).filter(far);
@@ -123,27 +129,33 @@ fn rate(stack: &FocalStack, place: &Place, best: usize) -> Vec<f64> {
 
 /// The part of `picture` around the patch at (`x`, `y`), and where the patch is in it.
 fn surroundings(picture: &GrayImage, x: usize, y: usize) -> (GrayImage, usize, usize) {
-    let (left, top) = (x.saturating_sub(MARGIN), y.saturating_sub(MARGIN));
+    let left = x.saturating_sub(MARGIN);
+    let top = y.saturating_sub(MARGIN);
     let right = (x + PATCH_SIDE + MARGIN).min(picture.width);
     let bottom = (y + PATCH_SIDE + MARGIN).min(picture.height);
+
     let rows = picture.data.chunks_exact(picture.width).skip(top).take(bottom - top);
     let data = rows.flat_map(|row| row[left..right].iter().copied()).collect();
     (GrayImage { width: right - left, height: bottom - top, data }, x - left, y - top)
 }
 
-/// How soft the edges at a place are: by the ratio of their gradients before and after blurring them again (Zhuo and Sim 2011).
+/// How soft the edges at a place are: by the ratio of their gradients before and after blurring them
+/// again (Zhuo and Sim 2011).
 fn softness(picture: &GrayImage, x: usize, y: usize) -> Option<f64> {
     let (around, x, y) = surroundings(picture, x, y);
     let again = gaussian_blur(&around, AGAIN);
+
     let inner = |side: usize, corner: usize| corner.max(1)..(corner + PATCH_SIDE).min(side - 1);
     let places = inner(around.height, y).flat_map(|y| inner(around.width, x).map(move |x| (x, y)));
     let mut edges: Vec<(f64, f64)> = places.map(|(x, y)| (gradient(&around, x, y), gradient(&again, x, y))).collect();
     edges.sort_by(|a, b| b.0.total_cmp(&a.0));
     edges.truncate(edges.len() / EDGES);
+
     let soft = |(before, after): (f64, f64)| {
         let ratio = before / after;
         (ratio > 1.0).then(|| (AGAIN * AGAIN / (ratio * ratio - 1.0) - SOBEL).max(0.0).sqrt())
     };
+
     median(edges.into_iter().filter_map(soft).collect())
 }
 
@@ -164,20 +176,26 @@ fn magnification(stack: &FocalStack) -> Option<f64> {
     if width < 60 || height < 60 {
         return None;
     }
+
     let part = |picture: &GrayImage, left: usize, top: usize, size: (usize, usize)| {
         let rows = picture.data.chunks_exact(picture.width).skip(top).take(size.1);
         let data = rows.flat_map(|row| row[left..left + size.0].iter().copied()).collect();
         GrayImage { width: size.0, height: size.1, data }
     };
+
     let mut growth = 1.0;
     for pair in stack.planes().windows(2) {
         let moved = |left: usize, top: usize, size: (usize, usize)| {
             shift(&part(&pair[0].picture, left, top, size), &part(&pair[1].picture, left, top, size), FARTHEST)
         };
-        let (third, two_thirds) = (width / 3, width - width / 3);
+        let third = width / 3;
+        let two_thirds = width - width / 3;
         let across = moved(two_thirds, 0, (third, height)).0 - moved(0, 0, (third, height)).0;
-        let (low, high) = (height / 3, height - height / 3);
+
+        let low = height / 3;
+        let high = height - height / 3;
         let down = moved(0, high, (width, low)).1 - moved(0, 0, (width, low)).1;
+
         growth *= 1.0 + 0.5 * (across / two_thirds as f64 + down / high as f64);
     }
     Some(growth - 1.0)

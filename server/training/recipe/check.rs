@@ -1,4 +1,5 @@
-//! What numbers a recipe may hold: each is checked before a training begins, and refused with its key and its range.
+//! Checks the numbers in a recipe before a training begins; an invalid one is rejected with its key
+//! and its range.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -15,16 +16,18 @@ pub const MAX_UPDATES: u64 = 1_000_000_000;
 /// Checks all numbers of `recipe`.
 ///
 /// # Errors
-/// With the key, its range and what it is, for the first that makes no sense.
+/// Names the key, the range and the value of the first number outside its range.
 pub(super) fn check(recipe: &Recipe) -> Result<(), String> {
     within("pictures", recipe.pictures, 1..=100_000)?;
     within("validate_every", recipe.validate_every, LEG..=MAX_UPDATES)?;
     if !recipe.validate_every.is_multiple_of(LEG) {
         return Err(format!("'validate_every' must be a multiple of {LEG}, and is {}", recipe.validate_every));
     }
+
     within("reliefs", recipe.reliefs, 0..=10_000)?;
     within("relief_share", recipe.relief_share, 0.0..=1.0)?;
     within("benchmark", recipe.benchmark, 0..=10_000)?;
+
     match (&recipe.dqn, &recipe.belief) {
         (Some(dqn), None) => check_dqn(dqn),
         (None, Some(belief)) => check_belief(belief),
@@ -43,10 +46,12 @@ fn check_dqn(dqn: &DqnRecipe) -> Result<(), String> {
     let least = dqn.window * dqn.scans;
     within("dqn.warm_up", dqn.warm_up, least as u64..=1_000_000_000)?;
     within("dqn.replay", dqn.replay, least..=100_000_000)?;
+
     within("dqn.updates", dqn.updates, 1..=MAX_UPDATES)?;
     check_target(dqn)?;
     check_rule("dqn", dqn.optimiser)?;
     descent("dqn", dqn.clip, dqn.final_rate)?;
+
     within("dqn.first_epsilon", dqn.first_epsilon, 0.0..=1.0)?;
     within("dqn.last_epsilon", dqn.last_epsilon, 0.0..=1.0)?;
     within("dqn.epsilon_frames", dqn.epsilon_frames, 0..=1_000_000_000_000)?;
@@ -59,12 +64,15 @@ fn check_target(dqn: &DqnRecipe) -> Result<(), String> {
         Target::Bellman { discount, steps, .. } => {
             // With 1 or nearly so, values have no bound that rewards set.
             within("dqn.target.discount", discount, 0.0..=0.9999)?;
-            // A state and the one so many steps later, both with their whole history, must lie in one window of one scan.
+
+            // A state and the one so many steps later, both with their whole history, must lie in
+            // one window of one scan.
             let most = (dqn.window - HISTORY).min(usize::from(dqn.frames_a_scan) - 1);
             if most == 0 {
                 let least = HISTORY + 1;
                 return Err(format!(
-                    "'dqn.window' must be at least {least}, and 'dqn.frames_a_scan' at least 2, for targets of kind 'bellman'"
+                    "'dqn.window' must be at least {least}, and 'dqn.frames_a_scan' at least 2, \
+                     for targets of kind 'bellman'"
                 ));
             }
             within("dqn.target.steps", steps, 1..=most)
@@ -105,7 +113,7 @@ fn shares(section: &str, variety: f64, wandering: f64) -> Result<(), String> {
     within(&format!("{section}.wandering"), wandering, 0.0..=1.0)
 }
 
-/// That `value` is in `range`, which what is no number never is.
+/// Rejects `value` outside `range`, including NaN.
 fn within<N: Copy + PartialOrd + Display>(key: &str, value: N, range: RangeInclusive<N>) -> Result<(), String> {
     if range.contains(&value) {
         return Ok(());

@@ -50,17 +50,22 @@ pub fn encode(weights: &Weights, patches: &[[u8; PIXELS]], encodings: &mut [Lane
     }
 }
 
-/// Adds to `gradients` the gradients by the weights, from `grad_output`, the gradients of a loss by the encodings of `patches`. Encodes each patch again:
-/// that costs less than to keep 13 kB of each for later.
+/// Adds to `gradients` the gradients by the weights, from `grad_output`, the gradients of a loss by
+/// the encodings of `patches`. Encodes each patch again: that costs less than to keep 13 kB of each
+/// for later.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub fn add_gradients(weights: &Weights, patches: &[[u8; PIXELS]], grad_output: &[Lanes], gradients: &mut Weights) {
     let turned = weights.later.map(|taps| taps.map(transposed));
     let mut layers = Layers::default();
-    let (mut third, mut second, mut first) = (Plane::<3>::default(), Plane::<7>::default(), Plane::<15>::default());
+    let mut third = Plane::<3>::default();
+    let mut second = Plane::<7>::default();
+    let mut first = Plane::<15>::default();
+
     for (patch, slope) in patches.iter().zip(grad_output) {
         forward(weights, patch, &mut layers);
         let [later_0, later_1, later_2] = &mut gradients.later;
         let [bias_0, bias_1, bias_2, bias_3] = &mut gradients.biases;
+
         backward(&layers.third, &turned[2], &[[*slope]], later_2, bias_3, &mut third);
         backward(&layers.second, &turned[1], &third, later_1, bias_2, &mut second);
         backward(&layers.first, &turned[0], &second, later_0, bias_1, &mut first);
@@ -71,15 +76,18 @@ pub fn add_gradients(weights: &Weights, patches: &[[u8; PIXELS]], grad_output: &
 #[inline(always)]
 fn forward(weights: &Weights, patch: &[u8; PIXELS], layers: &mut Layers) -> Lanes {
     standardise(patch, &mut layers.gray);
+
     for (y, row) in layers.first.iter_mut().enumerate() {
         // 15 sums at once would not fit the registers.
         convolve_gray::<0, 8>(&layers.gray, y, &weights.first, &weights.biases[0], row);
         convolve_gray::<8, 7>(&layers.gray, y, &weights.first, &weights.biases[0], row);
     }
+
     convolve(&layers.first, &weights.later[0], &weights.biases[1], &mut layers.second);
     layers.second.as_flattened_mut().iter_mut().for_each(rectify);
     convolve(&layers.second, &weights.later[1], &weights.biases[2], &mut layers.third);
     layers.third.as_flattened_mut().iter_mut().for_each(rectify);
+
     let mut encoding = [[[0.0; FILTERS]]];
     convolve(&layers.third, &weights.later[2], &weights.biases[3], &mut encoding);
     encoding[0][0]
@@ -116,6 +124,7 @@ fn transposed(square: [Lanes; FILTERS]) -> [Lanes; FILTERS] {
 #[inline(always)]
 fn standardise(patch: &[u8; PIXELS], gray: &mut Gray) {
     let mean = patch.iter().map(|&level| u32::from(level)).sum::<u32>() as f32 / PIXELS as f32;
+
     let mut squares = [0.0f32; 2 * FILTERS];
     for levels in patch.as_chunks::<{ 2 * FILTERS }>().0 {
         for lane in 0..2 * FILTERS {
@@ -123,7 +132,9 @@ fn standardise(patch: &[u8; PIXELS], gray: &mut Gray) {
             squares[lane] += centred * centred;
         }
     }
+
     let scale = 1.0 / ((squares.iter().sum::<f32>() / PIXELS as f32).sqrt() + 2.0);
+
     for (row, levels) in gray.iter_mut().zip(patch.as_chunks::<PATCH_SIDE>().0) {
         for x in 0..PATCH_SIDE {
             row[x] = (f32::from(levels[x]) - mean) * scale;
@@ -149,6 +160,7 @@ fn convolve_gray<const FROM: usize, const COUNT: usize>(
             }
         }
     }
+
     for x in 0..COUNT {
         rectify(&mut sums[x]);
         row[FROM + x] = sums[x];
@@ -174,8 +186,9 @@ fn convolve<const IN: usize, const OUT: usize>(input: &Plane<IN>, taps: &Taps, b
     }
 }
 
-/// From `grad_output`, the gradients at a layer's output: adds to the gradients by its weights and biases, and finds the gradients `below`, at
-/// what its (rectified) `input` was before it was rectified. `turned` are its weights by tap, then filter, then input channel.
+/// Backward through a layer, from `grad_output`, the gradients at its output: adds to the gradients
+/// by its weights and biases, and finds the gradients `below`, at what its (rectified) `input` was
+/// before it was rectified. `turned` are its weights by tap, then filter, then input channel.
 #[inline(always)]
 fn backward<const IN: usize, const OUT: usize>(
     input: &Plane<IN>,
@@ -188,10 +201,13 @@ fn backward<const IN: usize, const OUT: usize>(
     *below = [[[0.0; FILTERS]; IN]; IN];
     for dy in 0..3 {
         for dx in 0..3 {
-            let (mut sums, turned) = (taps[3 * dy + dx], turned[3 * dy + dx]);
+            let mut sums = taps[3 * dy + dx];
+            let turned = turned[3 * dy + dx];
+
             for y in 0..OUT {
                 for x in 0..OUT {
-                    let (slope, seen) = (grad_output[y][x], input[2 * y + dy][2 * x + dx]);
+                    let slope = grad_output[y][x];
+                    let seen = input[2 * y + dy][2 * x + dx];
                     let mut under = below[2 * y + dy][2 * x + dx];
                     for channel in 0..FILTERS {
                         add_product(&mut sums[channel], seen[channel], &slope);
@@ -203,7 +219,9 @@ fn backward<const IN: usize, const OUT: usize>(
             taps[3 * dy + dx] = sums;
         }
     }
+
     grad_output.as_flattened().iter().for_each(|slope| add(bias, slope));
+
     for (under, seen) in below.as_flattened_mut().iter_mut().zip(input.as_flattened()) {
         for lane in 0..FILTERS {
             // Not a branch, which would be mispredicted half the time.
@@ -226,6 +244,7 @@ fn backward_first(gray: &Gray, grad_output: &Plane<15>, taps: &mut [Lanes; TAPS]
             }
         }
     }
+
     *taps = sums;
     grad_output.as_flattened().iter().for_each(|slope| add(bias, slope));
 }
