@@ -9,9 +9,9 @@ const ON_BOUND: f64 = 1e-9;
 /// The traditional optimiser of Budd et al., MICCAI 2023: one step of 0.05 a frame, in the last direction if
 /// `0 < f < 1` and the metric rose since the last frame, else in the opposite one.
 ///
-/// The paper leaves the first move open. Here the direction before it is upwards, and the first frame, which has nothing
-/// to compare with, counts as a rise. At a bound the direction always reverses, even where that asks for a step
-/// outwards; the frame after puts it right.
+/// The paper leaves the first move open. Here the direction before it is upwards, and the first
+/// frame, which has nothing to compare with, counts as a rise. At a bound the direction always
+/// reverses, even where that asks for a step outwards; the frame after puts it right.
 #[derive(Debug, Clone)]
 pub struct HillClimber {
     metric: fn(&Patch) -> f64,

@@ -23,28 +23,35 @@ pub fn announcement(
 ) -> String {
     let link = |role| format!("http://{host}/enter?key={}", keys.of(role));
     let mut text = String::new();
+
     // Writing to a string cannot fail.
     let _ =
         writeln!(text, "parfocal {} with {} and {}", env!("CARGO_PKG_VERSION"), status.camera.name, status.lens.name);
     let _ = writeln!(text, "calibration: {}", calibration.title());
+
     if let Some(warning) = simulated(status) {
         let _ = writeln!(text, "\n*** {warning} ***");
     }
+
     text.push('\n');
     for role in ROLES {
         let _ = writeln!(text, "{:>10}  {}", role_name(role), link(role));
     }
+
     if let Ok(code) = QrCode::new(link(Role::Surgeon)) {
         let _ = writeln!(text, "\nScan this with the surgeon's tablet:\n\n{}", drawn(&code, terminal));
     }
+
     text.push_str(
         "A page opens only by its link, and whoever has the link has the role: give each link only to its person.\n",
     );
+
     let advice = if host.ip().is_loopback() {
         "Only this machine can connect. For a tablet, start with --bind 0.0.0.0:8080 on a network that you trust."
     } else {
         "The connection is not encrypted: use a network that you trust."
     };
+
     let _ = writeln!(text, "{advice}\nCtrl-C stops the server.");
     text
 }

@@ -92,6 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn dark(capture: &Capture) -> Result<(), Failure> {
     let mut calibration = calibration::begun(&capture.to.out)?;
     let dark = take(capture, &calibration)?.dark().map_err(|error| refused("dark", &error))?;
+
     let size = (dark.width(), dark.height());
     if calibration.size().is_some_and(|before| before != size) {
         // The white reference of another size is of no use any more.
@@ -110,6 +111,7 @@ fn white(capture: &Capture) -> Result<(), Failure> {
         )
         .into());
     };
+
     let white = take(capture, &calibration)?.white(dark).map_err(|error| refused("white", &error))?;
     calibration.white = Reference::PerPixel(white);
     capture.to.save(calibration, &["white"])
@@ -125,7 +127,9 @@ fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let optics = SimulatedLens::new(Arc::clone(&clock)).optics();
     let mut camera = camera::open(&capture.camera, CameraSettings { fps: capture.fps.into(), seed: 0, optics, clock })?;
+
     let mut average = Average::new(calibration.full_scale());
+
     for number in 0..WARM_UP + capture.frames {
         let frame = camera.next_frame(PATIENCE)?;
         match frame.image {
@@ -140,6 +144,7 @@ fn take(capture: &Capture, calibration: &Calibration) -> Result<Average, Failure
             }
         }
     }
+
     Ok(average)
 }
 
@@ -147,18 +152,23 @@ fn import(arguments: &Import) -> Result<(), Failure> {
     if arguments.from.is_none() && arguments.responses.is_none() && arguments.correction.is_none() {
         return Err("there is nothing to import: name a TOML file, --responses or --correction".into());
     }
+
     let mut calibration = calibration::begun(&arguments.to.out)?;
     let mut changed = Vec::new();
+
     if let Some(path) = &arguments.from {
         calibration = Calibration { version: calibration.version, ..calibration::read(path)? };
         changed = vec!["dark", "white"];
     }
+
     if let Some(path) = &arguments.responses {
         calibration.bands = tables::bands(path)?;
     }
+
     if let Some(path) = &arguments.correction {
         calibration.correction = tables::correction(path)?;
     }
+
     arguments.to.save(calibration, &changed)
 }
 
@@ -168,12 +178,14 @@ impl Destination {
         let before = calibration.version.parse::<u32>().unwrap_or(0);
         calibration.version = (before + 1).to_string();
         calibration.date = Some(SystemClock.wall().strftime("%Y-%m-%d").to_string());
+
         if let Some(name) = &self.name {
             calibration.name.clone_from(name);
         }
         if self.unit.is_some() {
             calibration.unit.clone_from(&self.unit);
         }
+
         let path = calibration::save(Path::new(&self.out), &calibration, changed)?;
         print(&format!("{}\nsaved in {}\n", calibration.title(), path.display()))
     }

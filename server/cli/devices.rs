@@ -30,10 +30,12 @@ impl Recorded {
             self.well_since = None;
             return false;
         }
+
         let recovering = condition.0 && self.last.is_some_and(|(worked, _)| !worked);
         if recovering && now.since(*self.well_since.get_or_insert(now)) < SETTLED {
             return false;
         }
+
         *self = Self { last: Some(condition), well_since: None };
         true
     }
@@ -48,11 +50,14 @@ pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Rece
             ("camera", (now.camera.working, false), &now.camera.message),
             ("lens", (now.lens.working, now.lens.caution), &now.lens.message),
         ];
+
         for (recorded, (device, condition, message)) in recorded.iter_mut().zip(devices) {
-            let (wall, at) = (clock.wall(), clock.now());
+            let wall = clock.wall();
+            let at = clock.now();
             if !recorded.is_news(condition, at) {
                 continue;
             }
+
             tracing::info!("{device}: {message}");
             let (working, _) = condition;
             let event = DeviceEvent { wall, at, device: device.to_owned(), working, message: message.to_string() };
@@ -60,6 +65,7 @@ pub async fn record(store: Store, clock: Arc<dyn Clock>, mut status: watch::Rece
                 tracing::error!(%error, "cannot record the state of a device");
             }
         }
+
         if status.changed().await.is_err() {
             return;
         }

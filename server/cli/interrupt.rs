@@ -38,6 +38,7 @@ pub fn let_lenses_go_first_beside_an_interrupt() -> io::Result<()> {
 fn listen(ending: &[i32]) -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let within = runtime.enter();
+
     for &ending in ending {
         let mut heard = signal(SignalKind::from_raw(ending))?;
         runtime.spawn(async move {
@@ -46,6 +47,7 @@ fn listen(ending: &[i32]) -> io::Result<()> {
         });
     }
     drop(within);
+
     let thread = std::thread::Builder::new().name("signals".to_owned());
     thread.spawn(move || runtime.block_on(std::future::pending::<()>()))?;
     Ok(())
@@ -67,6 +69,7 @@ impl Interrupt {
         let interrupt = Self::default();
         let heard = interrupt.clone();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+
         std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
             runtime.block_on(async {
                 while tokio::signal::ctrl_c().await.is_ok() {
@@ -77,6 +80,7 @@ impl Interrupt {
                 }
             });
         })?;
+
         Ok(interrupt)
     }
 

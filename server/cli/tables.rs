@@ -13,12 +13,14 @@ pub fn bands(path: &Path) -> Result<[Band; BANDS], Failure> {
     if rows.len() < 3 || !rising {
         return Err(format!("{}: needs at least three wavelengths, in rising order", path.display()).into());
     }
+
     let mut bands = Vec::with_capacity(BANDS);
     for band in 1..=BANDS {
         let response: Vec<(f64, f64)> = rows.iter().map(|row| (row[0], row[band])).collect();
         let found = main_peak(&response);
         bands.push(found.ok_or_else(|| format!("{}: band {} has no peak", path.display(), band - 1))?);
     }
+
     bands.try_into().map_err(|_| "16 bands".into())
 }
 

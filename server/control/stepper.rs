@@ -171,10 +171,12 @@ impl Stepper {
             Ok(advice) => (advice, None),
             Err(reason) => (None, Some(reason)),
         };
+
         self.step_hold = hold;
         if let Some(advice) = &advice {
             self.wanted = advice.target;
         }
+
         self.tell_lens();
         if advice.is_some() {
             // Advice that the lens did not take is not followed later, when its frame is long past.
@@ -193,11 +195,13 @@ impl Stepper {
             Ok(Err(error)) => Some(error),
             Err(panic) => Some(LensError::Gone(format!("its driver failed: {panic}"))),
         };
+
         match (&failure, &self.lens_fault) {
             (Some(error), None) => tracing::warn!(%error, "the lens does not take commands"),
             (None, Some(_)) => tracing::info!("the lens takes commands again"),
             _ => (),
         }
+
         self.lens_fault = failure.map(|error| HoldReason::new(Hold::LensFailed, &format!("{error}; trying again")));
     }
 

@@ -92,7 +92,8 @@ const ROBOTIC: [PaperRow; 6] = [
 ];
 
 impl Report {
-    /// The table as Markdown, beside the paper's figures on scans of the same kind; then the tests, and what was evaluated.
+    /// The table as Markdown, beside the paper's figures on scans of the same kind; then the tests,
+    /// and what was evaluated.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(
@@ -171,6 +172,7 @@ impl Report {
         if let Ok(Some(warning)) = warning(self.without_detail, self.subject.count) {
             let _ = write!(text, " Note that {warning}.");
         }
+
         text.push_str(match self.subject.between {
             None => "",
             Some(Between::Nearest) => " A frame shows the picture recorded at the nearest focal power.",
@@ -178,6 +180,7 @@ impl Report {
                 " A frame shows a mix of the pictures recorded at the two focal powers around."
             }
         });
+
         if !self.subject.weights.is_empty() {
             let weights: Vec<_> = self.subject.weights.iter().map(|(name, sum)| format!("{name} {sum:.12}")).collect();
             let _ = write!(text, " Weights, by how their SHA-256 begins: {}", weights.join(", "));
@@ -188,6 +191,7 @@ impl Report {
                 }
             }
         }
+
         text
     }
 
@@ -200,15 +204,18 @@ impl Report {
         table.write_record(COLUMNS)?;
         for row in &self.rows {
             let weights = self.subject.weights.get(&PolicyName::new(&row.policy));
+
             let numbers = [row.mae, row.sd, row.in_focus, row.travel, row.reversals];
             let intervals = [row.mae_interval, row.in_focus_interval].map(|(low, high)| [low, high]);
             let numbers = numbers.iter().chain(intervals.as_flattened()).map(f64::to_string);
+
             let mut record = vec![row.policy.clone(), row.frames.to_string()];
             record.extend(numbers);
             record.extend([self.subject.scans.clone(), self.subject.seed.to_string(), self.subject.footage.join("; ")]);
             record.push(weights.cloned().unwrap_or_default());
             table.write_record(record)?;
         }
+
         let bytes = table.into_inner().map_err(|error| io::Error::other(error.to_string()))?;
         String::from_utf8(bytes).map_err(io::Error::other)
     }
@@ -253,7 +260,8 @@ fn probability(p: f64) -> String {
 
 const COLOURS: [&str; 8] = ["#999999", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#6a3d9a"];
 
-/// Focal path (above) and error (below; moving average of 5 frames) of each policy on scan `index`, the optimum in black.
+/// Focal path (above) and error (below; moving average of 5 frames) of each policy on scan `index`,
+/// the optimum in black.
 #[must_use]
 pub fn figure(outcomes: &[Outcome], index: usize) -> String {
     let policies: Vec<(&str, &Path)> = outcomes
@@ -261,6 +269,7 @@ pub fn figure(outcomes: &[Outcome], index: usize) -> String {
         .filter(|outcome| outcome.policy != ORACLE)
         .filter_map(|outcome| Some((outcome.policy.as_str(), outcome.paths.get(index)?)))
         .collect();
+
     let frames = policies.first().map_or(0, |(_, path)| path.optimum.len());
     let across = Axis { label: "frame", from: 1.0, to: frames.max(1) as f64 };
     let coloured = || COLOURS.iter().cycle().zip(&policies);

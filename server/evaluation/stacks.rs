@@ -1,5 +1,5 @@
-//! The benchmark of real glass: photographed focal stacks, each at two scales and three seeds, and how each policy does there beside
-//! the MGM hill-climber.
+//! The benchmark of real glass: photographed focal stacks, each at two scales and three seeds, and
+//! how each policy does there compared with the MGM hill-climber.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ use crate::scans::planes::{PlaneStack, PlanesError};
 use crate::scans::stack::drift::{StackCourse, StackScans};
 use crate::scans::stack::{FocalStack, StackError, in_blocks};
 
-/// The policy that all others are set beside.
+/// The policy that all others are compared with.
 pub const BASELINE: &str = "mgm-hill-climber";
-/// The two scales, by the width in pixels that a stack's pictures are brought near to. Nobody knows how soft a lens's best picture
-/// is on the sensor, so each stack is used at both.
+/// The two scales, by the width in pixels that a stack's pictures are brought near to. It is unknown
+/// how soft a lens's best picture is on the sensor, so each stack is used at both.
 const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
 /// Seeds of the courses, one scan each.
 pub const SEEDS: usize = 3;
@@ -245,7 +245,8 @@ fn ratio_interval(stacks: &[StackResult], logs: &[f64]) -> (f64, f64) {
 }
 
 impl StackReport {
-    /// Writes `stacks.json`, `stacks.md`, and a figure of the first scan's paths for each stack and scale into `folder`.
+    /// Writes `stacks.json`, `stacks.md`, and a figure of the first scan's paths for each stack and
+    /// scale into `folder`.
     ///
     /// # Errors
     /// When a file cannot be written.

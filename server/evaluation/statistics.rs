@@ -24,11 +24,13 @@ pub fn bootstrap_interval(values: &[f64], seed: u64) -> (f64, f64) {
     if values.is_empty() {
         return (0.0, 0.0);
     }
+
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut means: Vec<f64> = (0..RESAMPLES)
         .map(|_| (0..values.len()).map(|_| values[rng.random_range(0..values.len())]).sum::<f64>())
         .map(|sum| sum / values.len() as f64)
         .collect();
+
     means.sort_by(f64::total_cmp);
     (means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40])
 }
@@ -36,7 +38,7 @@ pub fn bootstrap_interval(values: &[f64], seed: u64) -> (f64, f64) {
 /// Most pairs for which [`wilcoxon`]'s p is exact; `SciPy` and R have the same bound.
 const MOST_EXACT: usize = 50;
 
-/// How a [`SignedRank`]'s p was had.
+/// How a [`SignedRank`]'s p was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -51,12 +53,12 @@ pub enum Method {
 pub struct SignedRank {
     /// Two-sided p; 1 where no pair differs.
     pub p: f64,
-    /// How it was had.
+    /// How it was computed.
     pub method: Method,
 }
 
-/// Tests whether paired values differ. Pairs without a difference are left out; equal differences share their mean rank. p is
-/// exact for at most 50 pairs that differ, ties or not.
+/// Tests whether paired values differ. Pairs without a difference are left out; equal differences
+/// share their mean rank. p is exact for at most 50 pairs that differ, ties or not.
 #[must_use]
 pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
     let mut differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).filter(|d| *d != 0.0).collect();

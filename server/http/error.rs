@@ -31,13 +31,14 @@ pub enum Error {
     NeedsRole(Role),
     /// The browser has not been let in to any role.
     #[error(
-        "This browser has not been let in yet. Open it with the link of your role: the server prints all three when it starts; a surgeon gets \
-         the link from the operator."
+        "This browser has not been let in yet. Open it with the link of your role: the server prints all three \
+         when it starts; a surgeon gets the link from the operator."
     )]
     NoRole,
     /// The key in the link is not one of this server's.
     #[error(
-        "This link is not, or no longer, valid. A surgeon gets the link from the operator; the server printed all of them when it last started."
+        "This link is not, or no longer, valid. A surgeon gets the link from the operator; \
+         the server printed all of them when it last started."
     )]
     WrongKey,
     /// Another role does this.
@@ -48,7 +49,8 @@ pub enum Error {
     CrossSite,
     /// A name that the server does not go by.
     #[error(
-        "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, start it with --bind 0.0.0.0:8080."
+        "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, \
+         start it with --bind 0.0.0.0:8080."
     )]
     WrongHost,
     /// Members have no place left.
@@ -128,10 +130,12 @@ pub async fn render(request: Request, next: Next) -> Response {
     let page = wants_page(request.headers());
     let from_elsewhere = request.headers().get("sec-fetch-site").is_some_and(|site| site == "cross-site");
     let response = next.run(request).await;
+
     let status = response.status();
     if !status.is_client_error() && !status.is_server_error() {
         return response;
     }
+
     let (mut parts, body) = response.into_parts();
     let error = parts.extensions.remove::<Error>();
     let message = match &error {
@@ -141,16 +145,19 @@ pub async fn render(request: Request, next: Next) -> Response {
         None if page && status == StatusCode::BAD_REQUEST => MISSPELLED.to_owned(),
         None => message_of(status, &parts.headers, body).await,
     };
+
     parts.headers.remove(CONTENT_LENGTH);
     parts.headers.remove(CONTENT_TYPE);
     if !page {
         return (parts, Json(ErrorBody { error: message })).into_response();
     }
+
     let html = ErrorPage {
         title: title_of(status),
         message: &message,
         reload: from_elsewhere && matches!(error, Some(Error::NeedsRole(_) | Error::NoRole)),
     };
+
     match html.render() {
         Ok(html) => (parts, Html(html)).into_response(),
         Err(_) => (parts, message).into_response(),

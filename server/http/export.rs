@@ -50,12 +50,14 @@ async fn zip(
     let name = folder_name(session, query.unblinded);
     let export = Export::prepare(app.conductor.reader(), session, query.unblinded).await?;
     let (zip, bytes) = ZipStream::new(name.clone());
+
     // On a thread of its own: compressing would hold up the streams.
     tokio::task::spawn_blocking(move || {
         if let Err(error) = Handle::current().block_on(export.into_zip(zip)) {
             tracing::warn!(%session, %error, "an export was cut off");
         }
     });
+
     let disposition = format!("attachment; filename=\"{name}.zip\"");
     let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
     Ok((headers, Body::from_stream(bytes)))
@@ -69,7 +71,8 @@ struct Dictionary {
 }
 
 /// The data dictionary: every table and column of an export, with its unit.
-#[utoipa::path(get, path = "/researcher/dictionary", tag = "researcher", responses((status = 200, description = "The page", content_type = "text/html")))]
+#[utoipa::path(get, path = "/researcher/dictionary", tag = "researcher",
+    responses((status = 200, description = "The page", content_type = "text/html")))]
 async fn dictionary(_: Researcher) -> Result<Html<String>, Error> {
     Dictionary { tables: &TABLES, texts: TEXTS_IN_CSV }.render().map(Html).map_err(|_| Error::Internal)
 }

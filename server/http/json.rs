@@ -11,8 +11,8 @@ use super::error::Error;
 /// The greatest whole number up to which a JSON number has one meaning, whatever reads it.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// The body of a request, read from JSON. To JSON, and so to a description of this interface, 3.0 is the whole number 3: it is read
-/// so here too.
+/// The body of a request, read from JSON. In JSON, and so in the description of this interface, 3.0
+/// is the whole number 3: it is read so here too.
 pub(super) struct JsonBody<T>(pub(super) T);
 
 impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
@@ -21,6 +21,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
     async fn from_request(request: Request, state: &S) -> Result<Self, Response> {
         let Json(mut body) = Json::<Value>::from_request(request, state).await.map_err(IntoResponse::into_response)?;
         make_whole(&mut body);
+
         serde_json::from_value(body).map(Self).map_err(|error| {
             let said = format!("The request's JSON is not as /api/openapi.json describes it: {error}.");
             Error::Invalid(said).into_response()

@@ -1,5 +1,6 @@
-//! `/metrics`: counters for Prometheus. For operator and researcher; nothing in it is told apart by policy, and the loop's
-//! latency, from which one may be guessed, is left out while a session is under way.
+//! `/metrics`: counters for Prometheus, for operator and researcher. No counter tells policies apart,
+//! and the loop's latency, from which a policy may be guessed, is left out while a session is under
+//! way.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -36,6 +37,7 @@ fn collect(app: &App) -> Registry {
     let counts = app.live.counts();
     let telemetry = app.store.telemetry_counts();
     let mut registry = Registry::with_prefix("parfocal");
+
     let counters = [
         ("steps", "Steps of the control loop", status.steps),
         ("frames_lost", "Frames that the camera lost", status.camera.lost),
@@ -54,17 +56,21 @@ fn collect(app: &App) -> Registry {
             telemetry.lost.load(Ordering::Relaxed),
         ),
     ];
+
     for (name, help, value) in counters {
         registry.register(name, help, ConstCounter::new(value));
     }
+
     registry.register_with_unit("jpeg", "JPEG made", Unit::Bytes, ConstCounter::new(counts.jpeg_bytes()));
     registry.register("frames_sent", "Frames sent to viewers", app.metrics.frames_sent.clone());
     registry.register_with_unit("stream", "Frames sent to viewers", Unit::Bytes, app.metrics.bytes_sent.clone());
     registry.register("viewers", "Viewers that want pictures now", ConstGauge::new(counts.viewers()));
+
     if !app.blinded() {
         let latency = counts.latency().clone();
         registry.register_with_unit("latency", "Time from exposure to lens command", Unit::Seconds, latency);
     }
+
     let gauges = [
         ("steps_per_second", "Steps of the control loop over the last second", status.steps_per_second),
         ("camera_fps", "Frames a second from the camera", status.camera.fps),
@@ -76,6 +82,7 @@ fn collect(app: &App) -> Registry {
             f64::from(u8::from(status.priority == Standing::RealTime)),
         ),
     ];
+
     for (name, help, value) in gauges {
         registry.register(name, help, ConstGauge::new(value));
     }

@@ -30,12 +30,14 @@ async fn mjpeg(State(app): State<AppState>, _: Roles) -> impl IntoResponse {
 fn parts(app: AppState) -> impl Stream<Item = Bytes> {
     let mut shutdown = app.shutdown.clone();
     let watcher = app.live.watch();
+
     let frames = stream::unfold((app, watcher), async |(app, mut watcher)| {
         let frame = watcher.next().await?;
         app.metrics.frames_sent.inc();
         app.metrics.bytes_sent.inc_by(frame.picture.jpeg.len() as u64);
         Some((frame.picture.jpeg.clone(), (app, watcher)))
     });
+
     let frames = frames.flat_map(|jpeg| stream::iter([jpeg, Bytes::from_static(NEXT_PART)]));
     stream::iter([Bytes::from_static(FIRST_PART)]).chain(frames).take_until(async move { ended(&mut shutdown).await })
 }

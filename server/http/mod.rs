@@ -63,7 +63,9 @@ pub fn router(app: AppState) -> Router {
         .merge(assets::routes())
         .merge(openapi::routes())
         .split_for_parts();
+
     let _ = document.set(openapi::document(api).unwrap_or_default());
+
     // From the outside in.
     let layers = ServiceBuilder::new()
         .layer(TraceLayer::new_for_http().make_span_with(span))
@@ -74,6 +76,7 @@ pub fn router(app: AppState) -> Router {
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, TIMEOUT))
         .layer(RequestBodyLimitLayer::new(BODY_LIMIT))
         .layer(Extension(document));
+
     router.fallback(|| async { StatusCode::NOT_FOUND }).layer(layers).with_state(app)
 }
 

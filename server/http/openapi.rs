@@ -21,8 +21,8 @@ use super::roles::{Roles, cookie_name};
 #[openapi(
     info(
         title = "parfocal",
-        description = "Live view, autofocus control and blinded usability trials of a hyperspectral video exoscope. A role \
-                   is shown by the cookie that /enter gives, or by its key as a bearer token."
+        description = "Live view, autofocus control and blinded usability trials of a hyperspectral video exoscope. \
+                       A role is shown by the cookie that /enter gives, or by its key as a bearer token."
     ),
     components(schemas(ErrorBody))
 )]
@@ -91,11 +91,12 @@ pub fn document(mut api: utoipa::openapi::OpenApi) -> serde_json::Result<String>
             };
         }
     }
+
     serde_json::to_string(&document)
 }
 
-/// Adds to every operation what its handler does not decide, and so does not describe: what the layers around it may answer, and
-/// how a role is shown.
+/// Adds to every operation what its handler does not decide, and so does not describe: what the
+/// layers around it may answer, and how a role is shown.
 fn complete(api: &mut utoipa::openapi::OpenApi) {
     for (path, item) in &mut api.paths.paths {
         for operation in [&mut item.get, &mut item.post].into_iter().flatten() {
@@ -103,9 +104,11 @@ fn complete(api: &mut utoipa::openapi::OpenApi) {
                 let responses = &mut operation.responses.responses;
                 responses.entry(status.to_owned()).or_insert_with(|| RefOr::T(failure(words)));
             }
+
             if !OPEN.contains(&path.as_str()) {
                 operation.security = Some(shown_by(operation));
             }
+
             operation.operation_id = unique_id(operation);
         }
     }
@@ -137,6 +140,7 @@ fn around(path: &str, operation: &Operation) -> Vec<(&'static str, &'static str)
     if path.contains("researcher") || path.starts_with("/api/operator") || path.starts_with("/api/surgeon") {
         statuses.push(("507", "The disk or the database failed; nothing was changed"));
     }
+
     statuses
 }
 
@@ -151,13 +155,15 @@ fn failure(words: &str) -> Response {
 fn shown_by(operation: &Operation) -> Vec<SecurityRequirement> {
     let tags = operation.tags.iter().flatten();
     let its_own = ROLES.into_iter().find(|role| tags.clone().any(|tag| tag == role_name(*role)));
+
     let roles = its_own.map_or_else(|| ROLES.to_vec(), |role| vec![role]);
     let schemes = std::iter::once(KEY).chain(roles.into_iter().map(role_name));
     schemes.map(|scheme| SecurityRequirement::new(scheme, [] as [&str; 0])).collect()
 }
 
 /// This document.
-#[utoipa::path(get, path = "/api/openapi.json", tag = "service", responses((status = 200, description = "OpenAPI 3.1")))]
+#[utoipa::path(get, path = "/api/openapi.json", tag = "service",
+    responses((status = 200, description = "OpenAPI 3.1")))]
 async fn openapi(_: Roles, Extension(document): Extension<Finished>) -> Result<impl IntoResponse, Error> {
     let text = document.get().cloned().ok_or(Error::Internal)?;
     Ok(([(CONTENT_TYPE, "application/json")], text))

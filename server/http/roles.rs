@@ -136,6 +136,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
         cookie_name(role),
         app.keys.token(role)
     );
+
     tracing::info!(role = role_name(role), "a browser was let in");
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Redirect::to(home(role))))
 }

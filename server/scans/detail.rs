@@ -10,8 +10,8 @@ use crate::scans::ScanSet;
 
 /// Standard deviation in gray levels above which a patch is not mere sensor noise, whatever its spectrum.
 const MOST_NOISE: f32 = 16.0;
-/// How many times as great the mean gradient magnitude must be in focus as far out of it. Shading, as of a lamp or at the rim
-/// of a lens, looks the same in and out of focus.
+/// How many times as great the mean gradient magnitude must be in focus as far out of it. Shading, as
+/// of a lamp or at the rim of a lens, looks the same in and out of focus.
 const LEAST_PEAK: f64 = 1.2;
 
 /// No scan shows anything to focus on.

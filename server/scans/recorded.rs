@@ -104,8 +104,8 @@ pub fn evenly_spread(count: usize) -> Vec<FocalPower> {
     (0..=last).map(|index| FocalPower::nearest(index as f64 / last as f64)).collect()
 }
 
-/// Positions `0..count` in the random order in which pose `pose` (from 0) of the scan of `seed` takes its focal powers, so
-/// that a lens's hysteresis favours none.
+/// Positions `0..count` in the random order in which pose `pose` (from 0) of the scan of `seed` takes
+/// its focal powers, so that a lens's hysteresis favours none.
 #[must_use]
 pub fn capture_order(seed: u64, pose: usize, count: usize) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -129,6 +129,7 @@ impl RecordedScan {
     pub fn read(folder: &ScanFolder, progress: &(dyn Fn() + Sync)) -> Result<Self, ScanError> {
         let powers = folder.header().focal_powers.clone();
         let poses: Vec<_> = folder.clone().whole()?.poses().values().cloned().collect();
+
         let read = |pose: Pose| {
             let mut images = pose.images.clone();
             images.sort_by(|a, b| a.focal_power.get().total_cmp(&b.focal_power.get()));
@@ -139,6 +140,7 @@ impl RecordedScan {
             progress();
             Ok(Stack { optimum: pose.optimum, patches, wider: Vec::new() }.with_wider_of(&views))
         };
+
         let poses = poses.into_par_iter().map(read).collect::<Result<_, ScanError>>()?;
         Ok(Self { powers, poses })
     }
@@ -149,12 +151,14 @@ impl RecordedScan {
     pub fn phantom(trajectory: &Trajectory, seed: u64, powers: usize, progress: &(dyn Fn() + Sync)) -> Self {
         let powers = evenly_spread(powers);
         let reconstructor = Reconstructor::new(&Calibration::default());
+
         let still = |samples: &mut Vec<u16>, pose| {
             let still = trajectory.still(pose)?;
             let stack = frozen(&still, &reconstructor, samples, (&powers, &capture_order(seed, pose, powers.len())));
             progress();
             Some(stack)
         };
+
         let blank = || vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
         let poses = (0..trajectory.len()).into_par_iter().map_init(blank, still).flatten().collect();
         Self { powers, poses }
@@ -171,18 +175,22 @@ impl RecordedScan {
     pub fn see(&self, index: usize, focal_power: FocalPower, between: Between) -> View {
         let Some(pose) = self.poses.get(index).or(self.poses.last()) else { return Patch([0.0; PIXELS]).into() };
         let above = self.powers.partition_point(|&power| power <= focal_power).clamp(1, self.powers.len() - 1);
-        let (low, high) = (self.powers[above - 1], self.powers[above]);
+        let low = self.powers[above - 1];
+        let high = self.powers[above];
         let part = (low.distance(focal_power) / low.distance(high)).min(1.0);
         let nearest = if part < 0.5 { above - 1 } else { above };
+
         let patch = match between {
             Between::Nearest => as_patch(&pose.patches[nearest]),
             Between::Interpolated => mixed(&pose.patches[above - 1], &pose.patches[above], part),
         };
+
         let coarse = |position: usize, index: usize| pose.wider.get(position)?[index].as_ref();
         let wider = |index: usize| match between {
             Between::Nearest => Some(coarse(nearest, index)?.patch()),
             Between::Interpolated => Some(coarse(above - 1, index)?.mixed(coarse(above, index)?, part)),
         };
+
         View { patch, wider: std::array::from_fn(wider) }
     }
 }

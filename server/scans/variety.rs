@@ -1,4 +1,5 @@
-//! How scans for training differ from one another, so that a policy does not learn one rig, one hand or one scene by heart.
+//! How scans for training differ from one another, so that a policy does not learn one rig, one hand
+//! or one scene by heart.
 
 use rand::{Rng, RngExt};
 
@@ -16,37 +17,43 @@ pub struct Variety {
 }
 
 impl Variety {
-    /// Settings for one scan over `scene`: with probability `share` varied in speed, spot, noise, exposure and what else is in view.
+    /// Settings for one scan over `scene`: with probability `share` varied in speed, spot, noise,
+    /// exposure and what else is in view.
     pub fn draw(&self, scene: &Scene, rng: &mut impl Rng) -> ScanSettings {
         let mut settings = ScanSettings::fitting(scene);
         if !rng.random_bool(self.share) {
             return settings;
         }
+
         let factor = |rng: &mut _, spread: f64| (spread * standard_normal(rng)).exp();
         settings.focus.speed *= factor(rng, 0.45);
         settings.focus.memory *= factor(rng, 0.4);
         settings.crop.speed *= factor(rng, 1.2);
         settings.crop.memory *= factor(rng, 0.4);
+
         if rng.random_bool(0.2) {
             // Hardly anything that one frame shows is left in the next.
             settings.crop = Motion { speed: rng.random_range(15.0..40.0), memory: rng.random_range(5.0..30.0) };
         }
+
         settings.spot = if rng.random_bool(0.5) { Spot::Disc } else { Spot::Gaussian };
         settings.tremor = if rng.random_bool(0.5) { rng.random_range(0.0..0.6) } else { 0.0 };
         settings.flicker = if rng.random_bool(0.7) { rng.random_range(0.0..0.2) } else { 0.0 };
         settings.noise = if rng.random_bool(0.7) { rng.random_range(0.0..4.0) } else { 0.0 };
+
         let gain: f64 = rng.random_range(0.3..1.3);
         settings.veil = if rng.random_bool(0.3) { rng.random_range(0.0..0.4) } else { 0.0 };
         settings.unrest = rng.random_bool(0.5).then(|| restlessness(rng));
         settings.pattern = if rng.random_bool(0.4) { rng.random_range(0.0..3.0) } else { 0.0 };
         settings.covered = rng.random_bool(0.15);
         settings.exposure = (gain, rng.random_range(-0.5..1.0) * 120.0 * (1.0 - gain));
+
         settings
     }
 }
 
-/// From hardly restless to very: at most about as footage of tissue is, judged by how the energies of overlaid patches differ
-/// from frame to frame.
+/// From hardly restless to very: at most about as footage of tissue is, judged by how the energies of
+/// overlaid patches differ from frame to frame.
 fn restlessness(rng: &mut impl Rng) -> Restlessness {
     Restlessness {
         strain: rng.random_range(0.0..0.03),

@@ -26,7 +26,8 @@ pub enum TrainError {
     #[error("{0}")]
     Differs(String),
     /// The run folder cannot be written.
-    #[error("cannot write to {}: {source}; choose a folder that you can write to, or make this one writable", path.display())]
+    #[error("cannot write to {}: {source}; choose a folder that you can write to, or make this one writable",
+            path.display())]
     Folder {
         /// The file or folder.
         path: PathBuf,
@@ -57,7 +58,8 @@ pub enum TrainError {
     #[error("{} already holds a training; continue it with --resume, or choose another folder", .0.display())]
     Begun(PathBuf),
     /// The folder for a new training holds something else.
-    #[error("{} holds other files, or a training that ended before its first checkpoint; choose a new or empty folder", .0.display())]
+    #[error("{} holds other files, or a training that ended before its first checkpoint; \
+             choose a new or empty folder", .0.display())]
     Occupied(PathBuf),
     /// Another process trains in the folder.
     #[error("another training is running in {}; choose another folder, or wait until it ends", .0.display())]
@@ -79,7 +81,7 @@ pub enum TrainError {
 }
 
 impl TrainError {
-    /// That `path` could not be written.
+    /// The error for `path`, which could not be written.
     pub(super) fn writing(path: &Path, source: io::Error) -> Self {
         let path = path.to_owned();
         match source.kind() {

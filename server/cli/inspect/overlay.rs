@@ -35,9 +35,11 @@ pub(super) fn draw(rgb: RgbImage, report: &Report) -> image::RgbImage {
     if let Some(area) = &report.content_area {
         canvas.circle(area);
     }
+
     canvas.frame(report.patch);
     canvas.text(&format!("MGM {:.2}", report.mgm), 0);
     canvas.text(&format!("MLR {:.4}", report.mlr), 1);
+
     let RgbImage { width, height, data } = canvas.picture;
     image::RgbImage::from_raw(width as u32, height as u32, data).unwrap_or_default()
 }
@@ -71,6 +73,7 @@ impl Canvas {
 
     fn circle(&mut self, area: &ContentArea) {
         let half = self.scale as f64 / 2.0;
+
         for y in 0..self.picture.height {
             for x in 0..self.picture.width {
                 let distance = (x as f64 - area.x).hypot(y as f64 - area.y);
@@ -83,9 +86,12 @@ impl Canvas {
 
     /// A line around the patch, just outside of it, so that the patch itself stays as it is.
     fn frame(&mut self, patch: PatchArea) {
-        let (left, top) = (patch.x as isize, patch.y as isize);
-        let (right, bottom) = (left + patch.width as isize, top + patch.height as isize);
+        let left = patch.x as isize;
+        let top = patch.y as isize;
+        let right = left + patch.width as isize;
+        let bottom = top + patch.height as isize;
         let line = self.scale as isize;
+
         for y in top - line..bottom + line {
             for x in left - line..right + line {
                 let inside = (left..right).contains(&x) && (top..bottom).contains(&y);
@@ -100,6 +106,7 @@ impl Canvas {
     fn text(&mut self, text: &str, line: usize) {
         let (rows, columns) = GLYPH;
         let scale = 2 * self.scale;
+
         for (place, letter) in text.chars().enumerate() {
             let bits = GLYPHS.iter().find(|(glyph, _)| *glyph == letter).map_or(0, |(_, bits)| *bits);
             for pixel in 0..rows * columns {

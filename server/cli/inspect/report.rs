@@ -46,10 +46,12 @@ pub(super) fn table(reports: &[Report]) -> String {
     if reports.is_empty() {
         return String::new();
     }
+
     let heading = ["file", "kind", "size", "content area", "confidence", "patch", "mgm", "mlr"].map(str::to_owned);
     let rows: Vec<_> = std::iter::once(heading).chain(reports.iter().map(row)).collect();
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; 8] = std::array::from_fn(width);
+
     let line = |row: &[String; 8]| {
         let cells: Vec<_> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
         cells.join("  ").trim_end().to_owned() + "\n"
@@ -61,6 +63,7 @@ fn row(report: &Report) -> [String; 8] {
     let (area, confidence) = report.content_area.map_or(("none".to_owned(), "-".to_owned()), |area| {
         (format!("({:.1}, {:.1}) r {:.1}", area.x, area.y, area.radius), format!("{:.2}", area.confidence))
     });
+
     [
         report.path.clone(),
         report.kind.to_string(),

@@ -57,6 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     for note in check(&stack)? {
         tell(format_args!("note: {note}"));
     }
+
     let taken = stack.planes().len();
     let (even, gaps) = stack.even()?;
     if gaps > 0 {

@@ -158,6 +158,7 @@ fn asker(
     progress: ProgressBar,
 ) -> impl FnMut(usize) -> Result<(), StepperError> + Send {
     let (sender, lines) = channel();
+
     // Ends with the process: reading a terminal cannot be cut short.
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
@@ -167,6 +168,7 @@ fn asker(
         }
     });
     let typed = std::io::stdin().is_terminal();
+
     move |pose| {
         // An Enter from before the question, of a key that bounces or was pressed in vain, is no answer to it.
         while typed && lines.try_recv().is_ok() {}

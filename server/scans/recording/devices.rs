@@ -91,15 +91,19 @@ impl Bench for Devices {
         self.stepper.go(pose)?;
         let pictures = powers.iter().map(|&power| self.picture(power)).collect::<Result<Vec<_>, _>>()?;
         let Some(GrayImage { width, height, .. }) = pictures.first() else { return Err(RecordError::TooSmall(0, 0)) };
-        let (width, height) = (*width, *height);
+        let width = *width;
+        let height = *height;
+
         if let Some(other) = pictures.iter().find(|picture| (picture.width, picture.height) != (width, height)) {
             let reason = format!("its pictures changed from {width}x{height} to {}x{}", other.width, other.height);
             return Err(CameraError::Failed(reason).into());
         }
+
         let too_small = |_| RecordError::TooSmall(width, height);
         if width < LEAST_SIDE || height < LEAST_SIDE {
             return Err(RecordError::TooSmall(width, height));
         }
+
         let area = pictures.first().and_then(content_area::detect);
         let patch = PatchArea::central(width, height, area.as_ref()).map_err(too_small)?;
         Ok(Taken { pictures, patch, truth: None })
@@ -111,13 +115,16 @@ impl Devices {
     fn picture(&mut self, power: FocalPower) -> Result<GrayImage, RecordError> {
         self.lens.set(power)?;
         let dynamics = self.lens.dynamics();
+
         // Four times the settling time leaves 1/160 000 of a step.
         let settled = self.clock.now() + dynamics.delay + dynamics.settling * 4;
         let image = self.frame_since(settled)?;
         let reached = self.lens.read_back()?;
+
         if reached.distance(power) > TOLERANCE {
             return Err(RecordError::Astray { asked: power.get(), reached: reached.get() });
         }
+
         Ok(self.gray(&image))
     }
 

@@ -7,7 +7,7 @@ use super::RecordError;
 use crate::camera::recorded::{LEAST_SIDE, MOST_POSES, ScanError, poses};
 use crate::imaging::DecodeError;
 
-/// Why a folder is no scan.
+/// Why a folder cannot be imported.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The folder cannot be read.
@@ -30,7 +30,8 @@ pub enum ImportError {
         reason: String,
     },
     /// Poses without any picture.
-    #[error("there is no picture of {} in {}; poses follow one another without a gap", poses(missing), folder.display())]
+    #[error("there is no picture of {} in {}; poses follow one another without a gap",
+            poses(missing), folder.display())]
     MissingPoses {
         /// The folder.
         folder: PathBuf,

@@ -69,7 +69,8 @@ pub enum RecordError {
     Folder(#[from] ScanError),
 }
 
-/// Records every pose that `recording` misses. `stop` is asked between poses and `progress` told after each.
+/// Records every pose that `recording` misses. `stop` is asked between poses and `progress` called
+/// after each.
 ///
 /// # Errors
 /// [`RecordError::Stopped`] when it was told to stop; else when something failed.
@@ -79,13 +80,17 @@ pub fn record(
     stop: &dyn Fn() -> bool,
     progress: &dyn Fn(),
 ) -> Result<(), RecordError> {
-    let (seed, powers) = (recording.folder().header().seed, recording.folder().header().focal_powers.clone());
+    let header = recording.folder().header();
+    let seed = header.seed;
+    let powers = header.focal_powers.clone();
+
     for pose in recording.folder().missing() {
         if stop() {
             return Err(RecordError::Stopped);
         }
         let order = capture_order(seed, pose - 1, powers.len());
         let in_order: Vec<FocalPower> = order.iter().map(|&position| powers[position]).collect();
+
         let taken = bench.take(pose, &in_order)?;
         recording.store(&shot(pose, &in_order, taken))?;
         progress();

@@ -27,18 +27,22 @@ impl Bench for PhantomBench {
     fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError> {
         let beyond = || CameraError::BadSource(format!("the trajectory has no pose {pose}"));
         let still = pose.checked_sub(1).and_then(|index| self.trajectory.still(index)).ok_or_else(beyond)?;
+
         let tools = || (vec![0; SENSOR_WIDTH * SENSOR_HEIGHT], self.reconstructor.clone());
         let picture = |(samples, reconstructor): &mut (Vec<u16>, Reconstructor), (number, power): (u16, FocalPower)| {
             still.expose(number, power, samples);
             let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, std::mem::take(samples))
                 .map_err(|error| CameraError::Failed(error.to_string()))?;
-            let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+            let mut rgb = RgbImage::default();
+            let mut gray = GrayImage::default();
+
             reconstructor.reconstruct(&mosaic, &mut rgb, &mut gray);
             // What policies see as they see it: the picture is reconstructed for people and may be off by a level.
             put_square(&mut gray, still.seen(), &reconstructor.gray_square(&mosaic, still.seen()));
             *samples = mosaic.into_samples();
             Ok(gray)
         };
+
         let numbered: Vec<(u16, FocalPower)> = (0..).zip(powers.iter().copied()).collect();
         let pictures = numbered.into_par_iter().map_init(tools, picture).collect::<Result<_, CameraError>>()?;
         Ok(Taken { pictures, patch: still.patch(), truth: Some(still.optimal()) })

@@ -10,9 +10,11 @@ const TILE: usize = 64;
 const LEAST_PEAK: f64 = 1.2;
 /// Part of a curve's range by which it must fall and rise again to have another peak.
 const PROMINENCE: f64 = 0.25;
-/// Correlation of brightness from place to place below which two pictures show two scenes; of real stacks .98 and more.
+/// Correlation of brightness from place to place below which two pictures show two scenes; of real
+/// stacks .98 and more.
 const LEAST_ALIKE: f64 = 0.8;
-/// Gray levels by which a place's brightness changes at once where something moves, and how many times as much as is usual.
+/// Gray levels by which a place's brightness changes at once where something moves, and how many
+/// times as much as is usual.
 const MOVED: (f64, f64) = (15.0, 4.0);
 
 /// What a stack should be told of: jumps, motion, overexposure.
@@ -39,14 +41,17 @@ fn overexposure(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), Stack
         let bright = plane.picture.data.iter().filter(|&&level| level >= 254.0).count();
         bright as f64 / plane.picture.data.len().max(1) as f64
     };
+
     let worst = stack.planes().iter().max_by(|a, b| saturated(a).total_cmp(&saturated(b)));
     let Some((name, share)) = worst.map(|plane| (&plane.name, saturated(plane))) else { return Ok(()) };
+
     let told = format!("{:.0} % of {name} is overexposed", 100.0 * share);
     if share > 0.3 {
         return Err(unfit(format!(
             "{told}, where nothing can be told of focus; shorten the exposure and take it again"
         )));
     }
+
     if share > 0.05 {
         notes.push(told);
     }
@@ -81,6 +86,7 @@ fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), StackError> {
         let most = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(f64::INFINITY);
         let steady: Vec<usize> = (0..changes.len()).filter(|&index| changes[index] <= most).collect();
         let levels = |picture: &GrayImage| steady.iter().map(|&index| picture.data[index]).collect::<Vec<_>>();
+
         if correlation(&levels(&pair[0]), &levels(&pair[1])).is_some_and(|alike| alike < LEAST_ALIKE) {
             return Err(unfit(format!(
                 "{} and {} show different scenes; a focal stack is of one still scene",
@@ -100,9 +106,12 @@ fn motion(stack: &FocalStack, blocks: &[GrayImage], jumped: &[bool], notes: &mut
     let largest: Vec<(usize, f64)> = blocks.windows(2).map(largest).collect();
     let usual = median(&largest.iter().map(|change| change.1).collect::<Vec<_>>());
     let side = block_side(stack);
+
     for ((&(index, change), planes), jumped) in largest.iter().zip(stack.planes().windows(2)).zip(jumped) {
         if !jumped && change > MOVED.0 && change > MOVED.1 * usual {
-            let (x, y) = (index % blocks[0].width * side, index / blocks[0].width * side);
+            let x = index % blocks[0].width * side;
+            let y = index / blocks[0].width * side;
+
             notes.push(format!("something moves at {x},{y} between {} and {}", planes[0].name, planes[1].name));
         }
     }
@@ -114,8 +123,8 @@ fn curves(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), StackError>
     let peaked: Vec<&Vec<f64>> = curves.iter().filter(|curve| ratio(curve) >= LEAST_PEAK).collect();
     if peaked.len() * 10 < curves.len().max(1) {
         return Err(unfit(format!(
-            "the focus curve has no peak: sharpness changes by a fifth or more in only {} of {} places; take a scene with \
-             texture over a wider range of focus",
+            "the focus curve has no peak: sharpness changes by a fifth or more in only {} of {} places; \
+             take a scene with texture over a wider range of focus",
             peaked.len(),
             curves.len()
         )));
@@ -125,8 +134,8 @@ fn curves(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), StackError>
     let peaks = mean(&peaked.iter().map(|curve| peaks(curve) as f64).collect::<Vec<_>>());
     if peaks >= if count < 10 { 2.0 } else { 3.0 } {
         return Err(unfit(format!(
-            "sharpness rises and falls {peaks:.1} times from the first picture to the last: they are not in order of focus, or \
-             not of one scene; name them so that a number gives the order, or give a --list"
+            "sharpness rises and falls {peaks:.1} times from the first picture to the last: they are not \
+             in order of focus, or not of one scene; name them so that a number gives the order, or give a --list"
         )));
     }
 
@@ -134,8 +143,8 @@ fn curves(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), StackError>
     let share = peaked.iter().filter(at_end).count() as f64 / peaked.len() as f64;
     if share > 0.7 {
         return Err(unfit(format!(
-            "the focus curve has no peak inside the stack: {:.0} % of the places are sharpest in its first or last picture; \
-             take pictures beyond that",
+            "the focus curve has no peak inside the stack: {:.0} % of the places are sharpest in its first \
+             or last picture; take pictures beyond that",
             100.0 * share
         )));
     }
@@ -154,6 +163,7 @@ fn jumps(stack: &FocalStack, notes: &mut Vec<String>) -> Vec<bool> {
     let scale = (width / WIDTH).max(1);
     let small = |plane: &Plane| reduced(&plane.picture, width / scale, height / scale);
     let small: Vec<GrayImage> = stack.planes().iter().map(small).collect();
+
     let mut jumped = Vec::new();
     for (pair, planes) in small.windows(2).zip(stack.planes().windows(2)) {
         let (dx, dy) = shift(&pair[0], &pair[1], FARTHEST);
@@ -166,16 +176,20 @@ fn jumps(stack: &FocalStack, notes: &mut Vec<String>) -> Vec<bool> {
             ));
         }
     }
+
     jumped
 }
 
 /// By how many pixels `b` is shifted against `a`, at most `farthest` along each axis: where they differ least.
 #[must_use]
 pub fn shift(a: &GrayImage, b: &GrayImage, farthest: isize) -> (f64, f64) {
-    let (width, height, reach) = (a.width, a.height, farthest.unsigned_abs());
+    let width = a.width;
+    let height = a.height;
+    let reach = farthest.unsigned_abs();
     if width <= 4 * reach || height <= 4 * reach {
         return (0.0, 0.0);
     }
+
     let difference = |dx: isize, dy: isize| {
         let mut sum = 0.0;
         for y in reach..height - reach {

@@ -1,9 +1,10 @@
-//! Focal-time scans over photographed focal stacks: a window drifts over a still scene while the sharpest plane walks through the
-//! range, so that every picture a policy sees was really taken.
+//! Focal-time scans over photographed focal stacks: a window drifts over a still scene while the
+//! sharpest plane walks through the range, so that every picture a policy sees was really taken.
 //!
-//! The optimum's focal power and the window walk as in simulated scans. At each frame, `planes` neighbouring pictures of the stack
-//! become the range 0..=1, laid so that the plane in which the middle patch is sharpest, smoothed over the way, stands
-//! at the walking focal power as nearly as the stack allows. The true optimum is where the patch's mean gradient magnitude peaks.
+//! The optimum's focal power and the window walk as in simulated scans. At each frame, `planes`
+//! neighbouring pictures of the stack become the range 0..=1, laid so that the plane in which the
+//! middle patch is sharpest, smoothed over the way, stands at the walking focal power as nearly as
+//! the stack allows. The true optimum is where the patch's mean gradient magnitude peaks.
 
 use std::sync::Arc;
 
@@ -29,7 +30,8 @@ const DRIFT: Motion = Motion { speed: 3.535_533_905_932_737_7, memory: 30.0 };
 const FOCUS: Motion = Motion { speed: 0.012, memory: 60.0 };
 /// Where it may walk.
 const FOCUS_RANGE: (f64, f64) = (0.03, 0.97);
-/// Frames (standard deviation) over which the sharpest plane along the way is smoothed before the range is laid around it.
+/// Frames (standard deviation) over which the sharpest plane along the way is smoothed before the
+/// range is laid around it.
 const SMOOTHING: f64 = 12.0;
 
 /// One scan over a focal stack, prepared: where the patch lies and which planes make the range, frame by frame.
@@ -70,10 +72,12 @@ impl StackCourse {
             };
             (0..FRAMES).map(step).collect()
         };
+
         let margin = ((WINDOW - PATCH_SIDE) / 2) as f64;
         let down = walk((0.0, (height - WINDOW) as f64), DRIFT, None);
         let along = walk((0.0, (width - WINDOW) as f64), DRIFT, None);
         let focus = walk(FOCUS_RANGE, FOCUS, Some(0.5));
+
         let corners: Vec<(usize, usize)> = along
             .iter()
             .zip(&down)
@@ -91,6 +95,7 @@ impl StackCourse {
             let best = (0..planes).max_by(|a, b| sharpness(a).total_cmp(&sharpness(b))).unwrap_or(0);
             Moment { corner, first_plane, optimum: FocalPower::nearest(best as f64 / steps) }
         };
+
         let frames = (0..FRAMES).map(moment).collect();
         Some(Self { stack, planes, frames })
     }

@@ -1,4 +1,5 @@
-//! The value head's gradient by hand: a third of the operations that libtorch records and replays, which it is tested against.
+//! The value head's gradient by hand: a third of the operations that libtorch records and replays.
+//! Tests compare it with libtorch's.
 
 use rayon::prelude::*;
 use tch::nn::{Linear, Module};
@@ -37,8 +38,9 @@ impl Pass {
         Self { values: Tensor::cat(&values, 0), parts }
     }
 
-    /// Writes to `gradient`, which has the shapes of the head's variables in the order of their names, the gradient of a loss
-    /// whose gradient by the values is `grad_output` (`[S, 3]`). Returns its gradient by the states, `[S, input]`.
+    /// Writes to `gradient`, which has the shapes of the head's variables in the order of their names,
+    /// the gradient of a loss whose gradient by the values is `grad_output` (`[S, 3]`). Returns its
+    /// gradient by the states, `[S, input]`.
     pub fn back(self, grad_output: &Tensor, gradient: &[Tensor]) -> Tensor {
         let parts = self.parts.into_iter().zip(split(grad_output)).enumerate().map(|(index, (part, grad_output))| {
             let first = index == 0;
@@ -46,11 +48,13 @@ impl Pass {
             (part, grad_output, own.collect::<Vec<_>>())
         });
         let found = on_all_cores(parts.collect(), |(part, grad_output, own)| (part.back(grad_output, &own), own));
+
         for (_, own) in found.iter().skip(1) {
             for (sum, own) in gradient.iter().zip(own) {
                 let _ = tch::no_grad(|| sum.shallow_clone().g_add_(own));
             }
         }
+
         let by_states: Vec<&Tensor> = found.iter().map(|(by_states, _)| by_states).collect();
         Tensor::cat(&by_states, 0)
     }
@@ -99,6 +103,7 @@ fn on_all_cores<T: Send, R: Send>(parts: Vec<T>, work: impl Fn(T) -> R + Sync) -
     if parts.len() == 1 {
         return parts.into_iter().map(work).collect();
     }
+
     let alone = |part| {
         compute_on_this_thread();
         work(part)

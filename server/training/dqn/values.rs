@@ -1,5 +1,5 @@
-//! A value network as training runs it: on frames in their compact form, its head's gradient by hand, and on the processor its
-//! encoder's too.
+//! A value network as training runs it: on frames in their compact form, its head's gradient by hand,
+//! and on the processor its encoder's too.
 
 use tch::{Device, Kind, Tensor, nn};
 
@@ -37,12 +37,14 @@ impl Values {
             let width = self.network.sight.width() as i64;
             return Tensor::from_slice(&encoder.encode(&frames.patches)).view([-1, width]);
         }
+
         let device = self.store.device();
         let frames = if frames.metrics.is_empty() {
             Tensor::from_slice(&frames.patches).to_device(device).view([-1, PIXELS as i64]).to_kind(Kind::Float)
         } else {
             Tensor::from_slice(&frames.metrics).to_device(device).view([-1, 1])
         };
+
         self.network.encode(&frames)
     }
 
@@ -55,20 +57,23 @@ impl Values {
         Pass::through(&self.network.head, &states)
     }
 
-    /// The gradient by all variables, which are `flat`, of a loss whose gradient by the values of `pass` is `grad_output`
-    /// (`[S, 3]`).
+    /// The gradient by all variables, which are `flat`, of a loss whose gradient by the values of
+    /// `pass` is `grad_output` (`[S, 3]`).
     pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: Pass, grad_output: &Tensor) -> Tensor {
         let gradient = flat.values.empty_like();
         let parts = parts(&gradient, &flat.variables);
+
         // By name, the encoder's variables come before the head's, a bias and a weight a layer.
         let (encoder, head) = parts.split_at(parts.len() - 2 * self.network.head.layers.len());
         let by_states = pass.back(grad_output, head);
         if encoder.is_empty() {
             return gradient;
         }
+
         let width = self.network.sight.width() as i64;
         let by_histories = by_states.narrow(1, 0, HISTORY as i64 * width).reshape([-1, width]);
         let by_encodings = encodings.zeros_like().index_add_(0, &batch.history, &by_histories);
+
         if let Some(by_hand) = &self.by_hand {
             let found = by_hand.gradient(&batch.frames.patches, &floats(&by_encodings));
             gradient.narrow(0, 0, found.len() as i64).copy_(&Tensor::from_slice(&found));
@@ -80,6 +85,7 @@ impl Values {
                 part.shallow_clone().copy_(found);
             }
         }
+
         gradient
     }
 }

@@ -1,4 +1,5 @@
-//! The folder of a training: one training's and one process's at a time, each file in it whole.
+//! The folder of a training: it belongs to one training and one process at a time, and each file in
+//! it is whole.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
@@ -28,23 +29,28 @@ impl RunFolder {
         fs::create_dir_all(path).map_err(unwritable)?;
         let was_locked_before = path.join(LOCK).exists();
         let lock = lock(path)?;
+
         let foreign = |entry: fs::DirEntry| {
             let name = entry.file_name();
             name != LOCK && !files::is_partial(&name.to_string_lossy())
         };
+
         if fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok).any(foreign) {
             if !was_locked_before {
                 // Nothing of ours stays in a folder of others.
                 let _ = fs::remove_file(path.join(LOCK));
             }
+
             let path = path.to_owned();
             let ours = path.join(CHECKPOINT).exists();
             return Err(if ours { TrainError::Begun(path) } else { TrainError::Occupied(path) });
         }
+
         Ok(Self { path: path.to_owned(), _lock: lock })
     }
 
-    /// The folder of a training that goes on, and its checkpoint; what a killed process left half written is removed.
+    /// The folder of a training that is resumed, and its checkpoint. Removes what a killed process
+    /// left half written.
     ///
     /// # Errors
     /// When there is no checkpoint, it cannot be used, or another process trains there.
@@ -52,13 +58,16 @@ impl RunFolder {
         if !path.join(CHECKPOINT).exists() {
             return Err(TrainError::NothingToResume(path.to_owned()));
         }
+
         let lock = lock(path)?;
         let unwritable = |source| TrainError::writing(path, source);
+
         for entry in fs::read_dir(path).map_err(unwritable)?.filter_map(Result::ok) {
             if files::is_partial(&entry.file_name().to_string_lossy()) {
                 fs::remove_file(entry.path()).map_err(unwritable)?;
             }
         }
+
         let checkpoint = Checkpoint::read(&path.join(CHECKPOINT))?;
         Ok((Self { path: path.to_owned(), _lock: lock }, checkpoint))
     }
@@ -91,6 +100,7 @@ fn lock(folder: &Path) -> Result<File, TrainError> {
     let path = folder.join(LOCK);
     let failed = |source: io::Error| TrainError::writing(&path, source);
     let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(TrainError::Busy(folder.to_owned())),

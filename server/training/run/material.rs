@@ -1,4 +1,5 @@
-//! What a training trains on, drawn pictures or footage: told in its checkpoint, so that it goes on on the same.
+//! What a training trains on: drawn pictures or footage. Its checkpoint names them, so that a resumed
+//! training uses the same.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -38,21 +39,26 @@ impl Material {
             let unfit = |error: ClipError| TrainError::Recipe(error.to_string());
             return Ok(Self { clips: varied(Split::Training, pictures).map_err(unfit)?, footage: None });
         }
+
         let mut clips = Vec::new();
         for path in paths {
             clips.extend(footage::clips(path)?);
         }
+
         let mut hash = Sha256::new();
         for clip in &clips {
             clip.digest(&mut hash);
         }
+
         check_detail(&clips)?;
+
         // A training may go on from another folder.
         let paths = paths.iter().map(|path| std::path::absolute(path).unwrap_or_else(|_| path.clone())).collect();
         Ok(Self { clips, footage: Some((paths, hex::encode(hash.finalize()))) })
     }
 
-    /// What the training that `checkpoint` is of was begun on; `asked` says where its footage lies now, if anything.
+    /// What the training of `checkpoint` was begun on; `asked` says where its footage lies now, if
+    /// it was given.
     pub fn again(checkpoint: &Checkpoint<'_>, asked: &[PathBuf], pictures: u64) -> Result<Self, TrainError> {
         let differs = |text: String| Err(TrainError::Differs(text));
         let Some(known) = checkpoint.notes.get(FOOTAGE) else {
@@ -63,10 +69,12 @@ impl Material {
             }
             return Self::open(&[], pictures);
         };
+
         let known: Vec<PathBuf> = known.lines().map(PathBuf::from).collect();
         let names = known.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         let from = if asked.is_empty() { &known } else { asked };
         let gone = asked.is_empty() && known.iter().any(|path| !path.exists());
+
         let material = Self::open(from, pictures).map_err(|error| match error {
             TrainError::Footage(error) if gone => {
                 let advice = "give its new path with --footage";
@@ -74,6 +82,7 @@ impl Material {
             }
             error => error,
         })?;
+
         match &material.footage {
             Some((_, sum)) if checkpoint.notes.get(SHA256) == Some(sum) => Ok(material),
             _ if asked.is_empty() => differs(format!(
@@ -118,6 +127,7 @@ fn check_detail(clips: &[Arc<Clip>]) -> Result<(), TrainError> {
     let count = clips.len().max(LEAST_CHECKED);
     let scenes = clips.iter().cloned().map(Scene::Flat).collect();
     let set = Benchmark { scenes, conditions: Conditions::Fitting, seed: 1, count, frames: FRAMES };
+
     if let Some(warning) = warning(without_detail(&set), count)? {
         tell(format_args!("note: {warning}; nothing can be learned there"));
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::training::error::TrainError;
 use crate::training::recipe::{Recipe, shipped};
 
-/// What `--resume` was asked to continue. What is not given stays as the training was begun.
+/// What `--resume` was asked to continue. What is not given stays as when the training was begun.
 #[derive(Debug, Clone, Default)]
 pub struct ResumeRequest {
     /// The policy, or the name of a recipe that ships.
@@ -23,8 +23,10 @@ pub struct ResumeRequest {
 impl ResumeRequest {
     /// Checks that this is the training in `folder`, begun by `recipe` with `seed`.
     pub(super) fn check(&self, folder: &Path, recipe: &Recipe, seed: u64) -> Result<(), TrainError> {
-        let (folder, made) = (folder.display(), &recipe.policy);
+        let folder = folder.display();
+        let made = &recipe.policy;
         let differs = |text: String| Err(TrainError::Differs(text));
+
         if self.name != *made {
             let ships = shipped(&self.name).and_then(|text| Recipe::parse(text).ok());
             let same_policy = ships.as_ref().is_some_and(|ships| ships.policy == *made);
@@ -41,16 +43,19 @@ impl ResumeRequest {
                 ));
             }
         }
+
         let mut requested = self.recipe.clone().unwrap_or_else(|| recipe.clone());
         if let Some(updates) = self.updates {
             requested = requested.with_updates(updates);
         }
+
         if let Some((key, was, is)) = recipe.difference(&requested) {
             return differs(format!(
                 "the training in {folder} was begun with {key} = {was}, not {is}; leave out --config and --updates to \
                  continue, or start again in another folder"
             ));
         }
+
         match self.seed {
             Some(other) if other != seed => differs(format!(
                 "the training in {folder} was begun with seed {seed}, not {other}; leave out --seed to continue, or start \

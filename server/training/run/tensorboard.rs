@@ -40,8 +40,10 @@ impl EventFile {
         put_bytes(&mut entry, 1, tag.as_bytes());
         entry.push(2 << 3 | 5);
         entry.extend(value.to_le_bytes());
+
         let mut summary = Vec::new();
         put_bytes(&mut summary, 1, &entry);
+
         let mut event = seconds(clock);
         event.push(2 << 3);
         put_varint(&mut event, step);

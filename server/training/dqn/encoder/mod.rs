@@ -14,7 +14,8 @@ use kernels::{FILTERS, Lanes, TAPS, Weights};
 const LAYERS: [&str; 4] = ["0", "2", "4", "6"];
 /// Patches that are encoded in one go, cores sharing the rest.
 const ENCODED_AT_ONCE: usize = 16;
-/// Patches whose gradients are summed in one go. The sums are added in a fixed order: how many cores share them changes no digit.
+/// Patches whose gradients are summed in one go. The sums are added in a fixed order: how many cores
+/// share them changes no digit.
 const SUMMED_AT_ONCE: usize = 64;
 
 /// An encoder that computes with the variables that a store holds at the time.
@@ -31,9 +32,11 @@ impl Encoder {
         if store.device() != Device::Cpu {
             return None;
         }
+
         let mut variables = store.variables();
         let mut take = |layer: &str, part: &str| variables.remove(&format!("{path}.{layer}.{part}"));
         let mut layer = |name: &str| Some([take(name, "bias")?, take(name, "weight")?]);
+
         let [first, second, third, fourth] = LAYERS;
         Some(Self { variables: [layer(first)?, layer(second)?, layer(third)?, layer(fourth)?] })
     }
@@ -41,8 +44,10 @@ impl Encoder {
     /// Encodings `[N, 8]` of patches `[N, 1024]`, row after row.
     #[must_use]
     pub fn encode(&self, patches: &[u8]) -> Vec<f32> {
-        let (weights, patches) = (self.weights(), patches.as_chunks().0);
+        let weights = self.weights();
+        let patches = patches.as_chunks().0;
         let mut encodings = vec![Lanes::default(); patches.len()];
+
         let parts = patches.par_chunks(ENCODED_AT_ONCE).zip(encodings.par_chunks_mut(ENCODED_AT_ONCE));
         parts.for_each(|(patches, encodings)| kernels::encode(&weights, patches, encodings));
         encodings.into_flattened()
@@ -52,13 +57,17 @@ impl Encoder {
     /// the encodings `[N, 8]` of patches `[N, 1024]` is `grad_output`.
     #[must_use]
     pub fn gradient(&self, patches: &[u8], grad_output: &[f32]) -> Vec<f32> {
-        let (weights, patches, grad_output) = (self.weights(), patches.as_chunks().0, grad_output.as_chunks().0);
+        let weights = self.weights();
+        let patches = patches.as_chunks().0;
+        let grad_output = grad_output.as_chunks().0;
+
         let parts = patches.par_chunks(SUMMED_AT_ONCE).zip(grad_output.par_chunks(SUMMED_AT_ONCE));
         let sum = |(patches, grad_output): (&[_], &[_])| {
             let mut gradient = Weights::default();
             kernels::add_gradients(&weights, patches, grad_output, &mut gradient);
             flat(&gradient)
         };
+
         let sums: Vec<Vec<f32>> = parts.map(sum).collect();
         sums.into_iter().reduce(added).unwrap_or_else(|| flat(&Weights::default()))
     }
@@ -71,6 +80,7 @@ impl Encoder {
             let mut values = [0.0f32; FILTERS * FILTERS * TAPS];
             weight.copy_data(&mut values, weight.numel());
             let channels = weight.numel() / (FILTERS * TAPS);
+
             for (index, value) in values[..weight.numel()].iter().enumerate() {
                 *weights.slot(layer, index, channels) = *value;
             }
@@ -99,7 +109,10 @@ fn flat(weights: &Weights) -> Vec<f32> {
 impl Weights {
     /// The weight that `PyTorch` has at `index` in a layer of `channels` input channels.
     fn slot(&mut self, layer: usize, index: usize, channels: usize) -> &mut f32 {
-        let (filter, channel, tap) = (index / (channels * TAPS), index / TAPS % channels, index % TAPS);
+        let filter = index / (channels * TAPS);
+        let channel = index / TAPS % channels;
+        let tap = index % TAPS;
+
         match layer {
             0 => &mut self.first[tap][filter],
             _ => &mut self.later[layer - 1][tap][channel][filter],
