@@ -42,9 +42,11 @@ fn rows(path: &Path, columns: usize) -> Result<Vec<Vec<f64>>, Failure> {
         let record = record.map_err(|error| failed(&error))?;
         let values: Vec<Option<f64>> =
             record.iter().map(|text| text.parse().ok().filter(|value: &f64| value.is_finite())).collect();
+
         if number == 1 && values.iter().all(Option::is_none) {
             continue;
         }
+
         match values.into_iter().collect::<Option<Vec<f64>>>() {
             Some(row) if row.len() == columns => rows.push(row),
             _ => return Err(failed(&format_args!("line {number} must have {columns} numbers")).into()),
@@ -60,14 +62,18 @@ fn main_peak(response: &[(f64, f64)]) -> Option<Band> {
     if half <= 0.0 {
         return None;
     }
+
     let crossing = |((inner, above), (outer, below)): ((f64, f64), (f64, f64))| {
         inner + (outer - inner) * (above - half) / (above - below)
     };
     let falls = |pair: &((f64, f64), (f64, f64))| pair.1.1 <= half;
+
     let left = (1..=top).rev().map(|at| (response[at], response[at - 1])).find(falls).map(crossing);
     let right = response[top..].windows(2).map(|pair| (pair[0], pair[1])).find(falls).map(crossing);
     // A peak cut off by the table's end goes as far as the table.
-    let (left, right) = (left.unwrap_or(response[0].0), right.unwrap_or(response[response.len() - 1].0));
+    let left = left.unwrap_or(response[0].0);
+    let right = right.unwrap_or(response[response.len() - 1].0);
+
     Some(Band { centre_nm: f64::midpoint(left, right), fwhm_nm: right - left })
 }
 

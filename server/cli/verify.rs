@@ -26,8 +26,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let folder = arguments.dir.display();
         return Err(format!("{folder} is not a folder; give one that `parfocal export` wrote").into());
     }
+
     let checks = verify(&arguments.dir);
     print(&if arguments.json { serde_json::to_string(&checks)? + "\n" } else { checks.iter().map(line).collect() })?;
+
     let failed = checks.iter().filter(|check| matches!(check.verdict, Verdict::Failed(_))).count();
     if failed == 0 {
         return Ok(());

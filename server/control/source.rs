@@ -37,6 +37,7 @@ impl Source {
         let health = Arc::new(ArcSwap::from_pointee(camera.health()));
         let stop = Arc::new(AtomicBool::new(false));
         let (ending, ended) = sync_channel(0);
+
         let feed = Feed { frames: frames.clone(), health: health.clone(), stop: stop.clone(), _ending: ending };
         thread::Builder::new().name("camera".into()).spawn(move || feed.run(camera))?;
         Ok(Self { frames, health, stop, ended })
@@ -54,7 +55,7 @@ impl Source {
     }
 }
 
-/// What the thread holds.
+/// What the camera's thread works on.
 struct Feed {
     frames: Arc<LatestSlot<Frame>>,
     health: Arc<ArcSwap<CameraHealth>>,
@@ -68,6 +69,7 @@ impl Feed {
         if !camera.computes() {
             priority::raise(Place::Wire);
         }
+
         let mut failing = false;
         while !self.stop.load(Ordering::Relaxed) {
             let outcome = guarded(|| camera.next_frame(TIMEOUT));
@@ -79,7 +81,9 @@ impl Feed {
                 Ok(Err(error)) => Some(error),
                 Err(panic) => Some(CameraError::Failed(format!("its driver failed: {panic}"))),
             };
+
             self.health.store(Arc::new(camera.health()));
+
             if let Some(error) = &failure {
                 if !failing {
                     tracing::warn!(%error, "no frame from the camera");
@@ -90,6 +94,7 @@ impl Feed {
             } else if failing {
                 tracing::info!("the camera delivers again");
             }
+
             failing = failure.is_some();
         }
     }

@@ -67,17 +67,21 @@ async fn serve_one(
     // Where a socket cannot be tuned it still works.
     let _ = stream.set_nodelay(true);
     let _ = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
+
     let (place, give_way) = places.take(peer.ip());
     let place = Arc::new(place);
     let socket = Placed { stream, _place: Arc::clone(&place) };
+
     let service = router.map_request(move |mut request: axum::http::Request<Incoming>| {
         request.extensions_mut().insert(Arc::clone(&place));
         request.map(Body::new)
     });
+
     let mut builder = Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(BUFFER);
     let connection = builder.serve_connection(TokioIo::new(socket), TowerToHyperService::new(service)).with_upgrades();
     let mut connection = pin!(connection);
+
     let outcome = tokio::select! {
         outcome = connection.as_mut() => outcome,
         _ = give_way => {
@@ -89,6 +93,7 @@ async fn serve_one(
             connection.await
         }
     };
+
     if let Err(error) = outcome {
         tracing::debug!(%error, "a connection broke");
     }

@@ -1,8 +1,9 @@
 //! Places: how many connections there may be, of one host and in all, and who gives way.
 //!
-//! A connection is a stranger until one of its requests shows a role's key or cookie; from then on it is a member's. Strangers
-//! and members have places of their own, so that no number of strangers takes a member's. Where strangers have no place left,
-//! the newest gets that of the oldest: who has a key shows it at once, who only wants to fill the places waits.
+//! A connection is a stranger until one of its requests shows a role's key or cookie; from then on it
+//! is a member's. Strangers and members have places of their own, so that no number of strangers
+//! takes a member's. Where strangers have no place left, the newest gets that of the oldest: a client
+//! with a key shows it at once, one that only wants to fill the places waits.
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv6Addr};
@@ -26,8 +27,9 @@ struct Room {
 /// A browser opens up to six connections, and several may stand behind one address.
 const STRANGERS: Room = Room { host: 32, all: 128 };
 
-/// Some fifteen pages of one host: each holds a WebSocket, and up to six more connections while it loads. With the strangers' and
-/// what the server itself has open, well below the 1,024 files that a process may usually have.
+/// Some fifteen pages of one host: each holds a WebSocket, and up to six more connections while it
+/// loads. With the strangers' and what the server itself has open, well below the 1,024 files that a
+/// process may usually have.
 const MEMBERS: Room = Room { host: 128, all: 512 };
 
 /// All places.

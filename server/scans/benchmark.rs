@@ -26,8 +26,8 @@ pub enum Conditions {
     Same(ScanSettings),
     /// As fits each scene: [`ScanSettings::fitting`].
     Fitting,
-    /// The first so many as fits each scene, the others as varied as training's scans can be: what holds on both is likely to hold
-    /// elsewhere.
+    /// The first so many as fits each scene, the others as varied as training's scans can be: what
+    /// holds on both is likely to hold elsewhere.
     VariedFrom(usize),
 }
 
@@ -57,8 +57,8 @@ impl Benchmark {
         Ok(Self { scenes, conditions, seed: SEED, count, frames: FRAMES })
     }
 
-    /// The first `count` scans of the reference benchmark with relief: over scenes whose places lie at different distances, seen
-    /// through lenses whose best picture is soft.
+    /// The first `count` scans of the reference benchmark with relief: over scenes whose places lie at
+    /// different distances, seen through lenses whose best picture is soft.
     ///
     /// # Errors
     /// None in practice: its scenes are large enough.
@@ -74,12 +74,14 @@ impl Benchmark {
         let scene = self.scenes[index % self.scenes.len()].clone();
         // Distinct streams for neighbouring seeds: the golden-ratio increment of SplitMix64.
         let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index as u64);
+
         let settings = match self.conditions {
             Conditions::Same(settings) => settings,
             Conditions::Fitting => ScanSettings::fitting(&scene),
             Conditions::VariedFrom(first) if index < first => ScanSettings::fitting(&scene),
             Conditions::VariedFrom(_) => Variety { share: 1.0 }.draw(&scene, &mut ChaCha8Rng::seed_from_u64(!seed)),
         };
+
         Scan::over(scene, settings, seed)
     }
 }

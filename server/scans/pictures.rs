@@ -72,12 +72,15 @@ pub fn varied(split: Split, count: u64) -> Result<Vec<Arc<Clip>>, ClipError> {
         .map(|index| {
             let seed = split.first_seed() + index;
             let mut picture = if index % 3 == 0 { sharp_phantom(split, index) } else { texture(seed, SIDE) };
+
             if index % 2 == 0 {
                 vary_contrast(&mut picture, 0.2 + 0.2 * (index / 2 % 6) as f32, seed);
             }
+
             if index % 4 < 2 {
                 picture = gaussian_blur(&picture, 0.3 + 0.1 * (index / 4 % 10) as f64);
             }
+
             Clip::still(picture).map(Arc::new)
         })
         .collect()

@@ -3,8 +3,7 @@
 //! farther ones, and the lens's best picture is soft.
 //!
 //! Heights and positions of the focal plane are in pixels of blur: a place at height `h` is blurred
-//! by a spot of standard
-//! deviation `|p - h|` with the focal plane at `p`.
+//! by a spot of standard deviation `|p - h|` with the focal plane at `p`.
 
 use std::sync::Arc;
 
@@ -63,8 +62,7 @@ impl Style {
     };
 
     /// As hard for the hill-climbers as photographed stacks: relief that takes most of the range.
-    /// `docs/notebook.md` says
-    /// how it was calibrated.
+    /// `docs/notebook.md` says how it was calibrated.
     const DEEP: Self = Self {
         flat: 0.0,
         least_relief: 2.0,

@@ -21,13 +21,14 @@ struct Group {
 }
 
 impl Scenery {
-    /// This scenery with `share` of all scans over `scenes`; the others keep their shares among the rest. Nothing changes where there
-    /// are no scenes, or they have no share.
+    /// This scenery with `share` of all scans over `scenes`; the others keep their shares among the
+    /// rest. Nothing changes where there are no scenes, or they have no share.
     #[must_use]
     pub fn with(mut self, scenes: Vec<Scene>, share: f64) -> Self {
         if scenes.is_empty() || share <= 0.0 {
             return self;
         }
+
         self.groups.iter_mut().for_each(|group| group.share *= 1.0 - share);
         self.groups.push(Group { share, scenes });
         self
@@ -44,6 +45,7 @@ impl Scenery {
         if let [only] = &self.groups[..] {
             return &only.scenes;
         }
+
         let mut place: f64 = rng.random();
         for group in &self.groups {
             if place < group.share {

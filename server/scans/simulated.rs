@@ -51,8 +51,7 @@ pub struct ScanSettings {
 
 impl ScanSettings {
     /// The reference benchmark's scans: over still pictures, on which the crop moves as fast as crop
-    /// and scene together do
-    /// in footage. `docs/notebook.md` says how they were calibrated.
+    /// and scene together do in footage. `docs/notebook.md` says how they were calibrated.
     #[must_use]
     pub fn reference() -> Self {
         Self { crop: Motion { speed: 5.0, memory: 30.0 }, ..Self::default() }

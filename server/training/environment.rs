@@ -1,4 +1,5 @@
-//! Scans for training, one after another, seen through a lens that may lag: what one of many side by side does.
+//! One of the environments that train side by side: scans, one after another, seen through a lens
+//! that may lag.
 
 use std::collections::VecDeque;
 
@@ -11,8 +12,8 @@ use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scan;
 use crate::scans::variety::Variety;
 
-/// Most frames by which a lens is late: at 50 frames a second 40 ms, more than one settles in (about 15 ms) after the frame
-/// that decided was read out.
+/// Most frames by which a lens is late: at 50 frames a second 40 ms, more than one settles in (about
+/// 15 ms) after the frame that decided was read out.
 const MOST_DELAY: usize = 2;
 
 /// One of the many scans that run side by side in training.
@@ -36,12 +37,16 @@ impl Environment {
         let scene = scenery.draw(rng);
         let settings = variety.draw(&scene, rng);
         let scan = Scan::over(scene, settings, rng.random());
+
         let slow = rng.random_bool(0.4 * variety.share);
         let response = if slow { rng.random_range(0.4..1.0) } else { 1.0 };
+
         let late = rng.random_bool(0.25 * variety.share);
         let delay = if late { rng.random_range(1..=MOST_DELAY) } else { 0 };
+
         let coarse = rng.random_bool(0.4 * variety.share);
         let grid = if coarse { rng.random_range(0.01..0.06) } else { 0.0 };
+
         let wanders = rng.random_bool(wandering);
         let start = if rng.random_bool(0.5) { rng.random() } else { 0.5 };
         let under_way = VecDeque::from(vec![start; delay]);

@@ -59,8 +59,10 @@ fn info(which: &Which) -> Result<(), Failure> {
     if which.json {
         return print(&(serde_json::to_string(&info)? + "\n"));
     }
+
     let temperature = info.temperature_celsius.map_or("unknown".into(), |celsius| format!("{celsius:.1} °C"));
     let status = if info.status.is_empty() { "all well".into() } else { info.status.join("; ") };
+
     print(&format!(
         "driver       {}\nfirmware     {}\nserial       {}\nrange        {:.2} to {:.2} dpt\ntemperature  {temperature}\n\
          mode         {}\nstatus       {status}\nline errors  {}\n",

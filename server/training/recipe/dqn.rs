@@ -16,20 +16,22 @@ pub enum Target {
         steps: usize,
         /// Whether the online network picks the action that the target network values.
         double: bool,
-        /// Whether rewards are counted in steps a frame and against what an oracle would get from the same place: the policy that
-        /// is best stays the same, since that is shaping by a potential (Ng, Harada, Russell 1999), but what no policy can
-        /// know, how far away the optimum is, no longer drowns what an action changes.
+        /// Whether rewards are counted in steps a frame and against what an oracle would get from the
+        /// same place. The policy that is best stays the same, since that is shaping by a potential
+        /// (Ng, Harada, Russell 1999), but how far away the optimum is, which no policy can know, no
+        /// longer drowns what an action changes.
         #[serde(default)]
         regret: bool,
     },
     /// What each of the three actions would have gained over standing still at the next frame, in steps; known in
     /// simulation for all three whichever was taken.
     Lookahead {
-        /// What moving earns by itself where the picture is well out of focus, in steps: who stands still cannot tell on which
-        /// side the optimum lies.
+        /// What moving earns by itself where the picture is well out of focus, in steps: standing
+        /// still does not show on which side the optimum lies.
         #[serde(default)]
         restless: f64,
-        /// Share of that which a move against the last one earns: below 1, who looks for the optimum rather sweeps than trembles.
+        /// Share of that which a move against the last one earns: below 1, a policy that looks for
+        /// the optimum sweeps rather than trembles.
         #[serde(default = "whole")]
         turning: f64,
     },
@@ -86,7 +88,9 @@ impl DqnRecipe {
     #[must_use]
     pub fn epsilon(&self, frames: u64) -> f64 {
         let done = (frames as f64 / self.epsilon_frames.max(1) as f64).min(1.0);
-        let (first, last) = (self.first_epsilon, self.last_epsilon);
+        let first = self.first_epsilon;
+        let last = self.last_epsilon;
+
         if first.min(last) > 0.0 {
             // Rounding must not lead beyond what is a share.
             (first * (last / first).powf(done)).min(1.0)

@@ -1,4 +1,4 @@
-//! What whoever uses trained weights should know of them, as Markdown.
+//! The model card: what users of trained weights should know about them, as Markdown.
 
 use crate::evaluation::Row;
 use crate::scans::benchmark::SEED;
@@ -47,7 +47,8 @@ pub(super) fn benchmarked(card: &str, row: &Row, count: usize) -> String {
 
 fn figures(row: &Row) -> String {
     format!(
-        "mean absolute focal power error {:.4} ± {:.4}, in focus {:.1} %, travel {:.4} a frame, {:.2} reversals a second",
+        "mean absolute focal power error {:.4} ± {:.4}, in focus {:.1} %, travel {:.4} a frame, \
+         {:.2} reversals a second",
         row.mae,
         row.sd,
         100.0 * row.in_focus,

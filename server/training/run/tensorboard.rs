@@ -1,5 +1,6 @@
-//! TensorBoard event files: scalars only. Each record is its length, a masked CRC-32C of that, an `Event` protocol buffer,
-//! and a masked CRC-32C of that (`tensorflow/core/lib/io/record_writer.h`).
+//! TensorBoard event files: scalars only. Each record is its length, a masked CRC-32C of that, an
+//! `Event` protocol buffer, and a masked CRC-32C of that
+//! (`tensorflow/core/lib/io/record_writer.h`).
 
 use std::fs::File;
 use std::io::{self, Write};
