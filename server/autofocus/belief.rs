@@ -25,7 +25,7 @@ const LOOK: f64 = 0.06;
 /// Focal power that a test of the belief moves the lens by.
 const TEST: f64 = 0.1;
 
-/// Changes of focal power below this are no move.
+/// Changes of focal power below this do not count as a move.
 const STILL: f32 = 0.005;
 
 /// What the tracker remembers of the frame before.
@@ -114,7 +114,7 @@ impl Look {
 }
 
 impl Frame {
-    /// Whether a patch of any scale shows something that focus could be told by.
+    /// Whether a patch of any scale shows something to focus on.
     fn shows_detail(&self) -> bool {
         let mut looks = std::iter::once(&self.near).chain(self.wider.iter().flatten());
         looks.any(|look| look.spectrum.shows_detail())
@@ -403,7 +403,8 @@ mod tests {
     #[test]
     fn what_is_absent_is_nothing_and_what_is_there_is_told_scale_by_scale() {
         let stripes = |width: usize| Patch(std::array::from_fn(|i| if i % (2 * width) < width { 90.0 } else { 160.0 }));
-        let (fine, coarse) = (stripes(2), stripes(8));
+        let fine = stripes(2);
+        let coarse = stripes(8);
         let input = |wider| Trace::default().input(&View { patch: fine, wider }, 0.5);
         let alone = input([None; 2]);
         assert!(alone[NEAR_INPUT..].iter().all(|value| value.abs() < f32::EPSILON));
@@ -431,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_not_assured_looks_on_the_likelier_side() {
+    fn a_tracker_that_is_not_assured_looks_on_the_likelier_side() {
         let likelier = |bin: usize| {
             let mut belief = [1.0 / BINS as f32; BINS];
             belief[bin] += 0.02;

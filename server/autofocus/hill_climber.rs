@@ -1,4 +1,5 @@
-//! The hill-climber: goes on in one direction for as long as a focus metric rises, and turns back when it does not.
+//! The hill-climber: keeps one direction for as long as a focus metric rises, and turns back when it
+//! does not.
 
 use super::{Decision, Observation, Policy, STEP};
 use crate::imaging::Patch;
@@ -89,7 +90,8 @@ mod tests {
 
     #[test]
     fn a_start_on_a_bound_reverses_the_direction_it_begins_with() {
-        // Upwards before the first move: at 1 the reversal leads inside; at 0 it leads out, is cut off, and reverses again.
+        // Upwards before the first move: at 1 the reversal leads inside; at 0 it leads out, is cut off,
+        // and reverses again.
         assert_eq!(walk(1.0, &[1.0, 2.0, 3.0]), [19.0, 18.0, 17.0]);
         assert_eq!(walk(0.0, &[1.0, 2.0, 3.0]), [0.0, 1.0, 2.0]);
     }

@@ -138,7 +138,8 @@ mod tests {
 
     #[test]
     fn the_papers_networks_have_its_shapes_and_sizes() {
-        let (encoder_store, head_store) = (nn::VarStore::new(Device::Cpu), nn::VarStore::new(Device::Cpu));
+        let encoder_store = nn::VarStore::new(Device::Cpu);
+        let head_store = nn::VarStore::new(Device::Cpu);
         let encoder = Encoder::new(&encoder_store.root());
         let head = ValueHead::new(&head_store.root(), HISTORY * (ENCODING + 1));
         assert_eq!(parameters(&encoder_store), 1_832);

@@ -203,7 +203,8 @@ mod tests {
 
     #[test]
     fn instances_share_no_memory() {
-        let (registry, fixed) = (Registry::standard(), PolicyName::new("fixed"));
+        let registry = Registry::standard();
+        let fixed = PolicyName::new("fixed");
         let patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
         for start in [0.2, 0.7] {
             let focal_power = FocalPower::new(start).unwrap();

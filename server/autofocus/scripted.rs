@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_policy_is_told_why() {
+    fn a_file_that_is_not_a_policy_is_rejected_with_the_reason() {
         let error = |file| policy(file).err().unwrap();
         assert!(
             error("wrong-shape.pt")

@@ -85,7 +85,8 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     }
 });
 
-/// Band of a frequency pair: by radius, finer for low frequencies; none for the mean and its leakage, and the far corners.
+/// Band of a frequency pair: by radius, finer for low frequencies; none for the mean and its leakage,
+/// and the far corners.
 fn band(ky: usize, kx: usize) -> usize {
     if kx > HALF {
         return BANDS;

@@ -80,7 +80,7 @@ struct Destination {
 /// Does what the arguments say.
 ///
 /// # Errors
-/// When the camera fails, a reference is no use, or a file cannot be read or written.
+/// When the camera fails, a reference cannot be used, or a file cannot be read or written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.action {
         Action::Dark(capture) => dark(capture),

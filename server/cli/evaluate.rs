@@ -127,7 +127,7 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
     let policies = policies(&arguments.policies, &registry);
     let registry = policies.iter().fold(registry, scripted::with_file);
 
-    // What cannot run is told before anything that takes time.
+    // Report a policy that cannot run before doing anything that takes time.
     policies.iter().try_for_each(|name| registry.build(name).map(drop))?;
     Ok((registry, policies))
 }

@@ -31,7 +31,8 @@ pub struct Arguments {
 /// Writes the export.
 ///
 /// # Errors
-/// When there is no such session, it is asked for unblinded before it was, or the folder cannot be written.
+/// When there is no such session, it has not been unblinded though the policies are asked for, or the
+/// folder cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(write(arguments))
 }

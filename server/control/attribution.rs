@@ -1,4 +1,4 @@
-//! Which focal power a frame was exposed at, as far as can be told of a lens that cannot be read.
+//! Estimates which focal power a frame was exposed at, for a lens that cannot be read.
 
 use crate::autofocus::STEP;
 use crate::clock::Moment;
@@ -10,10 +10,11 @@ const THERE: f64 = STEP / 8.0;
 
 /// Follows the commands that a lens took, and tells where its glass was at a moment: the middle of an exposure.
 ///
-/// With 15 ms of settling, frames at 50 a second and exposures of up to 10 ms, the lens has always arrived when the next
-/// frame is exposed, so that policies see exactly the focal power they asked for, as in the paper's simulation. A slower
-/// lens, a faster camera or a longer exposure shows them frames from the way there; those are attributed to the point on
-/// the way that the lens's dynamics give, never to the destination.
+/// With 15 ms of settling, frames at 50 a second and exposures of up to 10 ms, the lens has always
+/// arrived when the next frame is exposed, so that policies see exactly the focal power they asked for,
+/// as in the paper's simulation. A slower lens, a faster camera or a longer exposure shows them frames
+/// from the way there; those are attributed to the point on the way that the lens's dynamics give,
+/// never to the destination.
 #[derive(Debug)]
 pub struct Attribution {
     way: Response,

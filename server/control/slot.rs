@@ -51,7 +51,7 @@ impl<T> LatestSlot<T> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).overwritten
     }
 
-    /// Wakes the taker for good: the producer has ended.
+    /// Wakes the taker and keeps it from waiting again: the producer has ended.
     pub fn close(&self) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
         self.fresh.notify_all();

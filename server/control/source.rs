@@ -60,7 +60,7 @@ struct Feed {
     frames: Arc<LatestSlot<Frame>>,
     health: Arc<ArcSwap<CameraHealth>>,
     stop: Arc<AtomicBool>,
-    /// Dropped with the rest when the thread ends: tells those who wait for that.
+    /// Dropped with the rest when the thread ends, which wakes [`Source::stop`].
     _ending: SyncSender<()>,
 }
 

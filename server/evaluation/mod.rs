@@ -120,7 +120,7 @@ pub fn evaluate(
             path.map_err(|error| EvaluateError::NoTarget { policy: name.clone(), scan: index + 1, error })
         };
 
-        // All of them first: of several that failed, the first is told, however the cores took turns.
+        // All of them first: of several that failed, the first is reported, however the cores took turns.
         let paths: Vec<Result<_, EvaluateError>> = (0..count).into_par_iter().map(run).collect();
         let paths = paths.into_iter().collect::<Result<_, _>>()?;
         outcomes.push(Outcome { policy: name.to_string(), paths, parts });

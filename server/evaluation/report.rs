@@ -38,7 +38,7 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// In what it differs from `other`, in words.
+    /// Names the first thing in which it differs from `other`.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<&'static str> {
         let differences = [

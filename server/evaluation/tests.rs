@@ -34,7 +34,8 @@ fn figures_of_fewer_poses_than_parts_are_those_of_the_whole_path() {
 
 #[test]
 fn figures_of_a_number_of_poses_that_parts_do_not_divide_are_those_of_the_whole_path() {
-    // Up nine steps of 0.05, a pause, down nine: 18 moves in 19 intervals, one turn, in 20 frames. Parts are of one or two.
+    // Up nine steps of 0.05, a pause, down nine: 18 moves in 19 intervals, one turn, in 20 frames.
+    // Parts are of one or two.
     let place = |index: i32| 0.05 * f64::from(index.min(19 - index));
     let path: Vec<f64> = (0..20).map(place).collect();
     // Off by 0.2 at the first four frames, which fill three parts and half of a fourth.

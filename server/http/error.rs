@@ -203,7 +203,7 @@ fn title_of(status: StatusCode) -> &'static str {
     }
 }
 
-/// Where the link of `role` is to be had: a surgeon has not seen the server start.
+/// Where to get the link of `role`: a surgeon has not seen the server start.
 const fn whence(role: Role) -> &'static str {
     match role {
         Role::Surgeon => ": the operator has it",

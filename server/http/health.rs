@@ -1,4 +1,4 @@
-//! `/healthz`: whether the server runs, for whoever watches it. Says nothing that a surgeon must not know.
+//! `/healthz`: whether the server runs, for monitoring. Says nothing that a surgeon must not know.
 
 use std::sync::Arc;
 

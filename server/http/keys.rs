@@ -25,7 +25,7 @@ const HEADER: &str = "# Keys of the three roles' links. Whoever has a key has th
 /// Roles that have a key.
 pub const ROLES: [Role; 3] = [Role::Surgeon, Role::Operator, Role::Researcher];
 
-/// Why there are no keys.
+/// Why the keys could not be loaded or made.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file could not be read or written.
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_file_is_said_to_be_damaged() {
+    fn a_damaged_file_is_reported_as_damaged() {
         let dir = tempfile::tempdir().unwrap();
         for text in ["", "surgeon = 3", "surgeon = \"\"\noperator = \"\"\nresearcher = \"\"\n"] {
             fs::write(dir.path().join(FILE), text).unwrap();

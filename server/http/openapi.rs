@@ -34,7 +34,7 @@ pub type Finished = Arc<OnceLock<String>>;
 /// What answers without a key.
 const OPEN: [&str; 3] = ["/enter", "/healthz", "/static/{version}/{folder}/{name}"];
 
-/// What any request may be answered, whoever asks for what.
+/// Answers that any request may get.
 const ALWAYS: [(&str, &str); 5] = [
     ("400", "The request cannot be read"),
     ("408", "It took too long"),
@@ -43,7 +43,7 @@ const ALWAYS: [(&str, &str); 5] = [
     ("503", "Too many pages are open at once"),
 ];
 
-/// What a request with a body may be answered.
+/// Answers that a request with a body may get.
 const WITH_BODY: [(&str, &str); 3] = [
     ("413", "The body is too long"),
     ("415", "The body is not said to be application/json"),

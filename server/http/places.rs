@@ -139,7 +139,8 @@ impl Drop for Place {
     }
 }
 
-/// Who counts as one: an address, or all of an IPv6 network, whose every address is one machine's for the asking.
+/// What counts as one host: an address, or a whole IPv6 network, in which one machine can use every
+/// address it likes.
 fn host(address: IpAddr) -> IpAddr {
     const NETWORK: u128 = !0 << 64;
     match address.to_canonical() {

@@ -102,7 +102,7 @@ impl SessionPage {
         Self { nonce, detail, questions, written, closing }
     }
 
-    /// The policy of `setting`, once it was told.
+    /// The policy of `setting`, once the session was unblinded.
     fn policy(&self, setting: usize) -> Option<&PolicyName> {
         self.detail.unblinding.as_ref()?.policies.get(setting.wrapping_sub(1))
     }

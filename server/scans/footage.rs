@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_and_empty_footage_is_told() {
+    fn missing_and_empty_footage_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         assert!(clips(&folder.path().join("no.mp4")).unwrap_err().to_string().contains("there is no such file"));
         assert!(clips(folder.path()).unwrap_err().to_string().contains("there is no picture"));

@@ -26,7 +26,7 @@ pub trait FocalTimeScan {
     /// The optimal focal power at this frame.
     fn optimum(&self) -> FocalPower;
 
-    /// Goes on to the next frame; at the last one it may stay.
+    /// Advances to the next frame; at the last one it may stay.
     fn advance(&mut self);
 }
 

@@ -62,8 +62,9 @@ pub fn sharp_phantom_of(split: Split, index: u64, side: usize) -> GrayImage {
     Scene::new(split.first_seed() + index).sharp_gray(side, side)
 }
 
-/// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds; half of all with a
-/// contrast that varies from place to place, and half of all soft, as optics, demosaicing and compression leave footage.
+/// Pictures to train on, `count` of them: one in three a phantom's, the others textures of many kinds.
+/// Half of all have a contrast that varies from place to place, and half of all are soft, as optics,
+/// demosaicing and compression leave footage.
 ///
 /// # Errors
 /// None in practice: the pictures are large enough.

@@ -205,7 +205,8 @@ fn gradient_magnitudes(picture: &GrayImage) -> Vec<f32> {
     out
 }
 
-/// Where `curve` over `positions` peaks: at the vertex of the parabola through its greatest value and that one's neighbours.
+/// Where `curve` over `positions` peaks: at the vertex of the parabola through its greatest value and
+/// that one's neighbours.
 fn peak(positions: &[f32], curve: &[f32]) -> f32 {
     let top = (0..curve.len()).max_by(|&a, &b| curve[a].total_cmp(&curve[b])).unwrap_or(0);
     if top == 0 || top + 1 == curve.len() {
@@ -272,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_stack_is_refused() {
+    fn pictures_that_are_not_a_stack_are_rejected() {
         let picture = GrayImage { width: 64, height: 64, data: vec![0.0; 64 * 64] };
         let small = GrayImage { width: 64, height: 63, data: vec![0.0; 64 * 63] };
         let at = |position: f32, picture: &GrayImage| (position, picture.clone());

@@ -122,7 +122,8 @@ impl RecordedScan {
         Self { powers, poses }
     }
 
-    /// Reads a scan's patches from its folder, checking every picture. `progress` is told after each pose.
+    /// Reads a scan's patches from its folder, checking every picture. `progress` is called after each
+    /// pose.
     ///
     /// # Errors
     /// When poses are missing, or a picture is damaged.
@@ -146,7 +147,7 @@ impl RecordedScan {
     }
 
     /// The scan of a hand-held trajectory over the phantom, as `parfocal scan record` would store it, of which only the
-    /// patches are made. `progress` is told after each pose.
+    /// patches are made. `progress` is called after each pose.
     #[must_use]
     pub fn phantom(trajectory: &Trajectory, seed: u64, powers: usize, progress: &(dyn Fn() + Sync)) -> Self {
         let powers = evenly_spread(powers);
@@ -377,7 +378,8 @@ mod tests {
 
     #[test]
     fn every_focal_power_is_taken_once_and_in_another_order_at_another_pose() {
-        let (first, second) = (capture_order(1, 0, 21), capture_order(1, 1, 21));
+        let first = capture_order(1, 0, 21);
+        let second = capture_order(1, 1, 21);
         assert_ne!(first, second);
         assert_eq!(capture_order(1, 0, 21), first);
         let mut sorted = first;

@@ -146,7 +146,7 @@ impl Optics {
         self.slope * (off + self.bend * off * off)
     }
 
-    /// The focal power at which `scene` is seen at `position`: what [`Optics::position`] takes back.
+    /// The focal power at which `scene` is seen at `position`: the inverse of [`Optics::position`].
     fn focal_power(&self, scene: &StackScene, focus: f64, position: f64) -> f64 {
         if scene.photographed {
             return (position - self.origin(focus, scene.planes.range())) / self.slope;
@@ -430,7 +430,7 @@ impl Scan {
         }
     }
 
-    /// Goes on to the next frame.
+    /// Advances to the next frame.
     pub fn advance(&mut self) {
         self.time += 1;
         self.focus.advance(&mut self.course);
@@ -597,7 +597,7 @@ mod tests {
     }
 
     #[test]
-    fn optics_take_back_what_they_give() {
+    fn focal_power_inverts_position() {
         let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 1).unwrap().remove(0);
         let stack = StackScene::clone(&stack);
         let photographed = StackScene { photographed: true, slopes: (8.0, 8.0), ..stack.clone() };

@@ -81,7 +81,8 @@ impl Environment {
         FocalPower::nearest(if self.grid > 0.0 { (stands / self.grid).round() * self.grid } else { stands })
     }
 
-    /// Sends the lens to `target` and goes on to the next frame, or to a later one where the lens is late.
+    /// Sends the lens to `target`, where it arrives some frames later if it is late, and advances to
+    /// the next frame.
     pub fn advance(&mut self, target: f64) {
         self.under_way.push_back(target);
         let target = self.under_way.pop_front().unwrap_or(target);

@@ -218,8 +218,8 @@ mod tests {
     #[test]
     fn adam_by_hand() {
         let rule = Rule::Adam { learning_rate: 0.1 };
-        // Down one and the same slope each step is the learning rate, however steep it is. After it turned round the mean
-        // gradient is -0.01 / 0.19, and the mean square still 1.
+        // Down one and the same slope each step is the learning rate, however steep it is. After it
+        // turned round the mean gradient is -0.01 / 0.19, and the mean square still 1.
         let turned = -0.1 + 0.1 * 0.01 / 0.19;
         for (gradients, expected) in
             [(&[1.0; 3][..], -0.3), (&[50.0; 3], -0.3), (&[0.02; 3], -0.3), (&[1.0, -1.0], turned)]

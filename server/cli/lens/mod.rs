@@ -1,4 +1,4 @@
-//! `parfocal lens`: what a lens is, moving it by hand, sweeping it, and a lens driver that is not there.
+//! `parfocal lens`: describes a lens, moves it by hand, sweeps it, measures it, and emulates one.
 
 mod emulate;
 mod measure;
@@ -64,7 +64,8 @@ fn info(which: &Which) -> Result<(), Failure> {
     let status = if info.status.is_empty() { "all well".into() } else { info.status.join("; ") };
 
     print(&format!(
-        "driver       {}\nfirmware     {}\nserial       {}\nrange        {:.2} to {:.2} dpt\ntemperature  {temperature}\n\
+        "driver       {}\nfirmware     {}\nserial       {}\n\
+         range        {:.2} to {:.2} dpt\ntemperature  {temperature}\n\
          mode         {}\nstatus       {status}\nline errors  {}\n",
         info.driver, info.firmware, info.serial, info.min_dioptre, info.max_dioptre, info.mode, info.line_errors
     ))

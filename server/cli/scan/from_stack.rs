@@ -51,7 +51,7 @@ pub struct Arguments {
 /// Makes the scan.
 ///
 /// # Errors
-/// When the pictures are no focal stack, or the scan cannot be stored.
+/// When the pictures are not a focal stack, or the scan cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stack = FocalStack::load(&arguments.folder, arguments.list.as_deref(), arguments.scale.into())?;
     for note in check(&stack)? {

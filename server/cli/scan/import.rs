@@ -21,7 +21,7 @@ pub struct Arguments {
 /// Imports.
 ///
 /// # Errors
-/// When the pictures are no scan, or it cannot be stored.
+/// When the pictures are not a scan, or it cannot be stored.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let imported = Imported::look(&arguments.folder)?;
     let progress = bar(imported.len(), 0);

@@ -75,7 +75,7 @@ struct Deviation {
 /// Looks at the scan and checks every picture.
 ///
 /// # Errors
-/// When there is no scan; when poses are missing or pictures damaged, after telling of them.
+/// When there is no scan; when poses are missing or pictures damaged, after reporting them.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scan = ScanFolder::open(&arguments.folder)?;
     let progress = bar(scan.poses().len(), 0);

@@ -170,7 +170,8 @@ fn asker(
     let typed = std::io::stdin().is_terminal();
 
     move |pose| {
-        // An Enter from before the question, of a key that bounces or was pressed in vain, is no answer to it.
+        // An Enter from before the question, from a key that bounces or was pressed too early, does not
+        // answer it.
         while typed && lines.try_recv().is_ok() {}
         progress.suspend(|| tell(format_args!("pose {pose} of {poses}: move the camera there, then press Enter")));
         loop {

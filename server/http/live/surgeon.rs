@@ -1,5 +1,5 @@
-//! What a surgeon's page gets on `/live`. These types have no field for a policy, its focal power, metric or timing, and
-//! their form is the same whatever runs.
+//! What a surgeon's page gets on `/live`. These types have no field for a policy, its focal power,
+//! metric or timing, and their form is the same whatever runs.
 
 use std::sync::Arc;
 
@@ -87,8 +87,9 @@ impl SurgeonStatus {
     }
 }
 
-/// A picture's age in whole hundreds of milliseconds. It holds the policy's own time, from hundredths of a millisecond to
-/// some milliseconds on a busy machine; a page wants to know only whether the picture is older than half a second.
+/// A picture's age in whole hundreds of milliseconds. The exact age includes the policy's own time, from
+/// hundredths of a millisecond to some milliseconds on a busy machine, and would tell policies apart; a
+/// page needs to know only whether the picture is older than half a second.
 pub(super) fn coarse(age_ms: f64) -> f64 {
     (age_ms / 100.0).floor() * 100.0
 }

@@ -19,7 +19,7 @@ const TOLERANCE: f64 = 0.01;
 
 /// What moves the camera to its next pose.
 pub enum Stepper {
-    /// A person, who is asked for each pose and says when it is there; whether to go on.
+    /// A person, who is asked for each pose and confirms when the camera is there.
     Asked(Box<dyn FnMut(usize) -> Result<(), StepperError> + Send>),
     /// A shell command in which `{pose}` stands for the pose's number.
     Command(String),

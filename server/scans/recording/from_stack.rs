@@ -121,7 +121,8 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     Ok(corners.iter().zip(&optima).zip(&followed).map(window).collect())
 }
 
-/// Stores the scan that `cut` makes of `stack` in `out`, or goes on with it. `progress` is told after each pose.
+/// Stores the scan that `cut` makes of `stack` in `out`, or continues it. `progress` is called after
+/// each pose.
 ///
 /// # Errors
 /// When the stack is too small, or `out` holds another scan or cannot be written.

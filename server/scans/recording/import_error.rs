@@ -71,14 +71,15 @@ pub enum ImportError {
         other_size: (usize, usize),
     },
     /// Pictures too small to be of use.
-    #[error("{} is {}x{} pixels; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}", path.display(), size.0, size.1)]
+    #[error("{} is {}x{} pixels; a scan's pictures must be at least {LEAST_SIDE}x{LEAST_SIDE}",
+            path.display(), size.0, size.1)]
     TooSmall {
         /// The file.
         path: PathBuf,
         /// Its width and height.
         size: (usize, usize),
     },
-    /// A file that is no picture.
+    /// A file that is not a picture.
     #[error("{}: {error}", path.display())]
     Picture {
         /// The file.

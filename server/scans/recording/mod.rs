@@ -41,7 +41,7 @@ pub struct Taken {
 /// Why recording ended early. What was stored is whole.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// It was told to.
+    /// It was told to stop.
     #[error("stopped")]
     Stopped,
     /// The camera could not be moved on.

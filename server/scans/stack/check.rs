@@ -1,4 +1,4 @@
-//! Whether pictures are a focal stack of one still scene: what can be told from the pictures alone.
+//! Checks from the pictures alone whether they are a focal stack of one still scene.
 
 use super::{FocalStack, Plane, StackError};
 
@@ -17,10 +17,10 @@ const LEAST_ALIKE: f64 = 0.8;
 /// times as much as is usual.
 const MOVED: (f64, f64) = (15.0, 4.0);
 
-/// What a stack should be told of: jumps, motion, overexposure.
+/// Notes for the person who took the stack: jumps, motion, overexposure.
 ///
 /// # Errors
-/// When the pictures are no focal stack: no peak, another scene, the wrong order, or overexposed.
+/// When the pictures are not a focal stack: no peak, another scene, the wrong order, or overexposed.
 pub fn check(stack: &FocalStack) -> Result<Vec<String>, StackError> {
     let mut notes = Vec::new();
     overexposure(stack, &mut notes)?;
@@ -326,12 +326,12 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_stack_is_told_of_nothing() {
+    fn a_sound_stack_gets_no_notes() {
         assert_eq!(check(&stack(11, |_, picture| picture)).unwrap(), Vec::<String>::new());
     }
 
     #[test]
-    fn what_is_no_stack_is_refused() {
+    fn pictures_that_are_not_a_stack_are_rejected() {
         let sharp = |_, _| texture(8, SIDE);
         assert!(refused(&stack(11, sharp)).contains("no peak"));
         let one_side = stack(21, |_, picture| picture).planes()[10..].to_vec();
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_and_something_that_moves_are_told() {
+    fn a_jump_and_something_that_moves_are_noted() {
         let jumped = |index, picture: GrayImage| {
             let mut moved = picture.clone();
             if index > 6 {

@@ -51,8 +51,9 @@ struct Moment {
 }
 
 impl StackCourse {
-    /// A course over `stack`, whose positions count its planes from 0, drawn from `seed`; `planes` of them are the range.
-    /// `None` where the stack has fewer planes, or is smaller than the window of 128 pixels.
+    /// A course over `stack`, whose positions count its planes from 0, drawn from `seed`; `planes` of
+    /// them are the range. `None` where the stack has fewer planes, or is smaller than the window of
+    /// 128 pixels.
     #[must_use]
     pub fn new(stack: Arc<PlaneStack>, planes: usize, seed: u64) -> Option<Self> {
         let (width, height) = stack.size();

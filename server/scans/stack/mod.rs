@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use crate::camera::footage::{self, pictures_in};
 use crate::imaging::{Calibration, DecodeError, GrayImage, Reconstructor, decode, reduced};
 
-/// Least number of pictures of which a stack can be told to have a peak and an order.
+/// Least number of pictures in which a peak and an order can be recognised.
 pub const LEAST_PLANES: usize = 5;
 /// Most positions, gaps included.
 const MOST_POSITIONS: usize = 1001;
@@ -104,7 +104,7 @@ pub enum StackError {
         /// All places.
         of: usize,
     },
-    /// What the pictures show is no focal stack.
+    /// The pictures do not show a focal stack.
     #[error("{0}")]
     Unfit(String),
 }
@@ -133,11 +133,12 @@ impl FocalStack {
         Ok(Self { planes })
     }
 
-    /// Reads the pictures in `folder`, made smaller by blocks of `scale` x `scale` pixels. Positions are those of `list`
-    /// (lines of `name,position`), else the one number in which the names differ, else the natural order of names.
+    /// Reads the pictures in `folder`, made smaller by blocks of `scale` x `scale` pixels. Positions are
+    /// those of `list` (lines of `name,position`), else the one number in which the names differ, else
+    /// the natural order of names.
     ///
     /// # Errors
-    /// When a picture or the list cannot be read, or they are no stack.
+    /// When a picture or the list cannot be read, or the pictures are not a stack.
     pub fn load(folder: &Path, list: Option<&Path>, scale: usize) -> Result<Self, StackError> {
         let files = pictures_in(folder)?;
         let placed = match list {

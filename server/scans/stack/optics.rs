@@ -38,7 +38,7 @@ pub struct Place {
     pub sharpness: Vec<f64>,
 }
 
-/// What is known of an optic. Nothing is said of what cannot be told from the pictures.
+/// What is known about an optic; `None` where the pictures do not show it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Optics {
     /// Focus curves.
@@ -167,8 +167,8 @@ fn gradient(picture: &GrayImage, x: usize, y: usize) -> f64 {
     f64::from(across.hypot(down))
 }
 
-/// How magnification grows from the first picture to the last: by how the left and right thirds, and the upper and lower
-/// ones, move apart from picture to picture.
+/// How magnification grows from the first picture to the last: by how the left and right thirds, and
+/// the upper and lower ones, move apart from picture to picture.
 fn magnification(stack: &FocalStack) -> Option<f64> {
     /// Farthest shift from one picture to the next, pixels.
     const FARTHEST: isize = 3;
@@ -248,10 +248,13 @@ mod tests {
         let sharp = gaussian_blur(&texture(8, SIDE), 1.5);
         let sample = |x: f64, y: f64| {
             let clamped = |v: f64| v.clamp(0.0, SIDE as f64 - 1.001);
-            let (x, y) = (clamped(x), clamped(y));
-            let (left, top) = (x as usize, y as usize);
+            let x = clamped(x);
+            let y = clamped(y);
+            let left = x as usize;
+            let top = y as usize;
             let at = |dx, dy| f64::from(sharp.data[(top + dy) * SIDE + left + dx]);
-            let (fx, fy) = (x - left as f64, y - top as f64);
+            let fx = x - left as f64;
+            let fy = y - top as f64;
             (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy
         };
         let zoomed = |index: usize| {

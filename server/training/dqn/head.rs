@@ -7,8 +7,8 @@ use tch::{Device, Tensor};
 
 use crate::autofocus::networks::{ValueHead, compute_on_this_thread};
 
-/// Most states that a core works on at once. What is summed over states is summed over these parts first, in a fixed order:
-/// how many cores share them changes no digit.
+/// Most states that a core works on at once. What is summed over states is summed over these parts
+/// first, in a fixed order: how many cores share them changes no digit.
 const STATES_AT_ONCE: i64 = 256;
 
 /// What a head made of states, with all that its gradient needs.

@@ -88,7 +88,7 @@ impl DqnTrainer {
         self.online.store.device()
     }
 
-    /// Every actor sees a frame, acts, and goes on.
+    /// Every actor sees a frame, acts, and advances to the next one.
     fn play_a_frame(&mut self) {
         let sight = self.online.network.sight;
         let seen: Vec<Seen> = self

@@ -99,8 +99,8 @@ mod tests {
     use crate::autofocus::networks::compute_on_this_thread;
     use crate::training::dqn::replay::Transition;
 
-    /// Windows of twelve frames of noise, of which every other begins a scan; in the others the first states' histories begin
-    /// before it.
+    /// Windows of twelve frames of noise, of which every other begins a scan; in the others the first
+    /// states' histories begin before it.
     fn batch(windows: u16, rng: &mut ChaCha8Rng) -> Batch {
         const WINDOW: u16 = 12;
         let mut frames = Frames::default();

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_others_wrote_is_left_alone() {
+    fn files_of_others_are_left_alone() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("MODEL_CARD.md"), "mine").unwrap();
         assert!(RunFolder::begin(folder.path()).unwrap_err().to_string().contains("holds other files"));
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_told_with_what_to_do() {
+    fn a_full_disk_is_reported_with_advice() {
         let folder = tempfile::tempdir().unwrap();
         let told = |path: &Path| TrainError::writing(path, io::ErrorKind::StorageFull.into()).to_string();
         let file = folder.path().join("curves.csv");

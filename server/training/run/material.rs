@@ -90,8 +90,8 @@ impl Material {
                  footage with --footage, or start again in another folder"
             )),
             _ => differs(format!(
-                "this training was begun on other footage: {names}; leave out --footage, or give the same pictures in the \
-                 same order"
+                "this training was begun on other footage: {names}; leave out --footage, or give the same \
+                 pictures in the same order"
             )),
         }
     }

@@ -19,8 +19,8 @@ pub(super) struct Made<'a> {
 pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
     let origin = made.origin.map_or("random weights".to_owned(), |file| format!("the weights {file}"));
     format!(
-        "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, beginning with {origin}, \
-         on {}.\n\n\
+        "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, \
+         beginning with {origin}, on {}.\n\n\
          Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
          and layouts. Not a medical device.\n\n\
          On {count} validation scans, half of them varied: {}.\n",

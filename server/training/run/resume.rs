@@ -58,8 +58,8 @@ impl ResumeRequest {
 
         match self.seed {
             Some(other) if other != seed => differs(format!(
-                "the training in {folder} was begun with seed {seed}, not {other}; leave out --seed to continue, or start \
-                 again in another folder"
+                "the training in {folder} was begun with seed {seed}, not {other}; leave out --seed to continue, \
+                 or start again in another folder"
             )),
             _ => Ok(()),
         }
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_differs_is_told_with_what_to_do() {
+    fn a_difference_is_reported_with_advice() {
         let ships = |name: &str| Recipe::parse(shipped(name).unwrap()).unwrap();
         let recipe = ships("mgm-learned").with_updates(2000);
         let request = |name: &str| ResumeRequest { name: name.to_owned(), ..ResumeRequest::default() };

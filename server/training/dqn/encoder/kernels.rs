@@ -1,5 +1,6 @@
 //! The encoder's arithmetic, forward and backward, a patch at a time. Its eight filters lie side by side in one 256-bit
-//! register, and what a patch needs fits the first-level cache: that is what libtorch, made for wide layers, cannot use.
+//! register, and what a patch needs fits the first-level cache. libtorch, made for wide layers, cannot
+//! use that.
 #![allow(clippy::needless_range_loop, reason = "plain index loops of fixed length are what compiles to vector code")]
 
 use multiversion::multiversion;

@@ -1,5 +1,6 @@
-//! The paper's CNN encoder for training on the processor, its gradients written by hand. `networks::Encoder`, which works
-//! on every device and in the live loop, is the reference that it is tested against.
+//! The paper's CNN encoder for training on the processor, its gradients written by hand.
+//! `networks::Encoder`, which works on every device and in the live loop, is the reference that it is
+//! tested against.
 
 mod kernels;
 #[cfg(test)]
@@ -53,8 +54,8 @@ impl Encoder {
         encodings.into_flattened()
     }
 
-    /// The gradient by all variables, laid out one after another in the order of their names, of a loss whose gradient by
-    /// the encodings `[N, 8]` of patches `[N, 1024]` is `grad_output`.
+    /// The gradient by all variables, laid out one after another in the order of their names, of a
+    /// loss whose gradient by the encodings `[N, 8]` of patches `[N, 1024]` is `grad_output`.
     #[must_use]
     pub fn gradient(&self, patches: &[u8], grad_output: &[f32]) -> Vec<f32> {
         let weights = self.weights();

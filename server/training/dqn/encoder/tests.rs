@@ -11,7 +11,8 @@ use crate::autofocus::networks;
 fn patches(count: usize, rng: &mut impl Rng) -> Vec<u8> {
     let mut levels = Vec::with_capacity(count * 1024);
     for patch in 0..count {
-        let (slope, noise) = (rng.random_range(0.0..4.0f32), rng.random_range(1..80u8));
+        let slope = rng.random_range(0.0..4.0f32);
+        let noise = rng.random_range(1..80u8);
         for pixel in 0..1024u16 {
             let ramp = slope * f32::from(pixel % 32);
             let level = 20.0 + ramp + f32::from(rng.random_range(0..noise));
