@@ -28,7 +28,7 @@ const TEST: f64 = 0.1;
 /// Changes of focal power below this do not count as a move.
 const STILL: f32 = 0.005;
 
-/// What the tracker remembers of the frame before.
+/// The tracker's memory of the frame before.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
     last: Option<Box<Frame>>,

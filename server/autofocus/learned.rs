@@ -73,7 +73,7 @@ pub struct ValueNetwork {
     /// What it sees.
     pub sight: Sight,
     encoder: Option<Encoder>,
-    /// What makes values of its histories.
+    /// Computes action values from the histories.
     pub head: ValueHead,
 }
 

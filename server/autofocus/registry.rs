@@ -220,6 +220,7 @@ mod tests {
             "",
             "it is not here: fetch it",
         );
+
         let error = |name| registry.build(&PolicyName::new(name)).err().map(|error| error.to_string());
         assert_eq!(error("c").as_deref(), Some("there is no policy 'c'; there are: a, b"));
         assert_eq!(error("b").as_deref(), Some("policy 'b' cannot run: it is not here: fetch it"));

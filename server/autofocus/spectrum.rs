@@ -1,4 +1,4 @@
-//! What a patch tells of its blur: the energy in bands of spatial frequency, as logarithms.
+//! Measures how blurred a patch is: the energy in bands of spatial frequency, as logarithms.
 //!
 //! A Gaussian of standard deviation s multiplies the energy at angular frequency w by exp(-(s w)²), so a change of blur
 //! shifts each band's logarithm by an amount that depends on neither contrast nor texture.

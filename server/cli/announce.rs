@@ -1,5 +1,5 @@
-//! What `serve` says when it is ready: where each role finds its page, a code for the tablet to scan, and, loudly, what
-//! is simulated.
+//! The announcement that `serve` prints when it is ready: where each role finds its page, a code for
+//! the tablet to scan, and, loudly, what is simulated.
 
 use std::fmt::Write;
 use std::net::{IpAddr, SocketAddr, UdpSocket};

@@ -246,7 +246,7 @@ fn names(argument: &str) -> Vec<&str> {
     }
 }
 
-/// What to evaluate on.
+/// The scans to evaluate on.
 struct Scans {
     /// The scans of one part.
     set: Box<dyn ScanSet>,

@@ -1,4 +1,4 @@
-//! What every command has: how it fails, what it prints, and its progress bar.
+//! Shared by all commands: how they fail, what they print, and the progress bar.
 
 use std::io::Write;
 

@@ -25,7 +25,7 @@ struct Question {
     focal_power: FocalPower,
 }
 
-/// What came of a question.
+/// The outcome of a question.
 type Answer = Result<Advice, Failure>;
 
 /// One instance of a policy on a thread of its own. At most one question is open at a time.

@@ -31,11 +31,11 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(200);
 /// How long a camera that does not answer is waited for at the end.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// What the loop is made of.
+/// The parts of the loop.
 pub struct Rig {
     /// Where frames come from.
     pub camera: Box<dyn Camera>,
-    /// What is turned.
+    /// The lens to move.
     pub lens: Box<dyn Lens>,
     /// Makes the patch of a mosaic.
     pub reconstructor: Reconstructor,

@@ -31,9 +31,9 @@ pub struct Stepper {
     placed: bool,
     segment: Option<SegmentId>,
     content_area: Option<ContentArea>,
-    /// What the lens took last.
+    /// The last command that the lens took.
     asked: FocalPower,
-    /// What the lens is to be told next: differs from `asked` only while it does not listen.
+    /// The next command for the lens: differs from `asked` only while it does not listen.
     wanted: FocalPower,
     /// Why the lens did not take the last command, if it did not.
     lens_fault: Option<HoldReason>,

@@ -54,7 +54,7 @@ impl Subject {
     }
 }
 
-/// What `evaluate` gives. docs/scripting.md promises the names of its fields.
+/// The result of `evaluate`. docs/scripting.md promises the names of its fields.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// What was evaluated.

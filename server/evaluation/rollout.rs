@@ -101,7 +101,8 @@ pub fn roll_out(policy: &mut dyn Policy, scan: &mut dyn FocalTimeScan, frames: u
     Ok(course)
 }
 
-/// What a policy with the paper's steps could do at best, if it knew the next frame's optimum.
+/// Runs the oracle: the best that a policy with the paper's steps could do if it knew the next
+/// frame's optimum.
 pub fn roll_out_oracle(scan: &mut dyn FocalTimeScan, frames: usize) -> Path {
     let mut focal_power = FocalPower::MIDDLE;
     let mut course = Path::default();

@@ -88,7 +88,7 @@ impl<S: ScanSet> ScanSet for PartOf<S> {
     }
 }
 
-/// What an evaluation found on one part of its scans.
+/// The findings of an evaluation on one part of its scans.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Shard {
     format: String,
@@ -138,7 +138,7 @@ pub enum MergeError {
 }
 
 impl Shard {
-    /// What was found on `part` of the scans of `subject`.
+    /// The findings on `part` of the scans of `subject`.
     #[must_use]
     pub fn new(part: Part, subject: Subject, without_detail: usize, outcomes: Vec<Outcome>) -> Self {
         Self { format: FORMAT.to_owned(), software: SOFTWARE.to_owned(), part, subject, without_detail, outcomes }

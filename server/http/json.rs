@@ -1,4 +1,4 @@
-//! What a request says in JSON.
+//! Reads a request's JSON body.
 
 use axum::Json;
 use axum::extract::{FromRequest, Request};

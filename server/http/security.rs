@@ -64,7 +64,7 @@ fn content_security_policy(nonce: &str) -> String {
 
 /// Gives the connection of a request that shows a key a member's place. Rejects requests from other
 /// sites and, on a loopback server, host names that are not this machine's own: a site whose name
-/// is made to point here (DNS rebinding) has no role's cookie, and does not even get an error page.
+/// is made to point here (DNS rebinding) has no role's cookie, and does not even get the page that says so.
 pub async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();

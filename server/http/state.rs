@@ -1,4 +1,4 @@
-//! What every handler holds of the rest of the server.
+//! The parts of the server that every handler can use.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -48,7 +48,7 @@ pub struct App {
     pub shutdown: watch::Receiver<bool>,
 }
 
-/// What HTTP itself counts.
+/// Counters of HTTP itself.
 #[derive(Debug, Clone, Default)]
 pub struct Metrics {
     /// Frames sent to viewers.

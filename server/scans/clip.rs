@@ -1,4 +1,4 @@
-//! What simulated scans are made of: sharp pictures in order of time.
+//! Clips, of which simulated scans are made: sharp pictures in order of time.
 
 use std::sync::{Arc, OnceLock};
 
@@ -28,7 +28,7 @@ pub struct Area {
     pub bottom: usize,
 }
 
-/// Pictures that no scan can be made of.
+/// Why no scan can be made of pictures.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClipError {
     /// There is no picture at all.

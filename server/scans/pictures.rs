@@ -1,4 +1,4 @@
-//! Which sharp pictures training, validation and the reference benchmark are made of: never the same ones.
+//! The sharp pictures of training, validation and the reference benchmark: never the same ones.
 
 use std::sync::Arc;
 

@@ -47,7 +47,7 @@ pub struct RecordedScan {
     poses: Vec<Stack>,
 }
 
-/// What is known of one pose.
+/// One pose: its patches, and where it is sharpest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
     /// The focal power at which the patch is sharpest.

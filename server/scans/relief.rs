@@ -30,7 +30,7 @@ const MOST_SOFTNESS: f64 = 3.0;
 /// Blur in pixels a unit of focal power: least and most of any scene.
 const SLOPES: (f64, f64) = (1.5, 24.0);
 
-/// What scenes are drawn by.
+/// Parameters that scenes are drawn with.
 #[derive(Debug, Clone, Copy)]
 pub struct Style {
     /// Share of scenes without relief.
@@ -222,7 +222,7 @@ fn close_positions() -> Vec<f32> {
     below.chain([0.0]).chain(side.iter().copied()).collect()
 }
 
-/// What lies on the ground, sharp.
+/// The sharp picture of the ground.
 fn surface(split: Split, index: u64, rng: &mut impl Rng) -> GrayImage {
     let seed = split.first_seed() + index;
     let mut picture =

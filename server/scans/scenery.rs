@@ -1,4 +1,4 @@
-//! What scans go over in training: groups of scenes, each drawn from with a share of its own.
+//! The scenes of training's scans, in groups, each drawn from with a share of its own.
 
 use std::sync::Arc;
 

@@ -22,7 +22,7 @@ pub enum TrainError {
     /// The footage shows nothing to focus on.
     #[error(transparent)]
     Blank(#[from] NothingToFocusOn),
-    /// What is asked for is not what the checkpoint's training was begun with.
+    /// The request differs from what the checkpoint's training was begun with.
     #[error("{0}")]
     Differs(String),
     /// The run folder cannot be written.

@@ -1,4 +1,4 @@
-//! What a training does over and over, whichever kind of policy learns.
+//! The steps that a training repeats, whichever kind of policy learns.
 
 use tch::nn;
 

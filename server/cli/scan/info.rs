@@ -204,7 +204,7 @@ fn table(rows: &[(&str, String)]) -> String {
     })
 }
 
-/// What an optic does, in lines; `unit` is what the pictures' positions are.
+/// An optic's figures, in lines; `unit` names the unit of the pictures' positions.
 pub(super) fn optics(optics: &Optics, unit: &str) -> String {
     let mut rows = Vec::new();
     if let Some(blur) = optics.blur_per_unit {
@@ -232,7 +232,7 @@ fn bars(curve: &[f64]) -> String {
     curve.iter().map(|value| BARS[((7.99 * value / most) as usize).min(7)]).collect()
 }
 
-/// What some poses show of the optic.
+/// The optic's figures, from some of the poses.
 fn optics_of(scan: &ScanFolder) -> Option<Optics> {
     let poses: Vec<_> = scan.poses().values().collect();
     let shown = poses.iter().step_by(poses.len().div_ceil(SHOWN).max(1));

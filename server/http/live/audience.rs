@@ -1,4 +1,4 @@
-//! Who is at the other end of a live stream.
+//! The audience at the other end of a live stream.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::control::ControlStatus;
 use crate::http::App;
 use crate::live::EncodedFrame;
 
-/// Who is at the other end, and so what may be sent: one implementation a role, each with types of its own.
+/// The audience decides what may be sent: one implementation a role, each with types of its own.
 pub trait Audience: Send + Sync + 'static {
     /// What goes with each picture.
     type Header: Serialize + Send;

@@ -51,7 +51,7 @@ struct LiveQuery {
     role: Option<Role>,
 }
 
-/// What a page says.
+/// A message from a page.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 enum Said {
@@ -61,7 +61,7 @@ enum Said {
     Visible { visible: bool },
 }
 
-/// What a page is told in text.
+/// A text message to a page.
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 enum Told<S, T> {
@@ -113,13 +113,13 @@ struct Desk<A: Audience> {
     in_flight: Option<u64>,
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
     statuses: watch::Receiver<Arc<ControlStatus>>,
-    /// The last status told, so that only changes are.
+    /// The last status sent, so that only changes are sent.
     told: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
     heartbeat: tokio::time::Interval,
     /// Heartbeats since the page was last heard.
     silent: u32,
-    /// What goes out next, whatever else there is.
+    /// The message that goes out next, before any other.
     next: Option<Message>,
 }
 

@@ -18,7 +18,7 @@ use crate::camera::{CameraError, recorded::LEAST_SIDE};
 use crate::imaging::{GrayImage, PatchArea};
 use crate::lens::{FocalPower, LensError};
 
-/// What scans are recorded of.
+/// A setup that scans are recorded with.
 pub trait Bench {
     /// Goes to pose `pose` (from 1) and takes a picture at each of `powers`, in this order.
     ///

@@ -257,6 +257,7 @@ mod tests {
             let fy = y - top as f64;
             (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy
         };
+
         let zoomed = |index: usize| {
             let zoom = 1.004f64.powf(index as f64);
             let centre = SIDE as f64 / 2.0;
@@ -264,6 +265,7 @@ mod tests {
             let data = (0..SIDE * SIDE).map(|i| sample(place(i % SIDE), place(i / SIDE)) as f32).collect();
             GrayImage { width: SIDE, height: SIDE, data }
         };
+
         let found = Optics::of(&stack(zoomed)).magnification.unwrap();
         assert!((found / 0.0407 - 1.0).abs() < 0.2, "{found}");
     }

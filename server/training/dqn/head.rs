@@ -11,7 +11,7 @@ use crate::autofocus::networks::{ValueHead, compute_on_this_thread};
 /// first, in a fixed order: how many cores share them changes no digit.
 const STATES_AT_ONCE: i64 = 256;
 
-/// What a head made of states, with all that its gradient needs.
+/// A head's forward pass over states, with all that its gradient needs.
 #[derive(Debug)]
 pub(super) struct Pass {
     parts: Vec<Part>,
@@ -19,7 +19,7 @@ pub(super) struct Pass {
     pub values: Tensor,
 }
 
-/// The same of some of the states.
+/// The forward pass over some of the states.
 #[derive(Debug)]
 struct Part {
     /// The head's layers.

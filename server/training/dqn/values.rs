@@ -154,6 +154,7 @@ mod tests {
             };
             rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
         };
+
         let alone = gradient(1);
         assert!(alone.iter().any(|&slope| slope.abs() > 1e-3));
         assert!([2, 5].into_iter().all(|threads| gradient(threads) == alone));

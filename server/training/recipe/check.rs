@@ -209,14 +209,17 @@ mod tests {
                 .flat_map(|(row, line)| line.match_indices("= ").map(move |(at, _)| (row, at + 2)).collect::<Vec<_>>())
                 .filter(|&(row, at)| lines[row][at..].starts_with(|c: char| c.is_ascii_digit()))
                 .collect();
+
             for (index, value) in numbers {
                 let (row, at) = places[index.index(places.len())];
                 let Some(line) = lines[row].get(at..) else { continue };
                 let end = line.find([' ', ',']).unwrap_or(line.len());
                 lines[row].replace_range(at..at + end, &value);
             }
+
             let Ok(recipe) = Recipe::parse(&lines.join("\n")) else { return Ok(()) };
             prop_assert!(recipe.updates() > 0 && recipe.validate_every % 100 == 0 && recipe.pictures > 0);
+
             let share = |value: f64| (0.0..=1.0).contains(&value);
             if let Some(dqn) = recipe.dqn {
                 prop_assert!([0, frames, u64::MAX].iter().all(|&frames| share(dqn.epsilon(frames))));

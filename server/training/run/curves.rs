@@ -13,7 +13,7 @@ pub(super) fn text(curve: &[Point]) -> String {
     curve.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// What [`text`] made a text of; lines that it cannot have written are left out.
+/// Parses what [`text`] wrote; lines that it cannot have written are left out.
 pub(super) fn parse(text: &str) -> Vec<Point> {
     let point = |line: &str| {
         let mut parts = line.split(',');

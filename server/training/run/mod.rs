@@ -155,7 +155,7 @@ impl Run {
         })
     }
 
-    /// What it is made by.
+    /// The recipe it is trained by.
     #[must_use]
     pub const fn recipe(&self) -> &Recipe {
         &self.recipe

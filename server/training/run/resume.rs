@@ -76,12 +76,14 @@ mod tests {
         let recipe = ships("mgm-learned").with_updates(2000);
         let request = |name: &str| ResumeRequest { name: name.to_owned(), ..ResumeRequest::default() };
         let check = |request: &ResumeRequest| request.check(Path::new("runs/a"), &recipe, 1);
+
         let fits = ResumeRequest { recipe: Some(recipe.clone()), seed: Some(1), ..request("mgm-learned") };
         check(&fits).unwrap();
         check(&ResumeRequest { updates: Some(2000), ..request("mgm-learned") }).unwrap();
         ResumeRequest { name: "parfocal-refined".to_owned(), ..ResumeRequest::default() }
             .check(Path::new("runs/a"), &ships("parfocal-refined").with_updates(7), 1)
             .unwrap();
+
         for (request, told) in [
             (request("parfocal"), "runs/a holds a training of mgm-learned, not of parfocal"),
             (request("mgm-learned-paper"), "by another recipe than mgm-learned-paper; name mgm-learned"),

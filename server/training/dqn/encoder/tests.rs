@@ -69,10 +69,12 @@ fn gradients_are_libtorchs() {
     let loss =
         (both.torch.forward(&as_tensor(&patches)) * Tensor::from_slice(&grad_output).view([-1, 8])).sum(Kind::Float);
     loss.backward();
+
     let found = Tensor::from_slice(&both.ours.gradient(&patches, &grad_output));
     let mut variables: Vec<_> = both.store.variables().into_iter().collect();
     variables.sort_by(|a, b| a.0.cmp(&b.0));
     assert_eq!(variables.len(), 8);
+
     let mut at = 0;
     for (name, variable) in variables {
         let expected = variable.grad();
@@ -93,13 +95,16 @@ fn a_gradient_is_what_a_small_step_changes() {
     let loss = || -> f64 {
         both.ours.encode(&patches).iter().zip(&grad_output).map(|(e, s)| f64::from(*e) * f64::from(*s)).sum()
     };
+
     let gradient = both.ours.gradient(&patches, &grad_output);
     // The second layer's weight [1][2][0][1] comes after both biases and the first layer's 72 weights.
     let expected = f64::from(gradient[8 + 72 + 8 + 72 + 2 * 9 + 1]);
+
     let step = |by: f64| {
         let weight = both.store.variables().remove("encoder.2.weight").unwrap();
         let _ = tch::no_grad(|| weight.get(1).get(2).get(0).get(1).g_add_scalar_(by));
     };
+
     step(1e-3);
     let above = loss();
     step(-2e-3);
