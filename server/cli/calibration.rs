@@ -129,6 +129,7 @@ pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Resul
 
     let text = calibration.to_toml(&names[0], &names[1]);
 
+    // The earlier calibration is kept under its version before the new one takes its place.
     if !before.is_empty() {
         let version = named(&before, "version");
         replace(&folder.join(format!("calibration-{version}.toml")), before.as_bytes()).map_err(failed)?;

@@ -26,13 +26,16 @@ impl Eye {
             FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
             FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
         };
+
         let area = PatchArea::central(width, height, content).map_err(|error| {
             HoldReason::new(Hold::CameraFailed, &format!("the camera's picture is no use: {error}"))
         })?;
+
         let view = match image {
             FrameImage::Mosaic(mosaic) => self.reconstructor.gray_view(mosaic, area),
             FrameImage::Rgb(rgb) => rgb_view(rgb, area),
         };
+
         Ok((area, view))
     }
 }

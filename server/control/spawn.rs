@@ -214,11 +214,13 @@ impl Worker {
 
     fn step(&mut self, frame: Frame) {
         self.last_frame_at = self.clock.now();
+
         match self.stepper.step(frame) {
             Ok(controlled) => {
                 self.camera_fault = None;
                 self.steps += 1;
                 self.window.add(self.last_frame_at, controlled.record.latency_micros);
+
                 if self.telemetry.try_send(controlled.record.clone()).is_err() {
                     self.telemetry_dropped += 1;
                 }

@@ -110,6 +110,7 @@ pub fn roll_out_oracle(scan: &mut dyn FocalTimeScan, frames: usize) -> Path {
         course.focal_power.push(focal_power.get());
         course.optimum.push(scan.optimum().get());
         scan.advance();
+
         let best = scan.optimum();
         focal_power = [0.0, -STEP, STEP]
             .map(|step| focal_power.moved(step))

@@ -182,6 +182,7 @@ pub fn merge(mut shards: Vec<(String, Shard)>) -> Result<(Report, Vec<Outcome>),
 
     shards.sort_by_key(|(_, shard)| shard.part.index);
 
+    // Sorted by part, so that a part given twice stands beside itself.
     for pair in shards.windows(2) {
         let [(first, a), (second, b)] = pair else { continue };
         let first = first.clone();

@@ -44,6 +44,7 @@ pub(super) async fn serve(listener: TcpListener, router: Router, mut shutdown: w
             () = ended(&mut shutdown) => return,
             accepted = listener.accept() => accepted,
         };
+
         match accepted {
             Ok((stream, peer)) => {
                 tokio::spawn(serve_one(stream, peer, places.clone(), router.clone(), shutdown.clone()));

@@ -184,6 +184,7 @@ async fn message_of(status: StatusCode, headers: &HeaderMap, body: axum::body::B
     {
         return text;
     }
+
     match status {
         StatusCode::NOT_FOUND => "There is nothing at this address.".into(),
         StatusCode::METHOD_NOT_ALLOWED => "This address does not take this kind of request.".into(),

@@ -120,12 +120,15 @@ impl Place {
             // It gave way in this moment.
             return Err(Full);
         };
+
         if there.member {
             return Ok(());
         }
+
         if taken.count(true, Some(there.host)) >= MEMBERS.host || taken.count(true, None) >= MEMBERS.all {
             return Err(Full);
         }
+
         if let Some(there) = taken.connections.get_mut(&self.number) {
             there.member = true;
         }

@@ -97,9 +97,11 @@ struct Seen {
 impl<'a> Inspector<'a> {
     fn new(arguments: &'a Arguments) -> Result<Self, Failure> {
         let calibration = calibration::read_or_default(arguments.calibration.as_deref())?;
+
         if let Some(out) = &arguments.out {
             fs::create_dir_all(out).map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
         }
+
         Ok(Self {
             mosaic: arguments.mosaic,
             out: arguments.out.as_deref(),

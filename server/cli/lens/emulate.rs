@@ -135,6 +135,7 @@ fn befall(emulator: &mut Emulator, line: &str) -> Result<String, String> {
         ["glass"] => return Ok(glass(emulator)),
         _ => return Err(HELP.into()),
     }
+
     Ok("done".into())
 }
 

@@ -97,6 +97,7 @@ impl OperatorStatus {
             Some(hold) if blinded => told_blinded(hold, status.held_for, status.message.as_ref()),
             held => (held, status.message.clone()),
         };
+
         Self {
             camera: status.camera.clone(),
             camera_offer: status.camera_offer.clone(),

@@ -322,6 +322,7 @@ fn numbers(name: &str) -> Vec<f64> {
 fn natural(a: &str, b: &str) -> Ordering {
     let a_pieces = pieces(a);
     let b_pieces = pieces(b);
+
     for (a, b) in a_pieces.iter().zip(&b_pieces) {
         let order = match (a.parse::<f64>(), b.parse::<f64>()) {
             (Ok(a), Ok(b)) => a.total_cmp(&b),
@@ -331,6 +332,7 @@ fn natural(a: &str, b: &str) -> Ordering {
             return order;
         }
     }
+
     a_pieces.len().cmp(&b_pieces.len()).then_with(|| a.cmp(b))
 }
 

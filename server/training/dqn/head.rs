@@ -77,6 +77,7 @@ impl Part {
                 let _ = grad_output.sum_intlist_out(&gradient[2 * index], 0, false, None);
                 let _ = grad_output.tr().mm_out(&gradient[2 * index + 1], input);
                 grad_output = grad_output.mm(&layer.ws);
+
                 if index > 0 {
                     // What a ReLU let through is above zero.
                     grad_output = input.threshold_backward(&grad_output, 0);

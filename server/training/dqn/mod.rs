@@ -207,6 +207,7 @@ impl Trainer for DqnTrainer {
     }
 
     fn update(&mut self) -> f64 {
+        // The first update waits until the warm-up has filled the memory.
         let goal = self.frames.max(self.recipe.warm_up) + self.recipe.frames_an_update as u64;
         while self.frames < goal {
             tch::no_grad(|| self.play_a_frame());

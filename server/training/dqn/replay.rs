@@ -130,6 +130,7 @@ impl Replay {
             return;
         }
 
+        // The ring is full: the new frame takes the place of the oldest.
         let at = ring.head;
         ring.transitions[at] = transition;
         match seen {

@@ -206,6 +206,7 @@ impl Checkpoint<'static> {
         let mut length = [0; 8];
         file.read_exact(&mut length).map_err(cut)?;
         let length = u64::from_le_bytes(length);
+        // A damaged length must not make us read more than a header can hold.
         if length > MAX_HEADER.min(size) {
             return Err(damaged("it is not a safetensors file".to_owned()));
         }

@@ -215,6 +215,7 @@ impl Run {
             tell(&Progress { updates, loss, epsilon: self.trainer.epsilon(), validation });
         }
 
+        // A complete training was saved after its last leg.
         let complete = self.updates() >= end;
         if !complete {
             self.save()?;

@@ -18,6 +18,7 @@ pub(super) struct Made<'a> {
 /// The card of weights whose figures on `count` validation scans are `row`.
 pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
     let origin = made.origin.map_or("random weights".to_owned(), |file| format!("the weights {file}"));
+
     format!(
         "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, \
          beginning with {origin}, on {}.\n\n\
