@@ -137,7 +137,8 @@ mod tests {
     #[test]
     fn a_link_leads_to_the_file_that_is_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        let (file, link) = (folder.path().join("real.svg"), folder.path().join("link.svg"));
+        let file = folder.path().join("real.svg");
+        let link = folder.path().join("link.svg");
         fs::write(&file, "before").unwrap();
         std::os::unix::fs::symlink("real.svg", &link).unwrap();
         replace(&link, b"after").unwrap();

@@ -53,7 +53,7 @@ impl<'a> Options<'a> {
     /// Rejects unknown options.
     ///
     /// # Errors
-    /// When there is an option that nobody took.
+    /// When an option was not taken.
     pub fn finish(self) -> Result<(), BadOptions> {
         match self.values.keys().next() {
             None => Ok(()),

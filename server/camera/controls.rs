@@ -1,4 +1,4 @@
-//! What an operator may change on a real camera while it runs: exposure, gain, frame rate.
+//! The settings that an operator may change on a running camera: exposure, gain, frame rate.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -10,7 +10,7 @@ use super::{Camera, CameraError, CameraSettings, footage, recorded};
 /// of images, `scan:DIR` with a recorded scan, or `gige:ID`.
 ///
 /// # Errors
-/// [`CameraError::BadSource`] when there is no such camera, or its source cannot be used.
+/// [`CameraError::BadSource`] when the camera is unknown, or its source cannot be used.
 pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, CameraError> {
     match spec.split_once(':') {
         None if spec == "phantom" => Ok(Box::new(PhantomCamera::new(settings))),

@@ -11,7 +11,7 @@ pub enum BadReference {
     Size {
         /// Width and height of this.
         found: (usize, usize),
-        /// What it is compared with.
+        /// The picture it is compared with.
         expected: &'static str,
         /// Width and height of that.
         size: (usize, usize),

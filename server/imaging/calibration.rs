@@ -7,7 +7,7 @@ use super::frame::MosaicFrame;
 /// Bands in one mosaic cell.
 pub const BANDS: usize = 16;
 
-/// What one band of the mosaic senses: a Gaussian in wavelength.
+/// The response of one band of the mosaic: a Gaussian in wavelength.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
     /// Centre wavelength in nm.
@@ -38,7 +38,7 @@ pub struct Calibration {
     pub date: Option<String>,
     /// Significant bits of a sample, 1..=16.
     pub bit_depth: u8,
-    /// What the bands sense.
+    /// The bands' responses.
     pub bands: [Band; BANDS],
     /// Counts without light.
     pub dark: Reference,

@@ -19,7 +19,7 @@ pub struct ContentArea {
     pub confidence: f64,
 }
 
-/// Where the patch was taken, in pixels of the same picture.
+/// The patch's place and size, in pixels of the same picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct PatchArea {
     /// Left column.
@@ -32,7 +32,7 @@ pub struct PatchArea {
     pub height: usize,
 }
 
-/// What the paper's policies see: 32x32 gray values on the 0..255 scale, row by row, from the centre
+/// The view of the paper's policies: 32x32 gray values on the 0..255 scale, row by row, from the centre
 /// of the content area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch(pub [f32; PATCH_SIDE * PATCH_SIDE]);

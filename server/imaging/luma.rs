@@ -29,7 +29,7 @@ pub fn rgb_patch(rgb: &RgbImage, area: PatchArea) -> Patch {
     }))
 }
 
-/// What policies see of `rgb` with the patch at `area`, computing just those pixels.
+/// The policies' view of `rgb` with the patch at `area`, computing just those pixels.
 #[must_use]
 pub fn rgb_view(rgb: &RgbImage, area: PatchArea) -> View {
     let (pixels, _) = rgb.data.as_chunks::<3>();

@@ -31,7 +31,7 @@ pub fn reduced(picture: &GrayImage, width: usize, height: usize) -> GrayImage {
 /// The part of a line of pixels that one pixel of the result covers.
 struct Cover {
     pixels: Range<usize>,
-    /// Where it begins and ends, in pixels.
+    /// The part's beginning and end, in pixels.
     from: f64,
     to: f64,
 }
@@ -47,7 +47,7 @@ impl Cover {
     }
 }
 
-/// What each of `into` pixels covers of `length` pixels.
+/// The parts of `length` pixels that each of `into` pixels covers.
 fn covered(length: usize, into: usize) -> Vec<Cover> {
     let into = into.clamp(1, length.max(1));
     let edge = |index: usize| (index * length) as f64 / into as f64;

@@ -184,7 +184,7 @@ fn share(part: usize, of: usize) -> f64 {
     part as f64 / of.max(1) as f64
 }
 
-/// What a white target adds to dark, and where it is judged.
+/// The light of a white target above dark, and the area in which it is judged.
 struct Light<'a> {
     white: &'a MosaicFrame,
     dark: &'a MosaicFrame,
@@ -203,7 +203,7 @@ impl<'a> Light<'a> {
         f64::from(self.white.samples()[index]) - f64::from(self.dark.samples()[index])
     }
 
-    /// Where sample `band` of cell (`x`, `y`) stands.
+    /// Index of sample `band` of cell (`x`, `y`).
     const fn place(&self, x: usize, y: usize, band: usize) -> usize {
         (CELL * y + band / CELL) * self.white.width() + CELL * x + band % CELL
     }

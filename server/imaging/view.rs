@@ -1,8 +1,9 @@
-//! What policies see of a frame: the patch in the middle of the view, and the same place at coarser scales.
+//! The policies' view of a frame: the patch in the middle of the view, and the same place at coarser
+//! scales.
 
 use super::geometry::{PATCH_SIDE, Patch};
 
-/// How many pixels along each axis one value of a wider patch is the mean of, finest first.
+/// Scales of the wider patches, finest first: pixels along each axis whose mean is one value.
 pub const WIDER: [usize; 2] = [2, 4];
 
 /// The patch of a frame, and wider ones around it.

@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_again_and_nonsense_is_not() {
+    fn dynamics_survive_writing_and_nonsense_is_refused() {
         let measured = MeasuredDynamics {
             driver: "Optotune Lens Driver 4".into(),
             serial: "AREA0042".into(),

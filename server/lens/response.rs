@@ -112,9 +112,11 @@ mod tests {
         let glass = Response::new(DYNAMICS, 0.0, power(0.2));
         glass.command(millis(100.0), power(0.8));
         assert_eq!(glass.focal_power_at(millis(101.9)), power(0.2));
+
         // Two thirds of the settling time leave 20^(-2/3) = 0.135721 of the step.
         let expected = 0.8 - 0.6 * 0.135_721;
         assert!((glass.focal_power_at(millis(112.0)).get() - expected).abs() < 1e-6);
+
         let settled = glass.focal_power_at(millis(117.0)).get();
         assert!((settled - (0.8 - 0.6 * 0.05)).abs() < 1e-9, "5 % of the step remain: {settled}");
         assert!((glass.focal_power_at(millis(300.0)).get() - 0.8).abs() < 1e-9);
@@ -125,6 +127,7 @@ mod tests {
         let glass = Response::new(DYNAMICS, 0.0, power(0.0));
         glass.command(millis(0.0), power(1.0));
         glass.command(millis(10.0), power(0.0));
+
         // At 12 ms the first move has run for 10 ms: 1 - 20^(-2/3) = 0.864279.
         assert!((glass.focal_power_at(millis(12.0)).get() - 0.864_279).abs() < 1e-6);
         assert!((glass.focal_power_at(millis(27.0)).get() - 0.864_279 * 0.05).abs() < 1e-6);
@@ -140,6 +143,7 @@ mod tests {
             time += 1000.0;
             glass.focal_power_at(millis(time)).get()
         };
+
         assert!((settled(0.5) - 0.49).abs() < 1e-9, "rising branch");
         assert!((settled(0.9) - 0.89).abs() < 1e-9);
         assert!((settled(0.885) - 0.89).abs() < 1e-9, "a reversal within the play moves nothing");
@@ -154,13 +158,16 @@ mod tests {
             play in 0.0..0.2_f64,
         ) {
             let glass = Response::new(DYNAMICS, play, FocalPower::MIDDLE);
-            let (mut low, mut high) = (0.5_f64, 0.5_f64);
+            let mut low = 0.5_f64;
+            let mut high = 0.5_f64;
             let mut now = Moment::from_nanos(0);
             for (gap, target) in commands {
                 now = now + Duration::from_micros(gap);
                 glass.command(now, power(target));
-                (low, high) = (low.min(target), high.max(target));
+                low = low.min(target);
+                high = high.max(target);
             }
+
             for look in looks {
                 let seen = glass.focal_power_at(Moment::from_nanos(look * 1000)).get();
                 prop_assert!((low - 1e-12..=high + 1e-12).contains(&seen), "{seen} outside {low}..{high}");

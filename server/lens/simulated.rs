@@ -35,7 +35,7 @@ pub struct SimulatedLens {
     name: Arc<str>,
 }
 
-/// What can go wrong with a simulated lens.
+/// A fault of a simulated lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulatedFault {
@@ -234,6 +234,7 @@ mod tests {
     fn drops_take_the_command_and_move_nothing() {
         let (mut lens, clock) = lens();
         lens.faults().unwrap().set(SimulatedFault::Drops);
+
         assert_eq!(lens.set(FocalPower::MAX), Ok(()));
         assert!((settled(&lens, &clock) - 0.5).abs() < 1e-9);
         assert!(lens.health().message.contains("lost"));
@@ -249,6 +250,7 @@ mod tests {
             let (mut lens, clock) = lens();
             let faults = lens.faults().unwrap();
             faults.set(fault);
+
             let error = lens.set(FocalPower::MAX).unwrap_err();
             assert!(error.to_string().starts_with(expected), "{error}");
             assert!(!lens.health().working);

@@ -31,7 +31,7 @@ pub struct Picture {
     pub content_area: Option<ContentArea>,
 }
 
-/// What the loop did with the frame. Never for surgeons.
+/// The loop's work on the frame. Never for surgeons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Insight {
     /// Focal power asked for after this frame.

@@ -73,7 +73,8 @@ mod tests {
 
     #[test]
     fn it_does_not_depend_on_the_frame_rate() {
-        let (slow, fast) = (path(3, 10, 20), path(3, 50, 20));
+        let slow = path(3, 10, 20);
+        let fast = path(3, 50, 20);
         for (index, place) in slow.iter().enumerate() {
             assert_eq!(place.map(f64::to_bits), fast[5 * index].map(f64::to_bits));
         }

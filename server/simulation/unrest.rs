@@ -18,13 +18,13 @@ const MOST_STRAIN: f64 = 0.15;
 /// How restless a scene is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Restlessness {
-    /// How fast it is deformed: standard deviation of the strain a frame.
+    /// Speed of the deformation: standard deviation of the strain a frame.
     pub strain: f64,
     /// Standard deviation of the logarithm of the contrast from place to place.
     pub contrast: f64,
     /// Size of the field of contrast's cells, pixels.
     pub cell: f64,
-    /// How fast the contrast's field moves over the scene, in cells a frame.
+    /// Speed of the contrast's field over the scene, in cells a frame.
     pub drift: f64,
 }
 
@@ -194,7 +194,8 @@ mod tests {
         let mut seen = vec![0.0; 32 * 32];
         unrest.gather(&slope(), (20.0, 30.5), 32, &mut seen);
         for (index, value) in seen.iter().enumerate() {
-            let (x, y) = (20.0 + (index % 32) as f32, 30.5 + (index / 32) as f32);
+            let x = 20.0 + (index % 32) as f32;
+            let y = 30.5 + (index / 32) as f32;
             assert!((value - 0.5 * (x + 2.0 * y)).abs() < 1e-3, "{index}: {value}");
         }
     }

@@ -203,6 +203,7 @@ mod tests {
             place = there_and_back(place.0, place.1, 4);
             played.push(place.0);
         }
+
         assert_eq!(played, [0, 1, 2, 3, 2, 1, 0, 1, 2]);
         assert_eq!(there_and_back(0, false, 1), (0, false), "a video of one picture stands still");
     }
@@ -211,8 +212,10 @@ mod tests {
     fn ramp(folder: &Path, count: u32) -> Option<PathBuf> {
         let file = folder.join("ramp.mkv");
         let source = format!("nullsrc=s=64x64:r={FPS},format=gbrp,geq=r='16+4*N':g='16+4*N':b='16+4*N'");
+
         let mut ffmpeg = Command::new("ffmpeg");
         ffmpeg.args(["-v", "error", "-f", "lavfi", "-i", &source, "-frames:v", &count.to_string(), "-c:v", "ffv1"]);
+
         let made = ffmpeg.arg(&file).status().is_ok_and(|status| status.success());
         if !made {
             eprintln!("skipped: no ffmpeg to make a video with");
@@ -230,6 +233,7 @@ mod tests {
             let held = clip.shelf.changed.wait_while(clip.shelf.lock(), behind).unwrap();
             most = most.max(held.pictures.len());
             drop(held);
+
             let gray = clip.at(Duration::from_secs(1) * step / FPS).data[0];
             // To the nearest, for the JPEG may be off by one level.
             numbers.push((i32::from(gray) - 16 + 2) / 4);
@@ -242,6 +246,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let Some(file) = ramp(folder.path(), 40) else { return };
         let mut clip = Clip::with(&file, 8).unwrap();
+
         let (numbers, most) = played(&mut clip, 90);
         let expected: Vec<i32> = (1..=90).map(|step| step % 40).collect();
         assert_eq!(numbers, expected);

@@ -12,7 +12,7 @@ use super::size::{HEIGHT, WIDTH, large_enough};
 use super::video::FootageError;
 use crate::imaging::{RgbImage, decode_any, is_mosaic};
 
-/// How long a still is shown.
+/// Time for which a still is shown.
 const STILL: Duration = Duration::from_secs(5);
 
 /// The source of the pictures.

@@ -13,7 +13,7 @@ const MOST_BYTES: usize = 1 << 28;
 /// Why footage cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FootageError {
-    /// There is no such file or folder, or it may not be read.
+    /// The file or folder does not exist, or may not be read.
     #[error("cannot read {}: {reason}", path.display())]
     Unreadable {
         /// The file or folder.
@@ -59,7 +59,7 @@ impl Video {
     /// pixels, its aspect kept.
     ///
     /// # Errors
-    /// When there is no such file or no decoder, or the file holds no video.
+    /// When the file or the decoder is missing, or the file holds no video.
     pub fn open(path: &Path, fps: u32, width: usize, height: usize) -> Result<Self, FootageError> {
         check(path)?;
         let scale = format!(

@@ -30,7 +30,7 @@ pub const MOST_POSES: usize = 100_000;
 /// Least width and height of a picture, pixels.
 pub const LEAST_SIDE: usize = 64;
 
-/// What was to be recorded, and with what.
+/// The plan of a scan: what to record, and with which devices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
@@ -62,7 +62,7 @@ pub struct Header {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// That of [`Pose::images`], drawn anew for each pose.
+    /// The order of [`Pose::images`], drawn anew for each pose.
     Random,
     /// The order was not noted.
     Unknown,
@@ -123,7 +123,7 @@ pub enum ScanError {
         /// Why.
         error: io::Error,
     },
-    /// What describes the scan makes no sense.
+    /// The description of the scan is invalid.
     #[error("{} does not describe a scan: {reason}", path.display())]
     Nonsense {
         /// The file.
@@ -167,7 +167,7 @@ pub enum ScanError {
     Other {
         /// The folder.
         path: PathBuf,
-        /// What is not the same.
+        /// The difference, in words.
         difference: String,
     },
     /// Another process records there.

@@ -32,7 +32,7 @@ pub struct Shot {
     pub pose: usize,
     /// Its pictures, in the order in which they were taken; all of one size.
     pub images: Vec<(FocalPower, GrayImage)>,
-    /// Where the patch is.
+    /// The patch's place.
     pub patch: PatchArea,
     /// The focal power at which the patch is sharpest in the stack.
     pub optimum: FocalPower,
@@ -77,7 +77,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// What is stored so far.
+    /// The scan's folder, with the poses stored so far.
     #[must_use]
     pub const fn folder(&self) -> &ScanFolder {
         &self.folder
@@ -181,7 +181,7 @@ fn is_ours(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(".partial")
 }
 
-/// What differs between two headers.
+/// Compares two headers; the error names the first difference.
 fn same(stored: &Header, asked: &Header) -> Result<(), &'static str> {
     let differs = [
         (stored.camera != asked.camera, "of another camera"),

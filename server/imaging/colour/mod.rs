@@ -61,7 +61,7 @@ fn xyz_from_bands(bands: &[Band; BANDS]) -> SMatrix<f64, 3, BANDS> {
     fitted
 }
 
-/// What white-balanced bands show of a reflectance.
+/// The white-balanced bands' responses to a reflectance.
 fn responses(bands: &[Band; BANDS], spectrum: &Spectrum) -> SVector<f64, BANDS> {
     SVector::from_fn(|index, _| {
         let Band { centre_nm, fwhm_nm } = bands[index];

@@ -22,7 +22,7 @@ use crate::imaging::frame::CELL;
 /// Cells worked on at once: a 256-bit register holds 16 samples, a row of each.
 pub(super) const CELLS: usize = 4;
 const SAMPLES: usize = CELL * CELLS;
-/// Where the red, green and blue of four cells lie in a vector of all outputs: two cells of each in either half.
+/// Places of four cells' red, green and blue in a vector of all outputs: two cells of each in either half.
 const PIXELS: [usize; 3 * CELLS] = [0, 2, 4, 1, 3, 5, 8, 10, 12, 9, 11, 13];
 /// Largest sum of the absolute integer weights of an output: even after rounding, the sum of the
 /// largest samples still fits 32 bits.

@@ -113,7 +113,8 @@ impl Reconstructor {
         patch
     }
 
-    /// What policies see of the gray picture with the patch at `area` (in cells), computing just those cells.
+    /// The policies' view of the gray picture with the patch at `area` (in cells), computing just those
+    /// cells.
     #[must_use]
     pub fn gray_view(&self, mosaic: &MosaicFrame, area: PatchArea) -> View {
         let size = (mosaic.band_width(), mosaic.band_height());

@@ -27,7 +27,7 @@ const NOISE: [u8; 3] = [0xFF, 0x00, 0x7E];
 /// A reply on its way.
 #[derive(Debug)]
 pub struct Answer {
-    /// What goes over the wire.
+    /// The bytes that go over the wire.
     pub bytes: Vec<u8>,
     /// Time until they go out.
     pub takes: Duration,

@@ -11,7 +11,7 @@ const GLASS: LensDynamics = LensDynamics { delay: Duration::from_millis(1), sett
 /// Half of 0.04 of the lens's 5 dioptres.
 const PLAY: f64 = 0.004;
 
-/// What is wrong with the emulated driver.
+/// A fault of the emulated driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fault {
     /// No fault.

@@ -10,7 +10,7 @@ use super::status::{FOCAL_POWER_MODE, Status, mode_name};
 use super::trouble::Trouble;
 use crate::lens::LensError;
 
-/// How the lens is to be used.
+/// The settings for using the lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Least dioptres to use, unless the device's own.

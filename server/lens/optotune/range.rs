@@ -6,7 +6,7 @@ use crate::lens::{FocalPower, LensError};
 /// Driver's units per dioptre.
 const PER_DIOPTRE: f64 = 200.0;
 
-/// How the driver counts focal power: `(dioptres + offset) * 200`.
+/// The driver's scale of focal power: `(dioptres + offset) * 200`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     offset: f64,
@@ -116,6 +116,7 @@ mod tests {
     fn ten_dioptres_are_3000_units_of_firmware_a_and_2000_of_others() {
         assert!((Scale::of_firmware(b'A').dioptre(3000) - 10.0).abs() < 1e-12);
         assert!((Scale::of_firmware(b'C').dioptre(2000) - 10.0).abs() < 1e-12);
+
         assert_eq!(range(None, None).unwrap().raw(FocalPower::MAX), 3000);
         assert_eq!(range(None, None).unwrap().raw(FocalPower::MIDDLE), 2500);
     }
@@ -124,8 +125,10 @@ mod tests {
     fn a_configured_part_is_used_but_never_beyond_the_device() {
         let part = range(Some(6.0), Some(8.0)).unwrap();
         assert_eq!((part.raw(FocalPower::MIN), part.raw(FocalPower::MAX)), (2200, 2600));
+
         let beyond = range(Some(-100.0), Some(1e9)).unwrap();
         assert_eq!((beyond.raw(FocalPower::MIN), beyond.raw(FocalPower::MAX)), (2000, 3000));
+
         assert!(range(Some(11.0), None).unwrap_err().to_string().contains("5.00 to 10.00 dpt"));
     }
 

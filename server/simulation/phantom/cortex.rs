@@ -203,7 +203,7 @@ fn opening(side: usize, rng: &mut impl Rng) -> Field {
     })
 }
 
-/// Where a knot lies, in texels: the spline's first knot is one cell before the field.
+/// Place of a knot, in texels: the spline's first knot is one cell before the field.
 fn place(knot: usize) -> f32 {
     (knot as f32 - 1.0) * CELL as f32
 }

@@ -252,23 +252,28 @@ mod tests {
                     (stack.at(x as f32, 64.0, radius * radius)[0] / 8000.0 - expected).abs()
                 })
                 .fold(0.0, f32::max);
+
             assert!(worst < 0.02 + 0.005 * (step - 1) as f32, "radius {radius}: {worst}");
         }
     }
 
     #[test]
-    fn between_levels_the_second_moment_is_that_of_the_asked_disc() {
+    fn between_levels_the_second_moment_is_that_of_the_disc_asked_for() {
         let mut point = vec![Texel::default(); SIDE * SIDE];
         point[64 * SIDE + 64] = [60_000; ENDMEMBERS];
         let stack = Stack::new(point, SIDE);
         for radius in [1.4_f32, 2.6, 3.3] {
-            let (mut sum, mut moment) = (0.0, 0.0);
+            let mut sum = 0.0;
+            let mut moment = 0.0;
+
             for index in 0..SIDE * SIDE {
-                let (x, y) = ((index % SIDE) as f32, (index / SIDE) as f32);
+                let x = (index % SIDE) as f32;
+                let y = (index / SIDE) as f32;
                 let value = stack.at(x, y, radius * radius)[0];
                 sum += value;
                 moment += value * (x - 64.0).powi(2);
             }
+
             // A uniform disc has a variance of r^2 / 4 along each axis.
             let expected = radius * radius / 4.0;
             assert!((moment / sum / expected - 1.0).abs() < 0.08, "radius {radius}: {} {expected}", moment / sum);

@@ -131,7 +131,8 @@ mod tests {
 
     #[test]
     fn a_spline_keeps_straight_lines_straight() {
-        let (side, cell) = (40, 8);
+        let side = 40;
+        let cell = 8;
         let coarse = Field::from_fn(knots(side, cell), |x, y| x as f32 + 10.0 * y as f32);
         let fine = Spline::new(&coarse, side, cell).field();
         for y in 0..side {

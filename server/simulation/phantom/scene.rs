@@ -222,9 +222,12 @@ mod tests {
 
     #[test]
     fn a_seed_gives_one_scene_and_another_seed_another() {
-        let (one, same, other) = (Scene::new(1), Scene::new(1), Scene::new(2));
+        let one = Scene::new(1);
+        let same = Scene::new(1);
+        let other = Scene::new(2);
         assert!(one.texels == same.texels);
-        let (one, other) = (one.sharp_gray(512, 272).data, other.sharp_gray(512, 272).data);
+        let one = one.sharp_gray(512, 272).data;
+        let other = other.sharp_gray(512, 272).data;
         assert!(correlation(&one, &other).abs() < 0.3);
     }
 
@@ -239,7 +242,8 @@ mod tests {
 
     fn correlation(a: &[f32], b: &[f32]) -> f32 {
         let mean = |v: &[f32]| v.iter().sum::<f32>() / v.len() as f32;
-        let (mean_a, mean_b) = (mean(a), mean(b));
+        let mean_a = mean(a);
+        let mean_b = mean(b);
         let covariance =
             |x: &[f32], mx, y: &[f32], my| -> f32 { x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum() };
         covariance(a, mean_a, b, mean_b) / (covariance(a, mean_a, a, mean_a) * covariance(b, mean_b, b, mean_b)).sqrt()

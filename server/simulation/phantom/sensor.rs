@@ -25,7 +25,7 @@ pub(super) struct Sensor {
     normal: Vec<f32>,
     /// The counts of these deviates without light.
     dark: Vec<u16>,
-    /// Where each row's fixed pattern starts among the deviates.
+    /// Start of each row's fixed pattern among the deviates.
     pattern: Vec<u32>,
     rng: ChaCha8Rng,
 }
@@ -44,12 +44,12 @@ impl Sensor {
         Self { normal, dark, pattern, rng }
     }
 
-    /// Where each row's noise starts in this exposure.
+    /// Starts of the rows' noise in this exposure.
     pub(super) fn fresh_noise(&mut self) -> Vec<u32> {
         noise(self.pattern.len(), &mut self.rng)
     }
 
-    /// Where each row's noise starts in an exposure whose noise is drawn from `rng`.
+    /// Starts of the rows' noise in an exposure whose noise is drawn from `rng`.
     pub(super) fn noise_of(&self, rng: &mut impl Rng) -> Vec<u32> {
         noise(self.pattern.len(), rng)
     }
@@ -155,10 +155,12 @@ mod tests {
     fn rows(level: f32, rows: usize) -> Vec<Vec<u16>> {
         let mut sensor = Sensor::new(7, WIDTH, rows);
         let noise = sensor.fresh_noise();
+
         let mut out = vec![vec![0; WIDTH]; rows];
         for (y, row) in out.iter_mut().enumerate() {
             sensor.read_row(row, y, 0, &vec![level; WIDTH], noise[y]);
         }
+
         out
     }
 
@@ -168,9 +170,11 @@ mod tests {
             let samples: Vec<f64> = rows(level, 200).concat().into_iter().map(f64::from).collect();
             let mean = samples.iter().sum::<f64>() / samples.len() as f64;
             let variance = samples.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / samples.len() as f64;
+
             // Electrons: shot (= signal) + read^2 + (PRNU * signal)^2; then counts, and rounding's 1/12.
             let electrons = f64::from(level) * 12_800.0 / 1023.0;
             let expected = (electrons + 13.0 * 13.0 + (0.007 * electrons).powi(2)) * (1023.0_f64 / 12_800.0).powi(2);
+
             assert!((mean - f64::from(level)).abs() < 0.01 * f64::from(level), "mean {mean} at {level}");
             assert!((variance / (expected + 1.0 / 12.0) - 1.0).abs() < 0.04, "variance {variance} {expected}");
         }

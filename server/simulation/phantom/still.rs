@@ -155,10 +155,11 @@ mod tests {
     use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
     #[test]
-    fn a_view_alone_is_the_same_as_that_of_the_whole_exposure() {
+    fn a_view_alone_equals_that_of_the_whole_exposure() {
         let trajectory = Trajectory::new(1, 2, Haste::default());
         let still = trajectory.still(1).unwrap();
         let reconstructor = Reconstructor::new(&Calibration::default());
+
         let seen = |whole: bool| {
             let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
             let power = FocalPower::nearest(0.3);
@@ -170,32 +171,38 @@ mod tests {
             let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
             reconstructor.gray_view(&mosaic, still.patch())
         };
+
         assert!(seen(true) == seen(false));
     }
 
     #[test]
-    fn the_exposure_is_the_one_that_auto_exposure_comes_to_rest_at() {
+    fn a_still_has_the_exposure_at_which_auto_exposure_settles() {
         let mut phantom = Phantom::new(5);
         let pose = Hand::new(5).pose_at(Duration::from_secs(2));
         let best = phantom.optimal(&pose);
+
         let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
         for _ in 0..40 {
             phantom.expose(&pose, best, &mut samples);
             phantom.adjust_exposure(&samples);
         }
-        let (settled, rested) = (phantom.settled_gain(&pose, best), phantom.exposure.gain());
+
+        let settled = phantom.settled_gain(&pose, best);
+        let rested = phantom.exposure.gain();
         assert!((settled / rested - 1.0).abs() < 0.08, "{settled} {rested}");
     }
 
     #[test]
-    fn every_exposure_has_noise_of_its_own_and_the_same_one_the_same() {
+    fn every_exposure_has_its_own_noise_and_the_same_one_the_same() {
         let trajectory = Trajectory::new(1, 1, Haste::default());
         let still = trajectory.still(0).unwrap();
+
         let seen = |number| {
             let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
             still.expose_view(number, still.optimal(), &mut samples);
             samples
         };
+
         assert!(seen(0) == seen(0) && seen(0) != seen(1));
     }
 }

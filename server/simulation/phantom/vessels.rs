@@ -16,7 +16,7 @@ pub(super) struct Vessels {
     pub(super) bulge: Field,
 }
 
-/// How many vessels there are.
+/// Numbers of vessels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Density {
     /// Large arteries.

@@ -119,7 +119,7 @@ fn lit_span(row: &[f32]) -> (usize, usize) {
     (first, last)
 }
 
-/// How one pose maps pixels to the surface.
+/// The mapping from pixels to the surface at one pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mapping {
     centre: [f32; 2],
@@ -209,7 +209,7 @@ pub(super) fn look(
     }
 }
 
-/// What one cell sees at `focal_power`: abundances times light.
+/// The light that one cell sees at `focal_power`: abundances times light.
 #[inline(always)]
 pub(super) fn look_at(
     x: usize,

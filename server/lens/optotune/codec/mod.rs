@@ -241,6 +241,7 @@ mod tests {
             (Request::SetFocalPower(3000), "507744410BB80000B371"),
             (Request::FocalPower, "50724441000000006470"),
         ];
+
         for (request, expected) in vectors {
             assert_eq!(hex::encode_upper(request.encode()), expected.replace(' ', ""), "{request:?}");
         }
@@ -250,9 +251,11 @@ mod tests {
     fn published_replies_are_understood() {
         let bytes = |text| hex::decode(text).unwrap();
         let reply = |request: Request, text| request.reply(&bytes(text));
+
         assert_eq!(reply(Request::Temperature, "544341019874660D0A"), Ok(Some(Reply::Temperature(408))));
         assert_eq!(reply(Request::MaxCurrent, "434D41726427FC0D0A"), Ok(Some(Reply::MaxCurrent(29_284))));
         assert_eq!(reply(Request::Mode, "4D4D410577280D0A"), Ok(Some(Reply::Mode(5))));
+
         for error in ["4531F3440D0A", "4501F3500D0A", "4E0D0A"] {
             assert_eq!(reply(Request::Status, error), Err(WireError::Device(DeviceError::Checksum)), "{error}");
             // No longer than the reply that was waited for.
