@@ -26,8 +26,9 @@ pub async fn slow(server: SocketAddr, bits: u64) -> SocketAddr {
 
 async fn carry(client: TcpStream, server: SocketAddr, bits: u64) {
     let socket = TcpSocket::new_v4().expect("a socket");
-    // Before connecting, when both are agreed on. Segments as on a network: loopback's own, of 64 KB, never fit the small
-    // buffer, and would leave only when a timer ran out. The queue is to stand where it would: in the server's kernel.
+    // Before connecting, when both are agreed on. Segments as on a network: loopback's own, of 64
+    // KB, never fit the small buffer, and would leave only when a timer ran out. The queue is to
+    // stand where it would: in the server's kernel.
     SockRef::from(&socket).set_tcp_mss(PACKET as u32).expect("small segments");
     SockRef::from(&socket).set_recv_buffer_size(PACKET * 8).expect("a small buffer");
     let upstream = socket.connect(server).await.expect("the server");

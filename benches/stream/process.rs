@@ -157,8 +157,8 @@ fn resident_mb(process: u32) -> u64 {
     line.split_whitespace().next().and_then(|kb| kb.parse::<u64>().ok()).unwrap_or_default() / 1024
 }
 
-/// A picture for the footage camera, whose window shows three quarters of it, 512 by 272: with as much detail as makes a
-/// JPEG of about 30 KB.
+/// A picture for the footage camera, whose window shows three quarters of it, 512 by 272: with as
+/// much detail as makes a JPEG of about 30 KB.
 pub fn picture(folder: &TempDir) -> String {
     let (width, height) = (683, 363);
     let picture = image::RgbImage::from_fn(width, height, |x, y| {

@@ -1,4 +1,5 @@
-//! Any bytes from a lens driver's line are a reply, an error or too few; and a reply stays what it is, whatever follows.
+//! Any bytes from a lens driver's line are a reply, an error or too few; and a reply stays what it
+//! is, whatever follows.
 
 #![no_main]
 

@@ -1,5 +1,6 @@
 //! Cameras, the sources of frames. This room knows nothing of policies.
 
+pub mod calibration;
 mod controls;
 pub mod footage;
 #[cfg(feature = "aravis")]

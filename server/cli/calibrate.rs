@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::output::{Failure, print};
-use super::{calibration, tables};
+use crate::camera::calibration::{self, tables};
 use crate::camera::{self, CameraSettings, FrameImage};
 use crate::clock::{Clock, SystemClock};
 use crate::imaging::{Average, Calibration, Reference};

@@ -14,7 +14,7 @@ use crate::camera::recorded::ScanFolder;
 use crate::evaluation::evaluate;
 use crate::evaluation::report::Subject;
 use crate::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
-use crate::evaluation::stacks::{FIRST_SEED, SEEDS, StackSource, bench};
+use crate::evaluation::stacks::{FIRST_SEED, SEEDS, StackSource, evaluate_stacks};
 use crate::files::replace;
 use crate::notices::tell;
 use crate::scans::ScanSet;
@@ -211,10 +211,11 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let sources: Vec<StackSource> = arguments.stacks.iter().map(|text| StackSource::parse(text)).collect();
 
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
-    let (report, outcomes) = bench(&registry, &policies, &sources, arguments.seed.unwrap_or(FIRST_SEED), &|name| {
-        bar.set_message(name.to_owned());
-        bar.inc(1);
-    })?;
+    let (report, outcomes) =
+        evaluate_stacks(&registry, &policies, &sources, arguments.seed.unwrap_or(FIRST_SEED), &|name| {
+            bar.set_message(name.to_owned());
+            bar.inc(1);
+        })?;
     bar.finish_and_clear();
 
     if let Some(folder) = &arguments.out {

@@ -2,8 +2,6 @@
 
 mod announce;
 mod calibrate;
-mod calibration;
-mod devices;
 mod evaluate;
 mod export;
 mod inspect;
@@ -13,7 +11,6 @@ mod output;
 mod policies;
 mod scan;
 mod serve;
-mod tables;
 mod train;
 mod verify;
 

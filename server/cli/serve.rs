@@ -18,9 +18,8 @@ use tracing_subscriber::EnvFilter;
 
 use super::announce::{announcement, reachable};
 use super::output::Failure;
-use super::{calibration, devices};
 use crate::autofocus::{PolicyName, Registry, scripted, shipped};
-use crate::camera::{self, CameraSettings};
+use crate::camera::{self, CameraSettings, calibration};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Library, Parts};
 use crate::control::{self, Command, ControlLoop, Drive, Rig, Settings};
@@ -28,7 +27,7 @@ use crate::http::keys::Keys;
 use crate::http::{self, App};
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
-use crate::store::{self, Store, telemetry};
+use crate::store::{self, Store, device_log, telemetry};
 use crate::{lens, live, priority};
 
 /// Arguments of `parfocal serve`.
@@ -147,7 +146,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         ControlLoop::spawn(Settings { frame_period, telemetry_capacity: TELEMETRY_CAPACITY, dynamics }, rig)?;
 
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
-    tokio::spawn(devices::record(store.clone(), Arc::clone(&clock), control.status.clone()));
+    tokio::spawn(device_log::record(store.clone(), Arc::clone(&clock), control.status.clone()));
 
     let (live, imaging) = live::start(control.clone(), reconstructor)?;
 

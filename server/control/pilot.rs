@@ -163,20 +163,20 @@ fn hold_reason(failure: Failure) -> HoldReason {
     match failure {
         Failure::Panicked(message) => {
             tracing::debug!(message, "the policy panicked");
-            HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being started afresh; the lens is held")
+            HoldReason::new(Hold::PolicyPanicked, "the policy failed and is being restarted; the lens is held")
         }
         Failure::Unavailable(error) => {
-            tracing::debug!(%error, "the policy cannot be had");
+            tracing::debug!(%error, "the policy cannot be started");
             HoldReason::new(
                 Hold::PolicyUnavailable,
                 "the policy cannot run here; the lens is held: `parfocal policies` tells why",
             )
         }
         Failure::InvalidTarget(target) => {
-            tracing::debug!(target, "the policy asked for what is no focal power");
+            tracing::debug!(target, "the policy returned an invalid focal power");
             HoldReason::new(
                 Hold::PolicyNonsense,
-                "the policy asked for what is no focal power and is being started afresh; the lens is held",
+                "the policy returned an invalid focal power and is being restarted; the lens is held",
             )
         }
     }

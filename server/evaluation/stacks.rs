@@ -155,13 +155,13 @@ pub struct StackReport {
 ///
 /// # Errors
 /// When a stack cannot be read or scanned, or a policy cannot run.
-pub fn bench(
+pub fn evaluate_stacks(
     registry: &Registry,
     policies: &[PolicyName],
     sources: &[StackSource],
     seed: u64,
     progress: &(dyn Fn(&str) + Sync),
-) -> Result<(StackReport, Vec<Vec<Outcome>>), StackBenchError> {
+) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
     let mut policies = policies.to_vec();
     let baseline = PolicyName::new(BASELINE);
     if !policies.contains(&baseline) {
@@ -185,7 +185,7 @@ pub fn bench(
 
 /// Why the benchmark ended without figures.
 #[derive(Debug, thiserror::Error)]
-pub enum StackBenchError {
+pub enum StackReportError {
     /// A stack cannot be used.
     #[error(transparent)]
     Stack(#[from] UnfitStack),

@@ -1,7 +1,7 @@
 //! Sharpness over focal power at rest: the scale for reading a moving lens's focal power from the
 //! picture.
 
-use super::BenchError;
+use super::MeasurementError;
 
 /// Least change of sharpness along the flank, as a share of the greatest sharpness.
 const CONTRAST: f64 = 0.15;
@@ -21,14 +21,14 @@ pub struct Flank {
 impl Flank {
     /// The steepest side of the curves measured going `up` and `down` through the same `powers`, which
     /// rise.
-    pub fn find(powers: &[f64], up: &[f64], down: &[f64]) -> Result<Self, BenchError> {
+    pub fn find(powers: &[f64], up: &[f64], down: &[f64]) -> Result<Self, MeasurementError> {
         let mean: Vec<f64> = up.iter().zip(down).map(|(up, down)| (up + down) / 2.0).collect();
         let (first, last) = steepest_run(&mean);
         let (first, last) = trimmed(&mean, first, last);
 
         let contrast = (mean[last] - mean[first]).abs() / mean.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         if first == last || contrast < CONTRAST {
-            return Err(BenchError::Flat(contrast));
+            return Err(MeasurementError::Flat(contrast));
         }
 
         // A difference in sharpness over the slope is a difference in focal power.
@@ -114,6 +114,6 @@ mod tests {
     fn a_picture_that_does_not_change_is_refused() {
         let powers: Vec<f64> = (0..=10).map(|stop| f64::from(stop) / 10.0).collect();
         let flat = [20.0, 20.1, 20.0, 20.2, 20.1, 20.0, 20.1, 20.3, 20.2, 20.0, 20.1];
-        assert!(matches!(Flank::find(&powers, &flat, &flat), Err(BenchError::Flat(_))));
+        assert!(matches!(Flank::find(&powers, &flat, &flat), Err(MeasurementError::Flat(_))));
     }
 }

@@ -17,7 +17,7 @@ use crate::lens::LensError;
 
 /// Why a lens could not be measured.
 #[derive(Debug, thiserror::Error)]
-pub enum BenchError {
+pub enum MeasurementError {
     /// The lens failed.
     #[error(transparent)]
     Lens(#[from] LensError),
@@ -44,7 +44,7 @@ pub enum BenchError {
     TooSlow(f64),
 }
 
-impl From<HoldReason> for BenchError {
+impl From<HoldReason> for MeasurementError {
     fn from(reason: HoldReason) -> Self {
         Self::Picture(reason.message.to_string())
     }

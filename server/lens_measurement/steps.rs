@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::curve::Flank;
 use super::fit::{Fit, Sample};
-use super::{BenchError, View};
+use super::{MeasurementError, View};
 use crate::clock::Moment;
 use crate::lens::{FocalPower, Lens};
 
@@ -61,7 +61,7 @@ pub fn measure(
     view: &mut View,
     plan: Plan,
     pause: &dyn Fn(Duration),
-) -> Result<Measurement, BenchError> {
+) -> Result<Measurement, MeasurementError> {
     let mut stand = Stand { lens, view, plan };
     let flank = stand.flank()?;
     let (low, high) = flank.ends();
@@ -80,10 +80,10 @@ pub fn measure(
     let both = Fit::of(&samples.concat(), longest);
 
     if both.delay + both.settling > SETTLED_BY * longest {
-        return Err(BenchError::TooSlow(1000.0 * longest));
+        return Err(MeasurementError::TooSlow(1000.0 * longest));
     }
     if both.rms > SCATTER {
-        return Err(BenchError::Unsteady(both.rms));
+        return Err(MeasurementError::Unsteady(both.rms));
     }
 
     Ok(Measurement { both, up, down, hysteresis: flank.hysteresis.max(0.0), between: (low, high), samples })
@@ -98,7 +98,7 @@ struct Stand<'a> {
 
 impl Stand<'_> {
     /// Measures sharpness over focal power, up and down, and finds its steepest side.
-    fn flank(&mut self) -> Result<Flank, BenchError> {
+    fn flank(&mut self) -> Result<Flank, MeasurementError> {
         let powers: Vec<f64> = (0..self.plan.stops.max(3)).map(f64::from).collect();
         let last = powers.last().copied().unwrap_or(1.0);
         let powers: Vec<f64> = powers.into_iter().map(|stop| stop / last).collect();
@@ -112,7 +112,7 @@ impl Stand<'_> {
     }
 
     /// Sends the lens to `power`, lets it rest, and measures the sharpness.
-    fn at_rest(&mut self, power: f64) -> Result<f64, BenchError> {
+    fn at_rest(&mut self, power: f64) -> Result<f64, MeasurementError> {
         self.lens.set(FocalPower::nearest(power))?;
         let rested = self.view.now() + self.plan.watch;
         self.view.mean(rested, FRAMES_AT_REST)
@@ -127,7 +127,7 @@ impl Stand<'_> {
         flank: &Flank,
         pause: &dyn Fn(Duration),
         samples: &mut Vec<Sample>,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), MeasurementError> {
         let start = flank.focal_power(self.at_rest(from)?);
 
         // The command falls a chosen part of a frame's time behind a frame.
@@ -149,7 +149,7 @@ impl Stand<'_> {
 
     /// Frames exposed within the time to watch after `commanded`: seconds after it, and the focal power
     /// seen.
-    fn watch(&mut self, commanded: Moment, flank: &Flank) -> Result<Vec<(f64, f64)>, BenchError> {
+    fn watch(&mut self, commanded: Moment, flank: &Flank) -> Result<Vec<(f64, f64)>, MeasurementError> {
         let mut seen = Vec::new();
         loop {
             let (at, sharpness) = self.view.next()?;

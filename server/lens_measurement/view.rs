@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::BenchError;
+use super::MeasurementError;
 use crate::autofocus::mgm;
 use crate::camera::{Camera, CameraError};
 use crate::clock::{Clock, Moment};
@@ -33,7 +33,7 @@ impl View {
     }
 
     /// The next frame: the middle of its exposure, and the mean gradient magnitude of its patch.
-    pub(super) fn next(&mut self) -> Result<(Moment, f64), BenchError> {
+    pub(super) fn next(&mut self) -> Result<(Moment, f64), MeasurementError> {
         let begun = self.clock.now();
         loop {
             match self.camera.next_frame(PATIENCE) {
@@ -49,7 +49,7 @@ impl View {
     }
 
     /// Mean sharpness of `frames` frames exposed at `from` or later.
-    pub(super) fn mean(&mut self, from: Moment, frames: usize) -> Result<f64, BenchError> {
+    pub(super) fn mean(&mut self, from: Moment, frames: usize) -> Result<f64, MeasurementError> {
         let mut sum = 0.0;
         let mut seen = 0;
 

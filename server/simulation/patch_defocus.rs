@@ -44,8 +44,8 @@ impl Defocus {
         })
     }
 
-    /// The same of a scene that `look` shows: it is called with how many pixels around the patch matter, how many that makes
-    /// a row, and where to put them, row after row.
+    /// The same of a scene that `look` shows: it is called with how many pixels around the patch
+    /// matter, how many that makes a row, and where to put them, row after row.
     pub fn patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
         let sigma = sigma.clamp(0.0, MOST_SIGMA);
         let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
@@ -55,8 +55,9 @@ impl Defocus {
         patch
     }
 
-    /// Gray levels of `square` of `image`, row after row, blurred as in [`Defocus::patch`]. A wide blur is made of means of 2x2 pixels:
-    /// each of the square's values is then twice as wide and high as a pixel.
+    /// Gray levels of `square` of `image`, row after row, blurred as in [`Defocus::patch`]. A wide
+    /// blur is made of means of 2x2 pixels: each of the square's values is then twice as wide and
+    /// high as a pixel.
     pub fn square(&mut self, image: &GrayImage, square: Square, sigma: f64, spot: Spot) -> Vec<f32> {
         let Square { x, y, side } = square;
         let sigma = sigma.clamp(0.0, MOST_SIGMA);
@@ -79,8 +80,8 @@ impl Defocus {
         levels
     }
 
-    /// Gray levels of a square of `side` pixels of a scene that `look` shows in means of 2x2 pixels, as in [`Defocus::patch_of`],
-    /// blurred by a spot of standard deviation `sigma` pixels.
+    /// Gray levels of a square of `side` pixels of a scene that `look` shows in means of 2x2
+    /// pixels, as in [`Defocus::patch_of`], blurred by a spot of standard deviation `sigma` pixels.
     pub fn coarse_square(
         &mut self,
         side: usize,
@@ -92,7 +93,8 @@ impl Defocus {
         let side = side / COARSE;
         let mut levels = vec![0.0; side * side];
         if sigma < 1.0 {
-            // Of so narrow a spot only the variance shows, not the shape; samples of a Gaussian would have less than its variance.
+            // Of so narrow a spot only the variance shows, not the shape; samples of a Gaussian
+            // would have less than its variance.
             let kernel = || narrow_kernel(sigma);
             self.blur(side, NARROW_REACH, Blur { sigma, spot: Spot::Gaussian, kernel }, look, &mut levels);
         } else {
@@ -103,7 +105,8 @@ impl Defocus {
         repeated(&levels, side)
     }
 
-    /// Fills `out`, `width` values a row and as many rows, with what `look` shows, blurred by `blur`, which reaches `reach` pixels far.
+    /// Fills `out`, `width` values a row and as many rows, with what `look` shows, blurred by
+    /// `blur`, which reaches `reach` pixels far.
     fn blur<K: FnOnce() -> Vec<f32>>(
         &mut self,
         width: usize,
@@ -168,8 +171,8 @@ fn gaussian_kernel(sigma: f64, reach: usize) -> Vec<f32> {
 /// Reach of a [`narrow_kernel`].
 const NARROW_REACH: usize = 4;
 
-/// A kernel of variance `sigma` squared, which must be below 1: `exp(-t) I_n(t)` with t the variance, the discrete Gaussian
-/// (Lindeberg 1990).
+/// A kernel of variance `sigma` squared, which must be below 1: `exp(-t) I_n(t)` with t the
+/// variance, the discrete Gaussian (Lindeberg 1990).
 fn narrow_kernel(sigma: f64) -> Vec<f32> {
     let half = 0.5 * sigma * sigma;
     // The series of the modified Bessel function; its terms shrink by a factor of more than 4.
@@ -279,7 +282,8 @@ mod tests {
         for sigma in [2.0, 4.0, 8.0] {
             let patch = defocus.patch(&step_edge(), (48, 48), sigma, Spot::Gaussian);
             for column in 0..PATCH_SIDE {
-                // Sampling the Gaussian at whole pixels costs up to half a gray level at sigma 2. The edge lies between columns 63 and 64, so at 15.5 in the patch's columns.
+                // Sampling the Gaussian at whole pixels costs up to half a gray level at sigma 2.
+                // The edge lies between columns 63 and 64, so at 15.5 in the patch's columns.
                 let expected = 100.0 * (1.0 + erf((column as f64 - 15.5) / (sigma * 2.0f64.sqrt())));
                 let found = f64::from(patch.0[10 * PATCH_SIDE + column]);
                 assert!((found - expected).abs() < 0.6, "sigma {sigma} column {column}: {found} != {expected}");
@@ -309,7 +313,8 @@ mod tests {
                 let patch = defocus.patch(&picture, (70 + 32, 80 + 64), sigma, spot);
                 let off = |i: usize| (levels[(64 + i / 32) * 128 + 32 + i % 32] - patch.0[i]).powi(2);
                 let off = ((0..1024).map(off).sum::<f32>() / 1024.0).sqrt();
-                // A wide blur is made at half the resolution, which shifts gray levels by what they change within a pixel.
+                // A wide blur is made at half the resolution, which shifts gray levels by what they
+                // change within a pixel.
                 let most = if sigma < WIDE_SIGMA { 1e-3 } else { 4.0 };
                 assert!(off < most, "{spot:?} of {sigma}: {off}");
             }

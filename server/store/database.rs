@@ -82,8 +82,8 @@ impl Store {
             .journal_mode(SqliteJournalMode::Wal)
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(5))
-            // Checkpoints are made between batches of telemetry and by a connection of their own, so that none falls on a comment's
-            // commit and nobody waits for one.
+            // Checkpoints are made between batches of telemetry and by a connection of their own,
+            // so that none falls on a comment's commit and nobody waits for one.
             .pragma("wal_autocheckpoint", "0");
         let trial = connect(options.clone().synchronous(SqliteSynchronous::Full)).await?;
         MIGRATOR.run(&trial).await?;
@@ -179,7 +179,7 @@ impl Store {
 }
 
 async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
-    // One connection, kept for good: its settings and prepared statements with it.
+    // One connection, kept open: its settings and prepared statements with it.
     let pool = SqlitePoolOptions::new()
         .max_connections(1)
         .min_connections(1)
@@ -209,8 +209,9 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     Ok(done.last_insert_rowid())
 }
 
-/// Keeps other accounts out of the folder and its files, which tell seeds, policies and what surgeons said. Earlier versions let
-/// every account read them. What cannot be changed is no reason not to serve, but to be told of.
+/// Keeps other accounts out of the folder and its files, which tell seeds, policies and what
+/// surgeons said. Earlier versions let every account read them. What cannot be changed is no reason
+/// not to serve, but to be told of.
 fn keep_private(folder: &Path) {
     let files = ["", "-wal", "-shm"].map(|suffix| folder.join(format!("{DATABASE}{suffix}")));
     for path in [folder.to_owned(), folder.join(LOCK)].into_iter().chain(files) {

@@ -1,11 +1,13 @@
 //! Store: everything SQLite; the only place with SQL. Decides nothing.
 //!
-//! One file, `parfocal.db`, in WAL mode. Three ways in: trial data on a connection that syncs every commit to the disk
-//! before it is acknowledged; telemetry on its own, which does not; readers that never write. A lock on the folder keeps a
-//! second server out, while programs that only read come and go.
+//! One file, `parfocal.db`, in WAL mode. Three ways in: trial data on a connection that syncs every
+//! commit to the disk before it is acknowledged; telemetry on its own, which does not; readers that
+//! never write. A lock on the folder keeps a second server out, while programs that only read come
+//! and go.
 
 mod counts;
 mod database;
+pub mod device_log;
 mod error;
 pub mod export;
 mod export_rows;

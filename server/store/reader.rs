@@ -42,7 +42,8 @@ impl Reader {
         Ok(Self { pool: SqlitePoolOptions::new().max_connections(3).connect_with(options).await? })
     }
 
-    /// The database as it is now, whatever is written from now on: all that is read from what comes back belongs together.
+    /// The database as it is now, whatever is written from now on: all that is read from what comes
+    /// back belongs together.
     ///
     /// # Errors
     /// When the database failed.
@@ -121,8 +122,9 @@ impl Reader {
         rows.iter().map(line).collect()
     }
 
-    /// The clocks at each start of the server. A run whose wall clock was behind when it began counts from the last that
-    /// is known of the run before, so that what happened later is never told earlier.
+    /// The clocks at each start of the server. A run whose wall clock was behind when it began
+    /// counts from the last that is known of the run before, so that what happened later is never
+    /// told earlier.
     ///
     /// # Errors
     /// When the database failed.
@@ -150,8 +152,9 @@ impl Reader {
         Ok(RunClocks(clocks))
     }
 
-    /// What befell camera and lens in `session`, each with its number and the run it was in: from the start of every run
-    /// that served it, so that the state in which it began is told, to its end.
+    /// What befell camera and lens in `session`, each with its number and the run it was in: from
+    /// the start of every run that served it, so that the state in which it began is told, to its
+    /// end.
     ///
     /// # Errors
     /// When the database failed.

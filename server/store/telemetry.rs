@@ -1,5 +1,5 @@
-//! Telemetry into SQLite: in batches, on a connection of its own, so that it delays nothing and nothing waits for it. What
-//! belongs to no setting of a session is forgotten after a while.
+//! Telemetry into SQLite: in batches, on a connection of its own, so that it delays nothing and
+//! nothing waits for it. What belongs to no setting of a session is forgotten after a while.
 
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;

@@ -33,8 +33,9 @@ where
     text.parse().map_err(|error| StoreError::Damaged(format!("column {column}, '{text}': {error}")))
 }
 
-/// Ends `connection` where its transaction failed; the pool then makes another. A full disk can undo a transaction behind
-/// the driver's back or leave it half open, and it would keep everyone else from writing for good.
+/// Ends `connection` where its transaction failed; the pool then makes another. A full disk can
+/// undo a transaction behind the driver's back or leave it half open, and it would keep everyone
+/// else from writing for good.
 pub(super) fn drop_if_failed<T>(mut connection: PoolConnection<Sqlite>, outcome: &Result<T, StoreError>) {
     if outcome.is_err() {
         connection.close_on_drop();

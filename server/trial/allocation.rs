@@ -1,9 +1,10 @@
 //! Allocation: which policy runs in which segment, drawn from a stored seed by a named algorithm whose every step is
 //! fixed here, so that no update of a library changes what an old seed meant.
 //!
-//! Words come from the `ChaCha20` key stream (RFC 8439; 256-bit key = seed, counter and nonce zero) as little-endian
-//! `u32`, one after another. A number below `n` is `word % n`, words from `2^32 - 2^32 % n` up being passed over.
-//! A shuffle walks `i` from the last place down to 1 and swaps places `i` and "number below `i + 1`" (Durstenfeld 1964).
+//! Words come from the `ChaCha20` key stream (RFC 8439; 256-bit key = seed, counter and nonce zero)
+//! as little-endian `u32`, one after another. A number below `n` is `word % n`, words from `2^32 -
+//! 2^32 % n` up being passed over. A shuffle walks `i` from the last place down to 1 and swaps
+//! places `i` and "number below `i + 1`" (Durstenfeld 1964).
 
 use std::fmt;
 

@@ -59,8 +59,8 @@ impl Bench {
         (1..=SECOND).find(|_| self.step().held.is_none()).expect("recovers within a second of the fault's end")
     }
 
-    /// Steps until one is not held, the clock moving on by `pace`: for hung threads, which come back in the machine's time
-    /// and not in the test's.
+    /// Steps until one is not held, the clock moving on by `pace`: for hung threads, which come
+    /// back in the machine's time and not in the test's.
     fn recover_in_time(&mut self, pace: Duration) {
         while self.step_after(pace).held.is_some() {
             std::thread::yield_now();
@@ -96,7 +96,7 @@ fn a_panic_holds_and_a_fresh_instance_takes_over() {
         let record = bench.step();
         assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyPanicked)));
     }
-    assert!(bench.message().contains("started afresh"), "{}", bench.message());
+    assert!(bench.message().contains("being restarted"), "{}", bench.message());
     assert!(bench.script.instances() < 8, "a policy that always panics is tried a few times a second");
     bench.script.set(Deed::GoTo(0.7));
     bench.recover();

@@ -1,5 +1,5 @@
-//! Which file of server/ uses which other one, read from the paths in its source. Tests within the files are left out: they may
-//! use whatever they like.
+//! Which file of server/ uses which other one, read from the paths in its source. Tests within the
+//! files are left out: they may use whatever they like.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -138,7 +138,8 @@ impl Paths {
         match parts.first().map(String::as_str) {
             Some("crate") => Some(parts[1..].to_vec()),
             Some("self") => Some([&self.module[..], &parts[1..]].concat()),
-            // A path that begins with one of the module's own children; anything else is no file's and falls away later.
+            // A path that begins with one of the module's own children; anything else is no file's
+            // and falls away later.
             Some(_) => Some([&self.module[..], parts].concat()),
             None => None,
         }

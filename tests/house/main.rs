@@ -1,5 +1,6 @@
-//! Holds server/ to the floors of ARCHITECTURE.md: a room uses only rooms of lower floors, and no files of a room use one another in
-//! a circle. Reads the source and the document, so that the two cannot drift apart.
+//! Holds server/ to the floors of ARCHITECTURE.md: a room uses only rooms of lower floors, and no
+//! files of a room use one another in a circle. Reads the source and the document, so that the two
+//! cannot drift apart.
 
 mod circles;
 mod document;

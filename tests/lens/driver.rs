@@ -113,8 +113,9 @@ fn on_closing_the_lens_is_left_without_current() {
     assert_eq!(emulator.mode_and_current(), (1, 0));
 }
 
-/// Prints the time from `set` to the emulated driver's end of the wire at 50 commands a second, with everything else
-/// that the driver's thread does going on. A measurement, not a test: `cargo test --test lens -- --ignored --nocapture`.
+/// Prints the time from `set` to the emulated driver's end of the wire at 50 commands a second,
+/// with everything else that the driver's thread does going on. A measurement, not a test: `cargo
+/// test --test lens -- --ignored --nocapture`.
 #[test]
 #[ignore = "measures"]
 fn measure_set_to_wire() {

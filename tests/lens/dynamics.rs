@@ -11,7 +11,7 @@ use parfocal::control::Eye;
 use parfocal::imaging::{Calibration, Reconstructor, RgbImage};
 use parfocal::lens::emulator::Model;
 use parfocal::lens::{FocalPower, Lens, LensDynamics, Optics, SimulatedLens};
-use parfocal::lens_measurement::{BenchError, Measurement, Plan, View, measure};
+use parfocal::lens_measurement::{Measurement, MeasurementError, Plan, View, measure};
 
 use super::{emulator, open};
 
@@ -57,7 +57,7 @@ fn measured(
     (clock, pause): (Arc<dyn Clock>, Pause),
     contrast: f64,
     plan: Plan,
-) -> Result<Measurement, BenchError> {
+) -> Result<Measurement, MeasurementError> {
     let due = clock.now();
     let period = Duration::from_millis(20);
     let camera = Stripes { clock: clock.clone(), optics, pause: pause.clone(), period, due, number: 0, contrast };
@@ -65,7 +65,7 @@ fn measured(
     measure(lens, &mut View::new(Box::new(camera), eye, clock), plan, &*pause)
 }
 
-fn simulated(delay: u64, settling: u64, contrast: f64, plan: Plan) -> Result<Measurement, BenchError> {
+fn simulated(delay: u64, settling: u64, contrast: f64, plan: Plan) -> Result<Measurement, MeasurementError> {
     let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
     let dynamics = LensDynamics { delay: Duration::from_millis(delay), settling: Duration::from_millis(settling) };
     let mut lens = SimulatedLens::moving(dynamics, clock.clone());
@@ -90,7 +90,7 @@ fn a_simulated_lens_is_measured_as_it_was_made() {
 
 #[test]
 fn what_cannot_be_measured_says_why() {
-    let message = |outcome: Result<Measurement, BenchError>| outcome.unwrap_err().to_string();
+    let message = |outcome: Result<Measurement, MeasurementError>| outcome.unwrap_err().to_string();
     assert!(message(simulated(2, 15, 0.0, Plan::default())).contains("fine texture"));
     let short = Plan { watch: Duration::from_millis(60), ..Plan::default() };
     assert!(message(simulated(30, 60, 1.0, short)).contains("watch for longer"));

@@ -1,4 +1,5 @@
-//! Answers that arrive late or out of order: which one counts, until when anything does, and what is told of the others.
+//! Answers that arrive late or out of order: which one counts, until when anything does, and what
+//! is told of the others.
 
 use std::path::Path;
 use std::time::Duration;

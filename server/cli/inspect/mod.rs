@@ -9,9 +9,9 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use super::calibration;
 use super::output::{Failure, print};
 use crate::autofocus::{mgm, mlr};
+use crate::camera::calibration;
 use crate::files::replace;
 use crate::imaging::{
     Calibration, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode,

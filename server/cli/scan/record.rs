@@ -9,8 +9,7 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 
 use crate::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
-use crate::camera::{self, CameraSettings};
-use crate::cli::calibration;
+use crate::camera::{self, CameraSettings, calibration};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
 use crate::cli::output::{Failure, bar, print};
 use crate::clock::SystemClock;

@@ -147,7 +147,8 @@ enum Piece {
 }
 
 impl ZipStream {
-    /// A ZIP file whose files stand in a folder named `root`, and its bytes as they come: an error where it was cut off.
+    /// A ZIP file whose files stand in a folder named `root`, and its bytes as they come: an error
+    /// where it was cut off.
     pub fn new(root: String) -> (Self, impl Stream<Item = io::Result<Bytes>> + Send + use<>) {
         let (pieces, receiver) = mpsc::channel(PIECES);
         let made = Made::default();

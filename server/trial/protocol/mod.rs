@@ -1,4 +1,5 @@
-//! Protocols: what a trial compares, for how long, and what it asks. Written in TOML (docs/trial.md); valid once parsed.
+//! Protocols: what a trial compares, for how long, and what it asks. Written in TOML
+//! (docs/trial.md); valid once parsed.
 
 mod fault;
 mod file;

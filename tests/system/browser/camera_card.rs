@@ -69,7 +69,8 @@ async fn the_operator_sets_exposure_gain_and_frame_rate() {
     assert_eq!(operator.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
 }
 
-/// A value that the camera cannot have: said with the bounds in the unit that is shown, and the old one stands there again.
+/// A value that the camera cannot have: said with the bounds in the unit that is shown, and the old
+/// one stands there again.
 async fn refused(operator: &Browser, server: &Server) {
     operator.type_into("#camera-exposure", &keys("99999999")).await;
     operator.sees("#camera-trouble", "Exposure must be from ").await;

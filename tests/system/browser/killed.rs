@@ -1,5 +1,5 @@
-//! A server killed, as by a power cut, right after it acknowledged a comment, at every point of a session: it goes on at
-//! the same place, and nothing acknowledged is lost.
+//! A server killed, as by a power cut, right after it acknowledged a comment, at every point of a
+//! session: it goes on at the same place, and nothing acknowledged is lost.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};

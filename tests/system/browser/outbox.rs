@@ -1,4 +1,5 @@
-//! What the surgeon's page keeps until it is saved: the outbox in a real browser, before a server that answers as each test says.
+//! What the surgeon's page keeps until it is saved: the outbox in a real browser, before a server
+//! that answers as each test says.
 
 use serde_json::{Value, json};
 
@@ -182,7 +183,8 @@ async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_ta
         }), 600)";
     assert_eq!(waits(asleep).await, json!([true, "wall-clock"]));
 
-    // Kept over a reload, where no page's clock knows how long; the real server knows no such address and takes nothing.
+    // Kept over a reload, where no page's clock knows how long; the real server knows no such
+    // address and takes nothing.
     let keep = "answers.push(new Promise(() => {}));
         Date.now = () => clock() - 600000;
         openOutbox().add('/comments', { session: 's', value: 'kept' });

@@ -1,4 +1,5 @@
-//! Takes a recorded connection apart: HTTP/1.1 exchanges (RFC 9112) and, after an upgrade, WebSocket messages (RFC 6455).
+//! Takes a recorded connection apart: HTTP/1.1 exchanges (RFC 9112) and, after an upgrade,
+//! WebSocket messages (RFC 6455).
 
 use super::proxy::Connection;
 

@@ -1,4 +1,5 @@
-//! What a surgeon is writing while the page changes underneath: nothing of it is lost, and no key of it does something else.
+//! What a surgeon is writing while the page changes underneath: nothing of it is lost, and no key
+//! of it does something else.
 
 use std::time::Duration;
 

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
-use super::output::Failure;
+use super::CalibrationFault;
 use crate::imaging::{BANDS, Band};
 
 /// Bands of the responses in `path`: a line per wavelength with nm and 16 responses; a heading may
 /// come first. Centre and width are those of each response's main peak at half its height.
-pub fn bands(path: &Path) -> Result<[Band; BANDS], Failure> {
+///
+/// # Errors
+/// When the table cannot be read or has no peak in a band.
+pub fn bands(path: &Path) -> Result<[Band; BANDS], CalibrationFault> {
     let rows = rows(path, BANDS + 1)?;
     let rising = rows.windows(2).all(|pair| pair[0][0] < pair[1][0]);
     if rows.len() < 3 || !rising {
@@ -21,11 +24,14 @@ pub fn bands(path: &Path) -> Result<[Band; BANDS], Failure> {
         bands.push(found.ok_or_else(|| format!("{}: band {} has no peak", path.display(), band - 1))?);
     }
 
-    bands.try_into().map_err(|_| "16 bands".into())
+    bands.try_into().map_err(|_| CalibrationFault("16 bands".to_owned()))
 }
 
 /// The correction in `path`: 16 lines of 16.
-pub fn correction(path: &Path) -> Result<[[f32; BANDS]; BANDS], Failure> {
+///
+/// # Errors
+/// When the table cannot be read or has another shape.
+pub fn correction(path: &Path) -> Result<[[f32; BANDS]; BANDS], CalibrationFault> {
     let rows = rows(path, BANDS)?;
     if rows.len() != BANDS {
         return Err(format!("{}: needs 16 lines of 16, but has {}", path.display(), rows.len()).into());
@@ -34,7 +40,7 @@ pub fn correction(path: &Path) -> Result<[[f32; BANDS]; BANDS], Failure> {
 }
 
 /// Lines of `columns` finite numbers; a first line that holds none is a heading.
-fn rows(path: &Path, columns: usize) -> Result<Vec<Vec<f64>>, Failure> {
+fn rows(path: &Path, columns: usize) -> Result<Vec<Vec<f64>>, CalibrationFault> {
     let failed = |problem: &dyn std::fmt::Display| format!("{}: {problem}", path.display());
     let reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_path(path);
     let mut rows = Vec::new();

@@ -1,14 +1,26 @@
 //! Calibrations in files: TOML, with 16-bit pictures beside it for references per pixel.
 
+pub mod tables;
+
 use std::fs;
 use std::io::{Cursor, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use image::{ImageBuffer, ImageFormat, Luma};
 
-use super::output::Failure;
 use crate::files::replace;
 use crate::imaging::{Calibration, MosaicFrame, Picture, Reference, decode};
+
+/// Why a calibration, or a maker's table, cannot be used or saved. Names the file, and says what to do.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct CalibrationFault(String);
+
+impl From<String> for CalibrationFault {
+    fn from(message: String) -> Self {
+        Self(message)
+    }
+}
 
 /// Name of the current calibration in its folder. Earlier ones stay beside it, by their version.
 const CURRENT: &str = "calibration.toml";
@@ -17,7 +29,10 @@ const CURRENT: &str = "calibration.toml";
 const CAMERA_BITS: u8 = 10;
 
 /// Reads the calibration in the file `path`, or the current one of the folder `path`.
-pub fn read(path: &Path) -> Result<Calibration, Failure> {
+///
+/// # Errors
+/// When it cannot be read, or makes no sense.
+pub fn read(path: &Path) -> Result<Calibration, CalibrationFault> {
     let path = if path.is_dir() { path.join(CURRENT) } else { path.to_owned() };
     let text = fs::read_to_string(&path)
         .map_err(|error| format!("cannot read the calibration {}: {error}", path.display()))?;
@@ -28,12 +43,18 @@ pub fn read(path: &Path) -> Result<Calibration, Failure> {
 }
 
 /// The calibration of `path` if one is given, else that of a typical unit.
-pub fn read_or_default(path: Option<&Path>) -> Result<Calibration, Failure> {
+///
+/// # Errors
+/// When it cannot be read, or makes no sense.
+pub fn read_or_default(path: Option<&Path>) -> Result<Calibration, CalibrationFault> {
     path.map_or_else(|| Ok(Calibration::default()), read)
 }
 
 /// Refuses a calibration whose references per pixel do not fit frames of `size`.
-pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Result<(), Failure> {
+///
+/// # Errors
+/// When they do not fit.
+pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usize)>) -> Result<(), CalibrationFault> {
     match (calibration.size(), size) {
         (Some(taken), Some(size)) if taken != size => Err(format!(
             "the calibration {} was taken at {}x{}, but {of} is {}x{}: take new references with \
@@ -51,13 +72,19 @@ pub fn check_size(calibration: &Calibration, of: &str, size: Option<(usize, usiz
 
 /// Refuses a calibration that does not fit a camera whose mosaics are of `size`, if it delivers
 /// any: in size, or in scale.
-pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> Result<(), Failure> {
+///
+/// # Errors
+/// When it does not fit.
+pub fn check_camera(calibration: &Calibration, size: Option<(usize, usize)>) -> Result<(), CalibrationFault> {
     check_size(calibration, "the camera's picture", size)?;
     if size.is_some() { check_scale(calibration) } else { Ok(()) }
 }
 
 /// Refuses a calibration for other samples than cameras give.
-pub fn check_scale(calibration: &Calibration) -> Result<(), Failure> {
+///
+/// # Errors
+/// When it does not fit.
+pub fn check_scale(calibration: &Calibration) -> Result<(), CalibrationFault> {
     if calibration.bit_depth != CAMERA_BITS {
         return Err(format!(
             "the calibration {} is for samples of {} bit, but parfocal converts every camera to {CAMERA_BITS} bit: \
@@ -86,7 +113,7 @@ fn picture(folder: &Path, name: &str) -> Result<MosaicFrame, String> {
 /// # Errors
 /// When it cannot be read, or when it is gone while earlier versions are still there: a new one
 /// would take their names.
-pub fn begun(folder: &Path) -> Result<Calibration, Failure> {
+pub fn begun(folder: &Path) -> Result<Calibration, CalibrationFault> {
     if folder.join(CURRENT).exists() {
         return read(folder);
     }
@@ -106,7 +133,10 @@ pub fn begun(folder: &Path) -> Result<Calibration, Failure> {
 
 /// Saves `calibration` in `folder` as the current one; the one before stays there under its
 /// version's name. `changed` names the references that are new. Returns the file's path.
-pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, Failure> {
+///
+/// # Errors
+/// When the folder cannot be written.
+pub fn save(folder: &Path, calibration: &Calibration, changed: &[&str]) -> Result<PathBuf, CalibrationFault> {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
 
@@ -145,7 +175,7 @@ fn named(toml: &str, key: &str) -> String {
     table.get(key).and_then(toml::Value::as_str).unwrap_or_default().to_owned()
 }
 
-fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), Failure> {
+fn write_picture(path: &Path, frame: &MosaicFrame) -> Result<(), CalibrationFault> {
     let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
     let size = |side: usize| u32::try_from(side).map_err(|_| failed(&"it is too large"));
 

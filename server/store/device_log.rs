@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 
+use super::{DeviceEvent, Store};
 use crate::clock::{Clock, Moment};
 use crate::control::ControlStatus;
-use crate::store::{DeviceEvent, Store};
 
 /// A device that failed counts as working again once it has worked for this long, so that one that comes and goes does
 /// not fill the log.
