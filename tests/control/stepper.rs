@@ -115,7 +115,7 @@ fn nonsense_holds_and_a_fresh_instance_takes_over() {
             let record = bench.step();
             assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyNonsense)));
         }
-        assert!(bench.message().contains("no focal power"), "{}", bench.message());
+        assert!(bench.message().contains("invalid focal power"), "{}", bench.message());
         bench.script.set(Deed::GoTo(0.6));
         bench.recover();
     }
