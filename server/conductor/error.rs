@@ -52,7 +52,7 @@ impl From<Refusal> for ConductError {
         let text = refusal.to_string();
         match refusal {
             Refusal::NotAllowed(_) => Self::Forbidden(text),
-            Refusal::UnknownSegment => Self::NotFound(text),
+            Refusal::UnknownSegment | Refusal::UnknownQuestion => Self::NotFound(text),
             Refusal::Conflict(_) => Self::Conflict(text),
             Refusal::Invalid(_) => Self::Invalid(text),
         }

@@ -4,14 +4,15 @@ use super::course::Course;
 use super::{ConductError, Shared};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::{Answer, Comment, Kept, Stamp};
-use crate::trial::answers;
+use crate::trial::acceptance;
 use crate::trial::grace::Grace;
-use crate::trial::question::AnswerValue;
-use crate::trial::remark::{Holding, NewAnswer, NewComment, Said};
+use crate::trial::refusal::Refusal;
+use crate::trial::remark::{Holding, NewAnswer, NewComment};
 
 impl Shared {
     pub(super) async fn comment(&self, new: NewComment) -> Result<(), ConductError> {
-        check_said(&new.said)?;
+        acceptance::check_comment(&new.said)?;
+
         let _pen = self.pen.lock().await;
         let current =
             self.live().course_of(new.session).map(|course| (course.state.plan().segments.clone(), course.grace));
@@ -19,6 +20,7 @@ impl Shared {
             Some(current) => current,
             None => self.of_earlier(new.session).await?,
         };
+
         let stamp = self.stamp();
         // A segment that is not this session's can only come from a broken page: what was said is
         // kept all the same.
@@ -34,6 +36,7 @@ impl Shared {
             stamp,
             said: new.said,
         };
+
         let kept = self.store.keep_comment(&comment).await?;
         let mut live = self.live();
         if kept == Kept::New
@@ -50,8 +53,7 @@ impl Shared {
         // What led to the question comes before its answer.
         self.record_stops(&mut pen).await?;
 
-        let checked =
-            self.live().course_of(new.session).map(|course| check_answer(course, &new).map(|()| course.grace));
+        let checked = self.live().course_of(new.session).map(|course| check(course, &new).map(|()| course.grace));
         let grace = match checked {
             Some(checked) => checked?,
             None => match self.load(new.session).await {
@@ -59,7 +61,7 @@ impl Shared {
                 Err(ConductError::Unreadable { .. }) => return self.keep_unasked(new).await,
                 earlier => {
                     let earlier = earlier?;
-                    check_answer(&earlier, &new)?;
+                    check(&earlier, &new)?;
                     earlier.grace
                 }
             },
@@ -80,13 +82,8 @@ impl Shared {
 
     /// Keeps an answer to a session whose questions are not known.
     async fn keep_unasked(&self, new: NewAnswer) -> Result<(), ConductError> {
-        if let AnswerValue::Text(text) = &new.value {
-            answers::check_length(text).map_err(|misfit| ConductError::Invalid(misfit.to_string()))?;
-        }
         let (segments, grace) = self.of_earlier(new.session).await?;
-        if new.segment.is_some_and(|segment| !segments.contains(&segment)) {
-            return Err(ConductError::NotFound("this session has no such setting; reload the page".to_owned()));
-        }
+        acceptance::check_unasked(&new, &segments)?;
         unless_taken(self.store.keep_answer(&self.stamped(new, grace)).await?)
     }
 
@@ -119,25 +116,8 @@ impl Shared {
     }
 }
 
-fn check_said(said: &Said) -> Result<(), ConductError> {
-    let (Said::Text(text) | Said::Quick(text)) = said else { return Ok(()) };
-    if text.trim().is_empty() {
-        return Err(ConductError::Invalid("the comment is empty".to_owned()));
-    }
-    answers::check_length(text).map_err(|misfit| ConductError::Invalid(misfit.to_string()))
-}
-
-fn check_answer(course: &Course, new: &NewAnswer) -> Result<(), ConductError> {
-    let known = new.segment.is_none_or(|segment| course.state.plan().position(segment).is_some());
-    let question =
-        course.protocol.question(&new.question, new.segment.is_some()).filter(|_| known).ok_or_else(|| {
-            ConductError::NotFound("this session asks no such question of this setting; reload the page".to_owned())
-        })?;
-    if !course.state.takes_answers(new.segment) {
-        return Err(ConductError::Conflict("this question has not been asked yet".to_owned()));
-    }
-    answers::check(question, &new.value, course.state.plan().segments.len())
-        .map_err(|misfit| ConductError::Invalid(misfit.to_string()))
+fn check(course: &Course, new: &NewAnswer) -> Result<(), Refusal> {
+    acceptance::check_answer(new, &course.protocol, &course.state)
 }
 
 fn unless_taken(kept: Kept) -> Result<(), ConductError> {

@@ -1,6 +1,7 @@
 //! Trials: protocol, allocation, the session's state machine, questionnaires. Pure: clock and
 //! random source are handed in.
 
+pub mod acceptance;
 pub mod action;
 pub mod allocation;
 pub mod answers;

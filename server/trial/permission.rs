@@ -1,6 +1,8 @@
 //! Who may do and see what outside the course of a session. Who may do what within it:
 //! [`session::decide`](super::session::decide).
 
+use std::time::Duration;
+
 use super::phase::Phase;
 use super::refusal::Refusal;
 use super::role::Role;
@@ -76,6 +78,34 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
 #[must_use]
 pub fn may_see_focal_power(role: Role, current: CurrentSession) -> bool {
     role != Role::Surgeon && current == CurrentSession::None
+}
+
+/// A hold that lasts this long is not a slow start, but a fault that the operator must know of.
+const LASTING: Duration = Duration::from_secs(3);
+
+/// What of a hold of the lens may be told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HoldTold {
+    /// The hold and its reason.
+    Fully,
+    /// That there is one, but not why.
+    WithoutReason,
+    /// Nothing.
+    Not,
+}
+
+/// What may be told, while a session is under way, of a hold that has lasted for `held_for`. A hold
+/// by the policy is told only when it lasts, and then without its reason: only learned policies take
+/// time to start and to compute.
+#[must_use]
+pub fn hold_told(caused_by_policy: bool, held_for: Duration) -> HoldTold {
+    if !caused_by_policy {
+        HoldTold::Fully
+    } else if held_for < LASTING {
+        HoldTold::Not
+    } else {
+        HoldTold::WithoutReason
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,9 @@ pub enum Refusal {
     /// The session has no such segment.
     #[error("this session has no such setting; reload the page")]
     UnknownSegment,
+    /// The session does not ask this question of this segment.
+    #[error("this session asks no such question of this setting; reload the page")]
+    UnknownQuestion,
     /// It does not fit the present state.
     #[error("{0}")]
     Conflict(String),

@@ -18,6 +18,7 @@ use crate::http::App;
 use crate::lens::{FocalPower, LensHealth};
 use crate::live::{EncodedFrame, Insight};
 use crate::priority::Standing;
+use crate::trial::permission::{self, HoldTold};
 use crate::trial::view::OperatorView;
 
 /// An operator's or researcher's page.
@@ -69,7 +70,7 @@ pub(super) struct OperatorStatus {
     policy: Option<PolicyName>,
     /// Last focal power asked for; not while a session is under way.
     focal_power: Option<FocalPower>,
-    /// Why the lens is being held, if it is; while a session is under way, see [`told_blinded`].
+    /// Why the lens is being held, if it is; while a session is under way, see [`told_in_session`].
     held: Option<Hold>,
     /// The hold in words, and what to do.
     message: Option<Arc<str>>,
@@ -94,7 +95,7 @@ struct Priority {
 impl OperatorStatus {
     fn new(status: &ControlStatus, blinded: bool) -> Self {
         let (held, message) = match status.held {
-            Some(hold) if blinded => told_blinded(hold, status.held_for, status.message.as_ref()),
+            Some(hold) if blinded => told_in_session(hold, status.held_for, status.message.as_ref()),
             held => (held, status.message.clone()),
         };
 
@@ -116,25 +117,17 @@ impl OperatorStatus {
     }
 }
 
-/// A hold that lasts this long is not a slow start, but a fault that the operator must know of.
-const LASTING: Duration = Duration::from_secs(3);
-
 /// A hold that has lasted for `held_for`, and the words for it, as far as they may be told while a
-/// session is under way. A hold by the policy is told only when it lasts, and then in the same words
-/// whatever went wrong: only learned policies take time to start and to think.
-fn told_blinded(hold: Hold, held_for: Duration, message: Option<&Arc<str>>) -> (Option<Hold>, Option<Arc<str>>) {
-    if !hold.caused_by_policy() {
-        return (Some(hold), message.cloned());
+/// session is under way.
+fn told_in_session(hold: Hold, held_for: Duration, message: Option<&Arc<str>>) -> (Option<Hold>, Option<Arc<str>>) {
+    match permission::hold_told(hold.caused_by_policy(), held_for) {
+        HoldTold::Fully => (Some(hold), message.cloned()),
+        HoldTold::WithoutReason => {
+            let words = "the focus has been held for some time; if it stays so, abort the session";
+            (Some(Hold::PolicySlow), Some(Arc::from(words)))
+        }
+        HoldTold::Not => (None, None),
     }
-
-    if held_for < LASTING {
-        return (None, None);
-    }
-
-    (
-        Some(Hold::PolicySlow),
-        Some(Arc::from("the focus has been held for some time; if it stays so, abort the session")),
-    )
 }
 
 impl Audience for ForOperator {
@@ -167,7 +160,7 @@ mod tests {
     #[test]
     fn a_policys_holds_are_told_in_a_session_only_when_they_last_and_then_all_alike() {
         let message: Arc<str> = Arc::from("the policy is starting");
-        let told = |hold, seconds| told_blinded(hold, Duration::from_secs(seconds), Some(&message));
+        let told = |hold, seconds| told_in_session(hold, Duration::from_secs(seconds), Some(&message));
         let policys = [Hold::PolicyPanicked, Hold::PolicyNonsense, Hold::PolicySlow, Hold::PolicyUnavailable];
         for hold in policys {
             assert_eq!(told(hold, 1), (None, None));

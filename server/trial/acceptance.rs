@@ -1,0 +1,71 @@
+//! What of a surgeon's comments and answers is accepted. Whatever is accepted is kept, whatever
+//! state the session is in.
+
+use super::answers;
+use super::protocol::Protocol;
+use super::question::AnswerValue;
+use super::refusal::Refusal;
+use super::remark::{NewAnswer, Said};
+use super::session::SessionState;
+use crate::ids::SegmentId;
+
+/// Whether a comment that says `said` is accepted.
+///
+/// # Errors
+/// When it is empty or too long.
+pub fn check_comment(said: &Said) -> Result<(), Refusal> {
+    let (Said::Text(text) | Said::Quick(text)) = said else { return Ok(()) };
+    if text.trim().is_empty() {
+        return Err(Refusal::Invalid("the comment is empty".to_owned()));
+    }
+    check_length(text)
+}
+
+/// Whether `new` is accepted as an answer in a session of `protocol` that stands at `state`.
+///
+/// # Errors
+/// When the session does not ask this question, has not asked it yet, or the answer does not fit it.
+pub fn check_answer(new: &NewAnswer, protocol: &Protocol, state: &SessionState) -> Result<(), Refusal> {
+    let plan = state.plan();
+    let has_segment = new.segment.is_none_or(|segment| plan.position(segment).is_some());
+    let question = protocol.question(&new.question, new.segment.is_some()).filter(|_| has_segment);
+    let question = question.ok_or(Refusal::UnknownQuestion)?;
+
+    if !state.takes_answers(new.segment) {
+        return Err(Refusal::conflict("this question has not been asked yet"));
+    }
+    let fits = answers::check(question, &new.value, plan.segments.len());
+    fits.map_err(|misfit| Refusal::Invalid(misfit.to_string()))
+}
+
+/// Whether `new` is accepted in a session of `segments` whose questions cannot be known any more,
+/// because its protocol cannot be read.
+///
+/// # Errors
+/// When the session has no such segment, or the answer is too long.
+pub fn check_unasked(new: &NewAnswer, segments: &[SegmentId]) -> Result<(), Refusal> {
+    if let AnswerValue::Text(text) = &new.value {
+        check_length(text)?;
+    }
+    match new.segment {
+        Some(segment) if !segments.contains(&segment) => Err(Refusal::UnknownSegment),
+        _ => Ok(()),
+    }
+}
+
+fn check_length(text: &str) -> Result<(), Refusal> {
+    answers::check_length(text).map_err(|misfit| Refusal::Invalid(misfit.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_comment_must_say_something_and_no_more_than_fits() {
+        assert_eq!(check_comment(&Said::Text("sharp".to_owned())), Ok(()));
+        let refused = |text: &str| check_comment(&Said::Text(text.to_owned())).unwrap_err();
+        assert_eq!(refused(" \n"), Refusal::Invalid("the comment is empty".to_owned()));
+        assert!(matches!(refused(&"a".repeat(answers::LONGEST_TEXT + 1)), Refusal::Invalid(_)));
+    }
+}
