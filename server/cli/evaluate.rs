@@ -14,7 +14,7 @@ use crate::camera::recorded::ScanFolder;
 use crate::evaluation::evaluate;
 use crate::evaluation::report::Subject;
 use crate::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
-use crate::evaluation::stacks::{FIRST_SEED, SEEDS, StackSource, evaluate_stacks};
+use crate::evaluation::stacks::{FIRST_SEED, SEEDS, evaluate_stacks};
 use crate::files::replace;
 use crate::notices::tell;
 use crate::scans::ScanSet;
@@ -23,6 +23,7 @@ use crate::scans::detail::{warning, without_detail};
 use crate::scans::footage;
 use crate::scans::recorded::{Between, FOCAL_POWERS, HASTE, POSES, Recorded, RecordedScan};
 use crate::scans::simulated::Scene;
+use crate::scans::stack::source::StackSource;
 use crate::simulation::phantom::Trajectory;
 
 /// What to evaluate, and on what.
@@ -39,7 +40,7 @@ pub struct Arguments {
     /// Evaluate on a photographed focal stack instead: a folder of pictures of one still scene in order of focus.
     /// `DIR:K` makes K of its planes the range 0 to 1, by default two fifths of them. Each stack runs at two scales and
     /// with three seeds, 31 to 33 unless --seed names the first. May be repeated.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"])]
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"])]
     stacks: Vec<String>,
     /// A video (its first 1500 frames), an image or a folder of images to use instead of the reference pictures.
     #[arg(long, value_name = "PATH")]

@@ -14,7 +14,7 @@ use crate::training::recipe::LEG;
 use crate::training::recipe::{MAX_UPDATES, Recipe, names, shipped};
 use crate::training::run::comparison::{TrainedRun, markdown};
 use crate::training::run::resume::ResumeRequest;
-use crate::training::run::{Progress, Run};
+use crate::training::run::{Progress, Run, Sources};
 
 /// Where to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -43,8 +43,9 @@ pub struct Arguments {
 #[group(id = "Training")]
 struct Training {
     /// Recipe: `mgm-learned`, `mlr-learned`, `cnn-learned` or `parfocal`. The first three have one
-    /// by the paper, too, with `-paper` at the end. `cnn-learned-refined`, `parfocal-refined` and
-    /// `parfocal-relief` are later stages: give them the weights of the stage before by `--from`.
+    /// by the paper, too, with `-paper` at the end. `cnn-learned-refined`, `parfocal-refined`,
+    /// `parfocal-relief` and `parfocal-adapted` (to a bench, with `--scans`) are later stages: give
+    /// them the weights of the stage before by `--from`.
     policy: String,
     /// Run folder: recipe, weights, model card, curves, checkpoint.
     #[arg(long, value_name = "DIR")]
@@ -59,10 +60,16 @@ struct Training {
     /// pictures; not needed with `--resume`.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
+    /// Recorded scans and focal stacks of your own bench to train on beside the pictures, half of the
+    /// time: folders of `parfocal scan`, or of pictures of a still scene in order of focus. `DIR:K` makes
+    /// K planes of a stack the range 0 to 1, by default two fifths. Of five folders or more every fifth
+    /// is kept for validation. Not needed with `--resume`.
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    scans: Vec<String>,
     /// Where to compute.
     #[arg(long, value_enum, default_value = "cpu")]
     device: Compute,
-    /// Continue from the checkpoint in the run folder, with the same recipe, seed and footage.
+    /// Continue from the checkpoint in the run folder, with the same recipe, seed, footage and scans.
     #[arg(long)]
     resume: bool,
     /// Weights (safetensors) of the same policy to start from instead of random ones.
@@ -170,7 +177,11 @@ fn begin(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
 
     let seed = arguments.seed.unwrap_or(1);
     let from = arguments.from.as_deref();
-    Ok(Run::begin(recipe, seed, &arguments.footage, &arguments.out, from, device)?)
+    Ok(Run::begin(recipe, seed, &sources(arguments), &arguments.out, from, device)?)
+}
+
+fn sources(arguments: &Training) -> Sources {
+    Sources { footage: arguments.footage.clone(), scans: arguments.scans.clone() }
 }
 
 fn resume(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
@@ -179,7 +190,7 @@ fn resume(arguments: &Training, device: tch::Device) -> Result<Run, Failure> {
         recipe: own_recipe(arguments)?,
         updates: arguments.updates,
         seed: arguments.seed,
-        footage: arguments.footage.clone(),
+        sources: sources(arguments),
     };
     Ok(Run::resume(&arguments.out, &request, device)?)
 }

@@ -2,7 +2,7 @@
 //! how each policy does there compared with the MGM hill-climber.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
@@ -14,68 +14,16 @@ use super::report::figure;
 use super::{EvaluateError, ORACLE, Outcome, Row, evaluate};
 use crate::autofocus::{PolicyName, Registry};
 use crate::files::replace;
-use crate::scans::planes::{PlaneStack, PlanesError};
+use crate::notices::tell;
 use crate::scans::stack::drift::{StackCourse, StackScans};
-use crate::scans::stack::{FocalStack, StackError, in_blocks};
+use crate::scans::stack::source::{ScaledStack, StackSource, UnfitStack};
 
 /// The policy that all others are compared with.
 pub const BASELINE: &str = "mgm-hill-climber";
-/// The two scales, by the width in pixels that a stack's pictures are brought near to. It is unknown
-/// how soft a lens's best picture is on the sensor, so each stack is used at both.
-const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
 /// Seeds of the courses, one scan each.
 pub const SEEDS: usize = 3;
 /// First of the seeds, unless another is asked for.
 pub const FIRST_SEED: u64 = 31;
-
-/// Why a focal stack cannot be scanned.
-#[derive(Debug, thiserror::Error)]
-pub enum UnfitStack {
-    /// It cannot be read, or its pictures make no stack.
-    #[error(transparent)]
-    Stack(#[from] StackError),
-    /// Its pictures are too small or too many.
-    #[error("{} is not a focal stack: {source}", folder.display())]
-    Planes {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: PlanesError,
-    },
-    /// It has fewer planes than the range needs, or is too small.
-    #[error("{} cannot be scanned: it needs {planes} pictures of at least 128x128 pixels", folder.display())]
-    TooSmall {
-        /// The folder.
-        folder: PathBuf,
-        /// Planes of the range.
-        planes: usize,
-    },
-}
-
-/// A focal stack's folder, and how many of its pictures make the range 0..=1 of a scan.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StackSource {
-    /// The folder with the pictures; sorted by name, numbers by value, they are in order of focus.
-    pub folder: PathBuf,
-    /// Planes of the range; two fifths of the stack's where it is `None`, but at least 6.
-    pub planes: Option<usize>,
-}
-
-impl StackSource {
-    /// The source that `DIR` or `DIR:PLANES` names.
-    #[must_use]
-    pub fn parse(text: &str) -> Self {
-        let split = text.rsplit_once(':').and_then(|(folder, planes)| Some((folder, planes.parse().ok()?)));
-        match split {
-            Some((folder, planes)) => Self { folder: folder.into(), planes: Some(planes) },
-            None => Self { folder: text.into(), planes: None },
-        }
-    }
-
-    fn name(&self) -> String {
-        self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
-    }
-}
 
 /// A stack at one scale, ready to be scanned.
 #[derive(Debug)]
@@ -86,26 +34,21 @@ struct Item {
     scans: StackScans,
 }
 
-/// Reads `source` at both scales and lays three courses over each.
+/// Lays three courses over `source` at each scale.
 fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, UnfitStack> {
-    let stack = FocalStack::load(&source.folder, None, 1)?;
-    let planes = source.planes.unwrap_or((2 * stack.planes().len() / 5).max(6));
-    let (width, _) = stack.size();
-
-    let item = |(scale, wide): (&'static str, usize)| {
-        let side = ((width as f64 / wide as f64).round() as usize).max(1);
-        let pictures = stack.planes().iter().map(|plane| in_blocks(&plane.picture, side));
-        let numbered: Vec<_> = pictures.enumerate().map(|(at, picture)| (at as f32, picture)).collect();
-
-        let unfit = |error| UnfitStack::Planes { folder: source.folder.clone(), source: error };
-        let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes };
-        let focal = Arc::new(PlaneStack::new(&numbered).map_err(unfit)?);
-        let course = |seed| StackCourse::new(Arc::clone(&focal), planes, seed).map(Arc::new);
+    let item = |scaled: ScaledStack| {
+        let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
+        let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
         let scans = StackScans(courses.ok_or_else(too_small)?);
-        Ok(Item { stack: source.name(), scale, planes, scans })
+        Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans })
     };
-    SCALES.into_iter().map(item).collect()
+
+    let (scaled, doubts) = source.at_scales()?;
+    for doubt in doubts {
+        tell(format_args!("note: {doubt}"));
+    }
+    scaled.into_iter().map(item).collect()
 }
 
 /// How the policies did on one stack at one scale.
@@ -313,12 +256,6 @@ impl StackReport {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_source_may_say_how_many_planes_make_the_range() {
-        assert_eq!(StackSource::parse("a/b:21"), StackSource { folder: "a/b".into(), planes: Some(21) });
-        assert_eq!(StackSource::parse("a:b/c"), StackSource { folder: "a:b/c".into(), planes: None });
-    }
 
     fn result(stack: &str, scale: &'static str, maes: [f64; 2]) -> StackResult {
         let row = |policy: &str, mae: f64| Row {

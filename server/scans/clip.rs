@@ -101,12 +101,7 @@ impl Clip {
     }
 
     fn index(&self, t: usize) -> usize {
-        let last = self.frames.len() - 1;
-        if last == 0 {
-            return 0;
-        }
-        let phase = t % (2 * last);
-        phase.min(2 * last - phase)
+        to_and_fro(t, self.frames.len())
     }
 
     /// Number of pictures, at least 1.
@@ -134,6 +129,16 @@ impl Clip {
     pub const fn area(&self) -> Area {
         self.area
     }
+}
+
+/// Which of `count` pictures is shown at time `t` when they are played forwards and backwards for ever.
+pub(super) fn to_and_fro(t: usize, count: usize) -> usize {
+    let last = count.saturating_sub(1);
+    if last == 0 {
+        return 0;
+    }
+    let phase = t % (2 * last);
+    phase.min(2 * last - phase)
 }
 
 #[cfg(test)]

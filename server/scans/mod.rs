@@ -1,6 +1,7 @@
 //! Focal-time scans: a scene over time, seen at any focal power, with the optimum known at every
 //! frame. Simulated, recorded at a bench, or made from a focal stack.
 
+pub mod bench;
 pub mod benchmark;
 pub mod clip;
 pub mod detail;

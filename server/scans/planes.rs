@@ -1,6 +1,7 @@
 //! Focal stacks in memory: one scene at several positions of the focal plane, and where each patch of it is sharpest.
 
 use multiversion::multiversion;
+use sha2::{Digest, Sha256};
 
 use crate::imaging::{GrayImage, PATCH_SIDE, Patch, Square, View};
 
@@ -72,6 +73,15 @@ impl PlaneStack {
         let planes = pictures.iter().map(|(_, picture)| bytes(picture)).collect();
 
         Ok(Self { width, height, positions, planes, sharpest })
+    }
+
+    /// Feeds `hash` with all that can be seen.
+    pub(crate) fn digest(&self, hash: &mut Sha256) {
+        hash.update((self.width as u64).to_le_bytes());
+        for (position, plane) in self.positions.iter().zip(&self.planes) {
+            hash.update(position.to_le_bytes());
+            hash.update(plane);
+        }
     }
 
     /// Width and height in pixels.

@@ -7,6 +7,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::autofocus::mgm;
 use crate::camera::recorded::{Pose, ScanError, ScanFolder};
@@ -16,6 +17,7 @@ use crate::imaging::{
 use crate::lens::FocalPower;
 use crate::scans::FocalTimeScan;
 use crate::scans::ScanSet;
+use crate::scans::clip::to_and_fro;
 use crate::simulation::phantom::{Haste, SENSOR_HEIGHT, SENSOR_WIDTH, Still, Trajectory};
 
 /// Poses of the paper's robotic scan.
@@ -171,6 +173,29 @@ impl RecordedScan {
         &self.poses
     }
 
+    /// The optimum at pose `index` (the last, beyond it).
+    #[must_use]
+    pub fn optimum(&self, index: usize) -> FocalPower {
+        self.poses.get(index).or(self.poses.last()).map_or(FocalPower::MIDDLE, |pose| pose.optimum)
+    }
+
+    /// The pose at frame `time` of a replay to and fro that never ends.
+    #[must_use]
+    pub fn pose_at(&self, time: usize) -> usize {
+        to_and_fro(time, self.poses.len())
+    }
+
+    /// Feeds `hash` with all that can be seen.
+    pub(crate) fn digest(&self, hash: &mut Sha256) {
+        hash.update((self.poses.len() as u64).to_le_bytes());
+        self.powers.iter().for_each(|power| hash.update(power.get().to_le_bytes()));
+        for pose in &self.poses {
+            pose.patches.iter().for_each(|patch| hash.update(patch.as_slice()));
+            let wider = pose.wider.iter().flatten().flatten();
+            wider.flat_map(|coarse| coarse.0.iter()).for_each(|value| hash.update(value.to_le_bytes()));
+        }
+    }
+
     /// What is seen at pose `index` (the last, beyond it) through a lens at `focal_power`.
     #[must_use]
     pub fn see(&self, index: usize, focal_power: FocalPower, between: Between) -> View {
@@ -282,7 +307,7 @@ impl FocalTimeScan for Playing {
     }
 
     fn optimum(&self) -> FocalPower {
-        self.scan.poses.get(self.pose).map_or(FocalPower::MIDDLE, |pose| pose.optimum)
+        self.scan.optimum(self.pose)
     }
 
     fn advance(&mut self) {

@@ -9,6 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::clip::{Area, Clip};
+use super::recorded::{Between, RecordedScan};
 use super::relief::StackScene;
 use crate::imaging::{PATCH_SIDE, Patch, Square, View, WIDER};
 use crate::lens::FocalPower;
@@ -94,6 +95,8 @@ pub enum Scene {
     Flat(Arc<Clip>),
     /// A focal stack, whose places may lie at different distances.
     Stack(Arc<StackScene>),
+    /// A recorded scan, played to and fro: only exposure, noise and cover of the settings apply.
+    Recorded(Arc<RecordedScan>),
 }
 
 /// How a lens's focal power becomes a position in a focal stack.
@@ -211,6 +214,7 @@ impl Scan {
 
         let time = match &scene {
             Scene::Flat(clip) if clip.len() > 1 => course.random_range(0..2 * clip.len()),
+            Scene::Recorded(scan) => course.random_range(0..2 * scan.poses().len()),
             _ => 0,
         };
 
@@ -236,7 +240,7 @@ impl Scan {
         let contrast = (settings.flicker * standard_normal(&mut course)).exp();
 
         let optics = match &scene {
-            Scene::Flat(_) => None,
+            Scene::Flat(_) | Scene::Recorded(_) => None,
             Scene::Stack(stack) => Some(Optics::draw(stack, stack.planes.sharpest(whole(corner(&crop))), &mut course)),
         };
         let defocus = Defocus::default();
@@ -274,6 +278,7 @@ impl Scan {
                 let sharpest = stack.planes.sharpest(whole(corner(&self.crop)));
                 FocalPower::nearest(optics.focal_power(stack, focus, sharpest))
             }
+            (Scene::Recorded(scan), _) => scan.optimum(scan.pose_at(self.time)),
             _ => FocalPower::nearest(focus),
         }
     }
@@ -283,6 +288,7 @@ impl Scan {
         let mut patch = match self.scene.clone() {
             Scene::Flat(clip) => self.look_at_flat(&clip, focal_power),
             Scene::Stack(stack) => self.look_at_stack(&stack, focal_power),
+            Scene::Recorded(scan) => self.look_at_recorded(&scan, focal_power).patch,
         };
 
         let gain = self.settings.exposure.0 as f32;
@@ -313,6 +319,7 @@ impl Scan {
                 let (corner, position) = self.place_in_stack(&stack, focal_power);
                 stack.planes.view(corner, position).wider
             }
+            Scene::Recorded(scan) => self.look_at_recorded(&scan, focal_power).wider,
         };
 
         let mut view = View { patch, wider };
@@ -351,6 +358,11 @@ impl Scan {
     fn look_at_stack(&self, stack: &StackScene, focal_power: FocalPower) -> Patch {
         let (corner, position) = self.place_in_stack(stack, focal_power);
         stack.planes.patch(corner, position)
+    }
+
+    /// What is seen of a recorded scan.
+    fn look_at_recorded(&self, scan: &RecordedScan, focal_power: FocalPower) -> View {
+        scan.see(scan.pose_at(self.time), focal_power, Between::Interpolated)
     }
 
     /// Where in a focal stack the patch lies, and the position of the focal plane.
@@ -463,6 +475,8 @@ impl Scene {
                 let (width, height) = stack.planes.size();
                 (0, 0, width, height)
             }
+            // The recording moved by itself.
+            Self::Recorded(_) => (0, 0, PATCH_SIDE, PATCH_SIDE),
         };
         [(left, right), (top, bottom)].map(|(low, high)| (low as f64, (high - PATCH_SIDE) as f64))
     }
@@ -512,6 +526,7 @@ impl FocalTimeScan for Scan {
 mod tests {
     use super::*;
     use crate::imaging::block_means;
+    use crate::scans::recorded::Stack;
     use crate::scans::variety::Variety;
     use crate::simulation::blur::gaussian_blur;
     use crate::simulation::texture::texture;
@@ -594,6 +609,26 @@ mod tests {
         }
 
         assert!(seen > 10 && sharper == seen, "{sharper} of {seen}");
+    }
+
+    #[test]
+    fn a_recorded_scan_is_shown_as_it_was_recorded_to_and_fro() {
+        let level = |pose: u8, power: u8| Box::new([10 * pose + power; PATCH_SIDE * PATCH_SIDE]);
+        let powers = crate::scans::recorded::evenly_spread(3);
+        let pose = |pose| Stack::new(&powers, (0..3).map(|power| level(pose, power)).collect());
+        let recorded = Arc::new(RecordedScan::new(powers.clone(), (1..4).map(pose).collect()));
+
+        let scene = Scene::Recorded(recorded);
+        let mut scan = Scan::over(scene.clone(), ScanSettings::fitting(&scene), 3);
+        let mut shown = Vec::new();
+        for _ in 0..8 {
+            shown.push(scan.observe(FocalPower::MAX).0[0] as u8);
+            scan.advance();
+        }
+
+        // Poses 1, 2, 3, 2, 1, ... at the third focal power, from whichever the seed begins with.
+        let whole: Vec<u8> = [12, 22, 32, 22].into_iter().cycle().take(12).collect();
+        assert!(whole.windows(8).any(|part| part == shown), "{shown:?}");
     }
 
     #[test]

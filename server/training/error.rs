@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::run::checkpoint::{CHECKPOINT, CheckpointError};
+use crate::scans::bench::BenchError;
 use crate::scans::detail::NothingToFocusOn;
 use crate::scans::footage::FootageError;
 
@@ -19,6 +20,9 @@ pub enum TrainError {
     /// The footage cannot be used.
     #[error(transparent)]
     Footage(#[from] FootageError),
+    /// The recordings of the bench cannot be used.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
     /// The footage shows nothing to focus on.
     #[error(transparent)]
     Blank(#[from] NothingToFocusOn),

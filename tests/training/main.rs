@@ -1,6 +1,8 @@
 //! Training and evaluation from outside: a short training learns, stopping changes nothing, the
 //! same seed gives the same figures.
 
+mod bench;
+
 use std::cell::Cell;
 use std::io::{BufRead, BufReader};
 use std::os::unix::process::ExitStatusExt;
@@ -17,9 +19,9 @@ use parfocal::scans::clip::Clip;
 use parfocal::scans::simulated::Scene;
 use parfocal::training::recipe::LEG;
 use parfocal::training::recipe::{Recipe, shipped};
-use parfocal::training::run::Run;
 use parfocal::training::run::checkpoint::Checkpoint;
 use parfocal::training::run::resume::ResumeRequest;
+use parfocal::training::run::{Run, Sources};
 
 /// The recipe that ships for `policy`, small.
 fn small(policy: &str, updates: u64) -> Recipe {
@@ -38,7 +40,7 @@ fn small(policy: &str, updates: u64) -> Recipe {
 
 fn begin(recipe: &Recipe, folder: &Path) -> Run {
     tch::set_num_threads(1);
-    Run::begin(recipe.clone(), 7, &[], folder, None, tch::Device::Cpu).unwrap()
+    Run::begin(recipe.clone(), 7, &Sources::default(), folder, None, tch::Device::Cpu).unwrap()
 }
 
 fn resume(policy: &str, folder: &Path) -> Run {
@@ -70,7 +72,10 @@ fn a_short_training_beats_a_lens_that_stays_where_it_is() {
 fn what_begins_with_weights_begins_with_what_they_know() {
     let folder = tempfile::tempdir().unwrap();
     let recipe = small("mgm-learned", 1);
-    let start = |file: &str| Run::begin(recipe.clone(), 7, &[], folder.path(), Some(Path::new(file)), tch::Device::Cpu);
+    let start = |file: &str| {
+        let from = Some(Path::new(file));
+        Run::begin(recipe.clone(), 7, &Sources::default(), folder.path(), from, tch::Device::Cpu)
+    };
     // Another policy's weights are refused, and leave nothing behind.
     assert!(start("policies/parfocal.safetensors").err().unwrap().to_string().contains("cannot use the weights"));
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
@@ -162,11 +167,13 @@ fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
     let run = folder.path().join("run");
     let mut recipe = small("mgm-learned", 2 * LEG);
     recipe.pictures = 1;
-    let begun = Run::begin(recipe, 7, std::slice::from_ref(&first), &run, None, tch::Device::Cpu).unwrap();
+    let sources = Sources { footage: vec![first.clone()], ..Sources::default() };
+    let begun = Run::begin(recipe, 7, &sources, &run, None, tch::Device::Cpu).unwrap();
     assert!(!train(begun, 1));
     let again = |footage: &[&PathBuf], seed: Option<u64>| {
         let footage = footage.iter().copied().cloned().collect();
-        let asked = ResumeRequest { name: "mgm-learned".to_owned(), footage, seed, ..ResumeRequest::default() };
+        let sources = Sources { footage, ..Sources::default() };
+        let asked = ResumeRequest { name: "mgm-learned".to_owned(), sources, seed, ..ResumeRequest::default() };
         Run::resume(&run, &asked, tch::Device::Cpu).map(|run| run.updates()).map_err(|error| error.to_string())
     };
     assert_eq!(again(&[], Some(7)), Ok(LEG));

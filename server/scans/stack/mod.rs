@@ -3,6 +3,7 @@
 pub mod check;
 pub mod drift;
 pub mod optics;
+pub mod source;
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};

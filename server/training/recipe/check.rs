@@ -26,6 +26,7 @@ pub(super) fn check(recipe: &Recipe) -> Result<(), String> {
 
     within("reliefs", recipe.reliefs, 0..=10_000)?;
     within("relief_share", recipe.relief_share, 0.0..=1.0)?;
+    within("bench_share", recipe.bench_share, 0.0..=1.0)?;
     within("benchmark", recipe.benchmark, 0..=10_000)?;
 
     match (&recipe.dqn, &recipe.belief) {

@@ -31,6 +31,9 @@ pub struct Recipe {
     /// Share of the scans that go over scenes with relief.
     #[serde(default, skip_serializing_if = "is_nothing")]
     pub relief_share: f64,
+    /// Share of the scans that go over a bench's own recordings, where some are given.
+    #[serde(default = "half", skip_serializing_if = "is_half")]
+    pub bench_share: f64,
     /// Updates from one validation to the next; a checkpoint is written with each.
     pub validate_every: u64,
     /// Scans of the reference benchmark that the best weights are run on in the end, for their model card; 0: none.
@@ -54,13 +57,22 @@ fn is_nothing(share: &f64) -> bool {
     *share <= 0.0
 }
 
+const fn half() -> f64 {
+    0.5
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over references")]
+fn is_half(share: &f64) -> bool {
+    (share - half()).abs() < f64::EPSILON
+}
+
 const fn whole_benchmark() -> usize {
     COUNT
 }
 
-/// The recipes that ship: ours under the policy's name, those that train it further with `-refined`
-/// or `-relief` appended, the paper's with `-paper`.
-const SHIPPED: [(&str, &str); 10] = [
+/// The recipes that ship: ours under the policy's name, those that train it further with `-refined`,
+/// `-relief` or `-adapted` appended, the paper's with `-paper`.
+const SHIPPED: [(&str, &str); 11] = [
     ("mgm-learned", include_str!("../../../policies/mgm-learned.toml")),
     ("mlr-learned", include_str!("../../../policies/mlr-learned.toml")),
     ("cnn-learned", include_str!("../../../policies/cnn-learned.toml")),
@@ -71,6 +83,7 @@ const SHIPPED: [(&str, &str); 10] = [
     ("parfocal", include_str!("../../../policies/parfocal.toml")),
     ("parfocal-refined", include_str!("../../../policies/parfocal-refined.toml")),
     ("parfocal-relief", include_str!("../../../policies/parfocal-relief.toml")),
+    ("parfocal-adapted", include_str!("../../../policies/parfocal-adapted.toml")),
 ];
 
 /// The text of the recipe that ships under `name`.
@@ -164,7 +177,7 @@ mod tests {
     fn every_shipped_recipe_is_sound_and_makes_its_policy() {
         for name in names() {
             let recipe = Recipe::parse(shipped(name).unwrap()).unwrap_or_else(|error| panic!("{name}: {error}"));
-            let suffixes = ["-paper", "-refined", "-relief"];
+            let suffixes = ["-paper", "-refined", "-relief", "-adapted"];
             let policy = suffixes.iter().fold(name, |name, suffix| name.trim_end_matches(suffix));
             assert_eq!(recipe.policy, policy);
         }

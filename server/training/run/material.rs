@@ -1,13 +1,14 @@
-//! What a training trains on: drawn pictures or footage. Its checkpoint names them, so that a resumed
-//! training uses the same.
+//! What a training trains on: drawn pictures or footage, and a bench's own recordings. Its checkpoint
+//! names them, so that a resumed training uses the same.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
 use super::checkpoint::Checkpoint;
 use crate::notices::tell;
+use crate::scans::bench::BenchScenes;
 use crate::scans::benchmark::{Benchmark, Conditions, FRAMES};
 use crate::scans::clip::{Clip, ClipError};
 use crate::scans::detail::{warning, without_detail};
@@ -19,89 +20,76 @@ use crate::scans::simulated::Scene;
 use crate::training::error::TrainError;
 use crate::training::recipe::Recipe;
 
-/// Names of the notes in a checkpoint.
-const FOOTAGE: &str = "footage";
-const SHA256: &str = "footage_sha256";
 /// Least number of scans that are looked at for detail.
 const LEAST_CHECKED: usize = 60;
+
+/// What a training may be given to train on.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Sources {
+    /// Videos, images or folders of images, instead of drawn pictures.
+    pub footage: Vec<PathBuf>,
+    /// Folders of a bench's recorded scans and focal stacks, beside the pictures.
+    pub scans: Vec<String>,
+}
 
 /// What a training trains on.
 pub(super) struct Material {
     pub clips: Vec<Arc<Clip>>,
     /// Where the footage lies and the checksum of its pictures; `None` for drawn pictures.
-    footage: Option<(Vec<PathBuf>, String)>,
+    footage: Option<Origin>,
+    /// The bench's recordings, and where they lie.
+    bench: Option<(BenchScenes, Origin)>,
 }
 
+/// Where pictures lie, and what they were when the training was begun.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Origin {
+    paths: Vec<String>,
+    sha256: String,
+}
+
+/// A kind of source in words: its option, and the name of its notes in a checkpoint.
+#[derive(Debug, Clone, Copy)]
+struct Kind {
+    name: &'static str,
+    option: &'static str,
+}
+
+const FOOTAGE: Kind = Kind { name: "footage", option: "--footage" };
+const SCANS: Kind = Kind { name: "scans", option: "--scans" };
+
 impl Material {
-    /// The footage at `paths`, or `pictures` drawn ones where there are none.
-    pub fn open(paths: &[PathBuf], pictures: u64) -> Result<Self, TrainError> {
-        if paths.is_empty() {
-            let unfit = |error: ClipError| TrainError::Recipe(error.to_string());
-            return Ok(Self { clips: varied(Split::Training, pictures).map_err(unfit)?, footage: None });
-        }
-
-        let mut clips = Vec::new();
-        for path in paths {
-            clips.extend(footage::clips(path)?);
-        }
-
-        let mut hash = Sha256::new();
-        for clip in &clips {
-            clip.digest(&mut hash);
-        }
-
-        check_detail(&clips)?;
-
-        // A training may go on from another folder.
-        let paths = paths.iter().map(|path| std::path::absolute(path).unwrap_or_else(|_| path.clone())).collect();
-        Ok(Self { clips, footage: Some((paths, hex::encode(hash.finalize()))) })
+    /// The footage of `sources`, or `pictures` drawn ones where there is none, and its recordings.
+    pub fn open(sources: &Sources, pictures: u64) -> Result<Self, TrainError> {
+        let (clips, footage) = clips(&sources.footage, pictures)?;
+        let bench = bench(&sources.scans)?;
+        Ok(Self { clips, footage, bench })
     }
 
-    /// What the training of `checkpoint` was begun on; `asked` says where its footage lies now, if
-    /// it was given.
-    pub fn again(checkpoint: &Checkpoint<'_>, asked: &[PathBuf], pictures: u64) -> Result<Self, TrainError> {
-        let differs = |text: String| Err(TrainError::Differs(text));
-        let Some(known) = checkpoint.notes.get(FOOTAGE) else {
-            if !asked.is_empty() {
-                return differs(
-                    "this training was begun on drawn pictures; leave out --footage to continue".to_owned(),
-                );
-            }
-            return Self::open(&[], pictures);
-        };
+    /// What the training of `checkpoint` was begun on; `asked` says where its pictures lie now, if
+    /// that was given.
+    pub fn again(checkpoint: &Checkpoint<'_>, asked: &Sources, pictures: u64) -> Result<Self, TrainError> {
+        let paths = |footage: &[PathBuf]| footage.iter().map(|path| path.to_string_lossy().into_owned()).collect();
+        let footage = Known::of(checkpoint, FOOTAGE, paths(&asked.footage))?;
+        let scans = Known::of(checkpoint, SCANS, asked.scans.clone())?;
 
-        let known: Vec<PathBuf> = known.lines().map(PathBuf::from).collect();
-        let names = known.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
-        let from = if asked.is_empty() { &known } else { asked };
-        let gone = asked.is_empty() && known.iter().any(|path| !path.exists());
+        let from = footage.paths().iter().map(PathBuf::from).collect::<Vec<_>>();
+        let (clips, origin) = clips(&from, pictures).map_err(|error| footage.unusable(error))?;
+        footage.check(origin.as_ref())?;
 
-        let material = Self::open(from, pictures).map_err(|error| match error {
-            TrainError::Footage(error) if gone => {
-                let advice = "give its new path with --footage";
-                TrainError::Differs(format!("the footage that this training was begun on is gone: {error}; {advice}"))
-            }
-            error => error,
-        })?;
-
-        match &material.footage {
-            Some((_, sum)) if checkpoint.notes.get(SHA256) == Some(sum) => Ok(material),
-            _ if asked.is_empty() => differs(format!(
-                "the footage that this training was begun on ({names}) has changed; give the path of the unchanged \
-                 footage with --footage, or start again in another folder"
-            )),
-            _ => differs(format!(
-                "this training was begun on other footage: {names}; leave out --footage, or give the same \
-                 pictures in the same order"
-            )),
-        }
+        let bench = bench(scans.paths()).map_err(|error| scans.unusable(error))?;
+        scans.check(bench.as_ref().map(|(_, origin)| origin))?;
+        Ok(Self { clips, footage: origin, bench })
     }
 
-    /// Notes where the footage lies, and its checksum.
+    /// Notes where the pictures lie, and their checksums.
     pub fn note(&self, checkpoint: &mut Checkpoint<'_>) {
-        if let Some((paths, sum)) = &self.footage {
-            let paths: Vec<_> = paths.iter().map(|path| path.to_string_lossy()).collect();
-            checkpoint.notes.insert(FOOTAGE.to_owned(), paths.join("\n"));
-            checkpoint.notes.insert(SHA256.to_owned(), sum.clone());
+        let bench = self.bench.as_ref().map(|(_, origin)| origin);
+        for (kind, origin) in [(FOOTAGE, self.footage.as_ref()), (SCANS, bench)] {
+            if let Some(origin) = origin {
+                checkpoint.notes.insert(kind.name.to_owned(), origin.paths.join("\n"));
+                checkpoint.notes.insert(kind.checksum(), origin.sha256.clone());
+            }
         }
     }
 
@@ -110,16 +98,167 @@ impl Material {
         let relief =
             relief::scenes(Split::Training, recipe.reliefs).map_err(|error| TrainError::Recipe(error.to_string()))?;
         let relief = relief.into_iter().map(Scene::Stack).collect();
-        Ok(Scenery::from(self.clips.clone()).with(relief, recipe.relief_share))
+        let bench = self.bench.as_ref().map_or_else(Vec::new, |(scenes, _)| scenes.training.clone());
+        Ok(Scenery::from(self.clips.clone()).with(relief, recipe.relief_share).with(bench, recipe.bench_share))
+    }
+
+    /// The bench's recordings to validate on.
+    pub fn bench_validation(&self) -> &[Scene] {
+        self.bench.as_ref().map_or(&[], |(scenes, _)| &scenes.validation)
     }
 
     /// The same in words, for a model card.
     pub fn words(&self) -> String {
-        match self.footage {
+        let pictures = match self.footage {
             None => format!("{} drawn pictures and brain phantoms", self.clips.len()),
             Some(_) => format!("{} clips of footage", self.clips.len()),
+        };
+        match &self.bench {
+            None => pictures,
+            Some((scenes, origin)) => format!(
+                "{pictures}, and on {} recordings of a bench, {} of them kept for validation",
+                origin.paths.len(),
+                scenes.kept.len()
+            ),
         }
     }
+}
+
+impl Kind {
+    /// Name of the note of its pictures' checksum.
+    fn checksum(self) -> String {
+        format!("{}_sha256", self.name)
+    }
+}
+
+/// What a checkpoint says of a kind of source, and where that lies now.
+struct Known {
+    kind: Kind,
+    /// Where it lay when the training was begun, and its checksum; `None` where there was none.
+    begun: Option<Origin>,
+    /// Where it lies now, where that was asked for.
+    asked: Vec<String>,
+}
+
+impl Known {
+    fn of(checkpoint: &Checkpoint<'_>, kind: Kind, asked: Vec<String>) -> Result<Self, TrainError> {
+        let begun = checkpoint.notes.get(kind.name).map(|paths| Origin {
+            paths: paths.lines().map(str::to_owned).collect(),
+            sha256: checkpoint.notes.get(&kind.checksum()).cloned().unwrap_or_default(),
+        });
+
+        if begun.is_none() && !asked.is_empty() {
+            let Kind { name, option } = kind;
+            let instead = if name == FOOTAGE.name { "on drawn pictures" } else { "without recordings" };
+            return Err(TrainError::Differs(format!(
+                "this training was begun {instead}; leave out {option} to continue"
+            )));
+        }
+        Ok(Self { kind, begun, asked })
+    }
+
+    /// Where it lies now.
+    fn paths(&self) -> &[String] {
+        match &self.begun {
+            Some(begun) if self.asked.is_empty() => &begun.paths,
+            _ => &self.asked,
+        }
+    }
+
+    /// Why the training cannot go on, if it is because what it was begun on is gone; else `error`.
+    fn unusable(&self, error: TrainError) -> TrainError {
+        let gone = self.asked.is_empty() && self.paths().iter().any(|path| !folder_of(path).exists());
+        if !gone {
+            return error;
+        }
+        let Kind { name, option } = self.kind;
+        let (is, its) = if name == FOOTAGE.name { ("is", "its new path") } else { ("are", "their new paths") };
+        TrainError::Differs(format!(
+            "the {name} that this training was begun on {is} gone: {error}; give {its} with {option}"
+        ))
+    }
+
+    /// Refuses pictures other than those that the training was begun on.
+    fn check(&self, now: Option<&Origin>) -> Result<(), TrainError> {
+        let Some(begun) = &self.begun else { return Ok(()) };
+        if now.is_some_and(|now| now.sha256 == begun.sha256) {
+            return Ok(());
+        }
+
+        let Kind { name, option } = self.kind;
+        let names = begun.paths.join(", ");
+        Err(TrainError::Differs(if self.asked.is_empty() {
+            let has = if name == FOOTAGE.name { "has" } else { "have" };
+            format!(
+                "the {name} that this training was begun on ({names}) {has} changed; give the path of the unchanged \
+                 {name} with {option}, or start again in another folder"
+            )
+        } else {
+            format!(
+                "this training was begun on other {name}: {names}; leave out {option}, or give the same pictures in \
+                 the same order"
+            )
+        }))
+    }
+}
+
+/// The file or folder that `path` names, which may end in `:PLANES`.
+fn folder_of(path: &str) -> &Path {
+    match path.rsplit_once(':') {
+        Some((folder, planes)) if planes.parse::<usize>().is_ok() => Path::new(folder),
+        _ => Path::new(path),
+    }
+}
+
+/// The footage at `paths` and where it comes from, or `pictures` drawn ones where there is none.
+fn clips(paths: &[PathBuf], pictures: u64) -> Result<(Vec<Arc<Clip>>, Option<Origin>), TrainError> {
+    if paths.is_empty() {
+        let unfit = |error: ClipError| TrainError::Recipe(error.to_string());
+        return Ok((varied(Split::Training, pictures).map_err(unfit)?, None));
+    }
+
+    let mut clips = Vec::new();
+    for path in paths {
+        clips.extend(footage::clips(path)?);
+    }
+
+    let mut hash = Sha256::new();
+    for clip in &clips {
+        clip.digest(&mut hash);
+    }
+
+    check_detail(&clips)?;
+
+    let paths = paths.iter().map(|path| absolute(&path.to_string_lossy())).collect();
+    Ok((clips, Some(Origin { paths, sha256: hex::encode(hash.finalize()) })))
+}
+
+/// The recordings in `folders` and where they come from, where there are some.
+fn bench(folders: &[String]) -> Result<Option<(BenchScenes, Origin)>, TrainError> {
+    if folders.is_empty() {
+        return Ok(None);
+    }
+
+    let scenes = BenchScenes::read(folders)?;
+    for doubt in &scenes.doubts {
+        tell(format_args!("note: {doubt}"));
+    }
+
+    match &scenes.kept[..] {
+        [] => tell(format_args!(
+            "note: validation uses the recordings that are trained on; with five or more, every fifth is kept for it"
+        )),
+        kept => tell(format_args!("kept for validation, not trained on: {}", kept.join(", "))),
+    }
+
+    let origin =
+        Origin { paths: folders.iter().map(|folder| absolute(folder)).collect(), sha256: scenes.sha256.clone() };
+    Ok(Some((scenes, origin)))
+}
+
+/// A training may go on from another folder.
+fn absolute(path: &str) -> String {
+    std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| path.to_string_lossy().into_owned())
 }
 
 /// Tells of scans over `clips` that show nothing to focus on.

@@ -12,7 +12,7 @@ pub mod resume;
 pub mod tensorboard;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tch::Device;
 
@@ -33,6 +33,7 @@ use comparison::{BENCHMARK, BenchmarkFigures};
 use curves::Point;
 use folder::RunFolder;
 use material::Material;
+pub use material::Sources;
 use model_card::Made;
 use resume::ResumeRequest;
 use tensorboard::EventFile;
@@ -71,17 +72,17 @@ pub struct Run {
 }
 
 impl Run {
-    /// A new training by `recipe` in `folder`, which is new or empty. It trains on `footage`, or on
-    /// drawn pictures if there is none, from the weights in the file `from` (safetensors), or from
-    /// random ones, with its networks on `device`.
+    /// A new training by `recipe` in `folder`, which is new or empty. It trains on what
+    /// `sources` name, from the weights in the file `from` (safetensors), or from random ones, with its
+    /// networks on `device`.
     ///
     /// # Errors
-    /// When the recipe fits no policy, the folder cannot be written, or the weights or footage
-    /// cannot be used.
+    /// When the recipe fits no policy, the folder cannot be written, or the weights, footage or
+    /// recordings cannot be used.
     pub fn begin(
         recipe: Recipe,
         seed: u64,
-        footage: &[PathBuf],
+        sources: &Sources,
         folder: &Path,
         from: Option<&Path>,
         device: Device,
@@ -91,7 +92,7 @@ impl Run {
         let weights = from.map(|file| beginning(design, file)).transpose()?;
         let folder = RunFolder::begin(folder)?;
 
-        let material = Material::open(footage, recipe.pictures)?;
+        let material = Material::open(sources, recipe.pictures)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
 
         if let (Some(bytes), Some(file)) = (weights, from) {
@@ -116,7 +117,7 @@ impl Run {
         request.check(folder.path(), &recipe, seed)?;
 
         let design = recipe.design()?;
-        let material = Material::again(&checkpoint, &request.footage, recipe.pictures)?;
+        let material = Material::again(&checkpoint, &request.sources, recipe.pictures)?;
         let mut run = Self::new(recipe, design, seed, folder, material, device)?;
 
         let version = checkpoint.notes.get("version").map_or("an earlier version", String::as_str);
@@ -137,7 +138,7 @@ impl Run {
         material: Material,
         device: Device,
     ) -> Result<Self, TrainError> {
-        let validation = validation(&recipe)?;
+        let validation = validation(&recipe, &material)?;
         let trainer = trainer(design, &recipe, material.scenery(&recipe)?, seed, device)?;
 
         Ok(Self {
@@ -342,16 +343,17 @@ impl Run {
 
 /// The scans by which the best weights are chosen: over the same pictures, scans like the reference
 /// benchmark's and scans as varied as training's can be; where the recipe trains on relief, as many
-/// over scenes with relief.
-fn validation(recipe: &Recipe) -> Result<Benchmark, TrainError> {
+/// over scenes with relief; where it trains on a bench's recordings, as many over those.
+fn validation(recipe: &Recipe, material: &Material) -> Result<Benchmark, TrainError> {
     let unfit = |error: &dyn std::fmt::Display| TrainError::Recipe(error.to_string());
     let flat = varied(Split::Validation, recipe.pictures.min(60)).map_err(|error| unfit(&error))?;
     let flat: Vec<Scene> = flat.into_iter().map(Scene::Flat).collect();
     let relief = relief::scenes(Split::Validation, recipe.reliefs.min(60)).map_err(|error| unfit(&error))?;
 
     let plain = flat.len();
-    let scenes: Vec<Scene> =
-        flat.iter().cloned().chain(flat.clone()).chain(relief.into_iter().map(Scene::Stack)).collect();
+    let bench = material.bench_validation().iter().cycle().take(flat.len()).cloned();
+    let relief = relief.into_iter().map(Scene::Stack);
+    let scenes: Vec<Scene> = flat.iter().cloned().chain(flat.clone()).chain(relief).chain(bench).collect();
 
     let count = scenes.len();
     Ok(Benchmark { scenes, conditions: Conditions::VariedFrom(plain), seed: 1, count, frames: FRAMES })

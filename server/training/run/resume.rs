@@ -1,7 +1,8 @@
 //! Checks that the arguments of a resumed training match the original run.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use super::material::Sources;
 use crate::training::error::TrainError;
 use crate::training::recipe::{Recipe, shipped};
 
@@ -16,8 +17,8 @@ pub struct ResumeRequest {
     pub updates: Option<u64>,
     /// The seed.
     pub seed: Option<u64>,
-    /// Where the footage lies.
-    pub footage: Vec<PathBuf>,
+    /// Where footage and recordings lie.
+    pub sources: Sources,
 }
 
 impl ResumeRequest {

@@ -1,0 +1,123 @@
+//! What a bench has recorded, as scenes to train on: focal-time scans and focal stacks, some of them
+//! kept for validation.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+use super::planes::PlaneStack;
+use super::recorded::RecordedScan;
+use super::relief::StackScene;
+use super::simulated::Scene;
+use super::stack::source::{ScaledStack, StackSource, UnfitStack};
+use crate::camera::recorded::{HEADER, ScanError, ScanFolder};
+
+/// Of so many folders one is kept for validation.
+const KEPT_OF: usize = 5;
+/// Planes that make the range in training, least and most, of those that are asked for: how far a
+/// lens reaches differs from lens to lens.
+const REACH: (f64, f64) = (0.75, 1.3);
+
+/// Scenes of a bench.
+#[derive(Debug, Clone)]
+pub struct BenchScenes {
+    /// Those to train on.
+    pub training: Vec<Scene>,
+    /// Those to validate on: every fifth folder's, or the same where there are fewer.
+    pub validation: Vec<Scene>,
+    /// The folders of those that are kept for validation, as they were named.
+    pub kept: Vec<String>,
+    /// What is doubtful about the pictures, in words.
+    pub doubts: Vec<String>,
+    /// SHA-256 of all pictures as they are used, in hexadecimal.
+    pub sha256: String,
+}
+
+/// Why a bench's recordings cannot be trained on.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// There is no such folder.
+    #[error("there is no folder {0}; name folders of recorded scans (scan.json) or of focal stacks (pictures)")]
+    NoFolder(String),
+    /// A recorded scan cannot be read.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// A recorded scan of a still scene.
+    #[error("the scan {0} has one pose alone; name the folder with its pictures, to use them as a focal stack")]
+    OnePose(String),
+    /// A focal stack cannot be used.
+    #[error(transparent)]
+    Stack(#[from] UnfitStack),
+}
+
+impl BenchScenes {
+    /// Reads the recordings in `folders`: each is a recorded scan, or a focal stack, which `DIR:PLANES`
+    /// gives the number of planes that make the range 0..=1.
+    ///
+    /// # Errors
+    /// When a folder is missing, or what is in it cannot be used.
+    pub fn read(folders: &[String]) -> Result<Self, BenchError> {
+        let mut hash = Sha256::new();
+        let mut doubts = Vec::new();
+        let recordings: Vec<Vec<Scene>> =
+            folders.iter().map(|folder| recording(folder, &mut hash, &mut doubts)).collect::<Result<_, _>>()?;
+
+        let is_kept = |index: usize| index % KEPT_OF == KEPT_OF - 1;
+        let scenes = |kept: bool| -> Vec<Scene> {
+            let chosen = recordings.iter().enumerate().filter(|(index, _)| is_kept(*index) == kept);
+            chosen.flat_map(|(_, scenes)| scenes.clone()).collect()
+        };
+
+        let training = scenes(false);
+        let kept: Vec<String> =
+            folders.iter().enumerate().filter(|(index, _)| is_kept(*index)).map(|(_, folder)| folder.clone()).collect();
+        let validation = if kept.is_empty() { training.clone() } else { scenes(true) };
+
+        Ok(Self { training, validation, kept, doubts, sha256: hex::encode(hash.finalize()) })
+    }
+}
+
+/// The scenes of one folder.
+fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Result<Vec<Scene>, BenchError> {
+    if Path::new(folder).join(HEADER).exists() {
+        let scan = RecordedScan::read(&ScanFolder::open(Path::new(folder))?, &|| ())?;
+        if scan.poses().len() < 2 {
+            return Err(BenchError::OnePose(folder.to_owned()));
+        }
+        scan.digest(hash);
+        return Ok(vec![Scene::Recorded(Arc::new(scan))]);
+    }
+
+    let source = StackSource::parse(folder);
+    if !source.folder.is_dir() {
+        return Err(BenchError::NoFolder(folder.to_owned()));
+    }
+
+    let (scaled, doubtful) = source.at_scales()?;
+    doubts.extend(doubtful);
+
+    let mut scenes: Vec<StackScene> = Vec::new();
+    for ScaledStack { planes, pictures, .. } in scaled {
+        // A stack that is small enough is the same at both scales.
+        if scenes.iter().any(|scene| scene.planes.size() == pictures.size()) {
+            continue;
+        }
+
+        let (first, last) = pictures.range();
+        if planes < 3 || planes as f64 > last - first + 1.0 {
+            return Err(UnfitStack::TooSmall { folder: source.folder, planes }.into());
+        }
+
+        pictures.digest(hash);
+        scenes.push(scene(planes, Arc::unwrap_or_clone(pictures)));
+    }
+    Ok(scenes.into_iter().map(|scene| Scene::Stack(Arc::new(scene))).collect())
+}
+
+/// A photographed stack of which about `planes` planes make the range.
+fn scene(planes: usize, pictures: PlaneStack) -> StackScene {
+    let (first, last) = pictures.range();
+    let reach = |factor: f64| (factor * planes.saturating_sub(1) as f64).clamp(1.0, last - first);
+    StackScene { slopes: (reach(REACH.0), reach(REACH.1)), planes: pictures, photographed: true }
+}

@@ -1,0 +1,112 @@
+//! Focal stacks named on the command line, and their pictures at the scales at which they are used.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::check::check;
+use super::{FocalStack, StackError, in_blocks};
+use crate::scans::planes::{PlaneStack, PlanesError};
+
+/// The two scales, by the width in pixels that a stack's pictures are brought near to. It is unknown
+/// how soft a lens's best picture is on the sensor, so each stack is used at both.
+const SCALES: [(&str, usize); 2] = [("s", 500), ("l", 1000)];
+/// Fewest planes that make a range, where their number is not given.
+const LEAST_PLANES: usize = 6;
+
+/// Why a focal stack cannot be scanned.
+#[derive(Debug, thiserror::Error)]
+pub enum UnfitStack {
+    /// It cannot be read, or its pictures make no stack.
+    #[error(transparent)]
+    Stack(#[from] StackError),
+    /// Its pictures are too small or too many.
+    #[error("{} is not a focal stack: {source}", folder.display())]
+    Planes {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        source: PlanesError,
+    },
+    /// It has fewer planes than the range needs, or is too small.
+    #[error("{} cannot be scanned: a range of {planes} planes needs 3 or more, as many pictures, and at least 128x128 \
+             pixels", folder.display())]
+    TooSmall {
+        /// The folder.
+        folder: PathBuf,
+        /// Planes of the range.
+        planes: usize,
+    },
+}
+
+/// A focal stack's folder, and how many of its pictures make the range 0..=1 of a scan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StackSource {
+    /// The folder with the pictures; sorted by name, numbers by value, they are in order of focus.
+    pub folder: PathBuf,
+    /// Planes of the range; two fifths of the stack's where it is `None`, but at least 6.
+    pub planes: Option<usize>,
+}
+
+/// A stack's pictures at one scale.
+#[derive(Debug, Clone)]
+pub struct ScaledStack {
+    /// `s` or `l`: about 500 or 1000 pixels wide.
+    pub scale: &'static str,
+    /// Planes that make the range 0..=1.
+    pub planes: usize,
+    /// The pictures; their positions count the planes from 0.
+    pub pictures: Arc<PlaneStack>,
+}
+
+impl StackSource {
+    /// The source that `DIR` or `DIR:PLANES` names.
+    #[must_use]
+    pub fn parse(text: &str) -> Self {
+        let split = text.rsplit_once(':').and_then(|(folder, planes)| Some((folder, planes.parse().ok()?)));
+        match split {
+            Some((folder, planes)) => Self { folder: folder.into(), planes: Some(planes) },
+            None => Self { folder: text.into(), planes: None },
+        }
+    }
+
+    /// The folder's name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
+    }
+
+    /// Reads the stack and makes it smaller to each of the scales. Also returns what is doubtful about
+    /// its pictures, in words: a scan over them is possible all the same.
+    ///
+    /// # Errors
+    /// When it cannot be read, or its pictures make no stack.
+    pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), UnfitStack> {
+        let stack = FocalStack::load(&self.folder, None, 1)?;
+        let doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
+        let planes = self.planes.unwrap_or((2 * stack.planes().len() / 5).max(LEAST_PLANES));
+        let (width, _) = stack.size();
+
+        let scaled = |(scale, wide): (&'static str, usize)| {
+            let side = ((width as f64 / wide as f64).round() as usize).max(1);
+            let pictures = stack.planes().iter().map(|plane| in_blocks(&plane.picture, side));
+            let numbered: Vec<_> = pictures.enumerate().map(|(at, picture)| (at as f32, picture)).collect();
+
+            let unfit = |source| UnfitStack::Planes { folder: self.folder.clone(), source };
+            Ok(ScaledStack { scale, planes, pictures: Arc::new(PlaneStack::new(&numbered).map_err(unfit)?) })
+        };
+        let scaled = SCALES.into_iter().map(scaled).collect::<Result<_, UnfitStack>>()?;
+        let named = |doubt: String| format!("{}: {doubt}", self.folder.display());
+        Ok((scaled, doubts.into_iter().map(named).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_may_say_how_many_planes_make_the_range() {
+        assert_eq!(StackSource::parse("a/b:21"), StackSource { folder: "a/b".into(), planes: Some(21) });
+        assert_eq!(StackSource::parse("a:b/c"), StackSource { folder: "a:b/c".into(), planes: None });
+    }
+}

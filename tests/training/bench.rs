@@ -1,0 +1,115 @@
+//! Training on the recordings of a bench: what is taken, what is kept for validation, what is refused.
+
+use parfocal::simulation::blur::gaussian_blur;
+use parfocal::simulation::texture::texture;
+
+use super::*;
+
+/// Stores a focal stack of 9 pictures in `folder`, sharpest in the fifth, over a texture of its own.
+fn stack(folder: &Path, seed: u64) {
+    std::fs::create_dir_all(folder).unwrap();
+    let sharp = texture(seed, 144);
+    for plane in 0..9u8 {
+        let blurred = gaussian_blur(&sharp, 0.6 * (f64::from(plane) - 4.0).abs());
+        let levels = blurred.data.iter().map(|level| level.round() as u8).collect();
+        let picture = image::GrayImage::from_raw(144, 144, levels).unwrap();
+        picture.save(folder.join(format!("{plane}.png"))).unwrap();
+    }
+}
+
+/// Five stacks, named as on the command line.
+fn five_stacks(folder: &Path) -> Vec<String> {
+    let names = ["first", "second", "third", "fourth", "fifth"];
+    let made = names.iter().zip(1..).map(|(name, seed)| {
+        stack(&folder.join(name), seed);
+        folder.join(name).to_str().unwrap().to_owned()
+    });
+    made.collect()
+}
+
+fn on(scans: &[String]) -> Sources {
+    Sources { scans: scans.to_vec(), ..Sources::default() }
+}
+
+/// Updates that `mgm-learned` in `run` continues from when it is given `scans`, or why it does not.
+fn again(run: &Path, scans: &[String]) -> Result<u64, String> {
+    let asked = ResumeRequest { name: "mgm-learned".to_owned(), sources: on(scans), ..ResumeRequest::default() };
+    Run::resume(run, &asked, tch::Device::Cpu).map(|run| run.updates()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_training_continues_on_the_recordings_that_it_was_begun_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let stacks = five_stacks(folder.path());
+    let run = folder.path().join("run");
+
+    let begun = Run::begin(small("mgm-learned", 2 * LEG), 7, &on(&stacks), &run, None, tch::Device::Cpu).unwrap();
+    assert!(!train(begun, 1));
+    assert_eq!(again(&run, &[]), Ok(LEG));
+    assert_eq!(again(&run, &stacks), Ok(LEG));
+    assert!(again(&run, &stacks[..4]).unwrap_err().contains("begun on other scans: "));
+
+    let moved = folder.path().join("moved").to_str().unwrap().to_owned();
+    std::fs::rename(&stacks[1], &moved).unwrap();
+    let error = again(&run, &[]).unwrap_err();
+    assert!(error.contains("are gone: there is no folder") && error.contains("with --scans"), "{error}");
+
+    let mut found = stacks.clone();
+    found[1].clone_from(&moved);
+    assert_eq!(again(&run, &found), Ok(LEG));
+
+    stack(Path::new(&stacks[1]), 99);
+    assert!(again(&run, &[]).unwrap_err().contains("have changed;"));
+
+    std::fs::remove_dir_all(&stacks[1]).unwrap();
+    std::fs::rename(&moved, &stacks[1]).unwrap();
+    assert!(train(resume("mgm-learned", &run), u64::MAX));
+    let card = std::fs::read_to_string(run.join("MODEL_CARD.md")).unwrap();
+    assert!(card.contains("and on 5 recordings of a bench, 1 of them kept for validation"), "{card}");
+
+    let without = folder.path().join("without");
+    assert!(!train(begin(&small("mgm-learned", 2 * LEG), &without), 1));
+    assert!(again(&without, &stacks).unwrap_err().contains("begun without recordings; leave out --scans"));
+}
+
+#[test]
+fn recordings_are_taken_as_scans_or_stacks_and_every_fifth_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let stacks = five_stacks(folder.path());
+    let scan = folder.path().join("scan").to_str().unwrap().to_owned();
+    let made =
+        parfocal(&["scan", "from-stack", &stacks[0], "--out", &scan, "--size", "96", "--poses", "20", "--planes", "5"]);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+
+    let recipe = folder.path().join("recipe.toml");
+    let text = toml::to_string(&small("mgm-learned", LEG)).unwrap();
+    std::fs::write(&recipe, text).unwrap();
+    let train = |scans: &[&str], out: &str| {
+        let out = folder.path().join(out);
+        let begin = ["train", "mgm-learned", "--config", recipe.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        parfocal(&[&begin, ["--scans"].as_slice(), scans].concat())
+    };
+
+    let with_planes = format!("{}:5", stacks[1]);
+    let four = [scan.as_str(), &with_planes, &stacks[2], &stacks[3]];
+    let trained = train(&[four.as_slice(), &[&stacks[4]]].concat(), "whole");
+    let told = String::from_utf8_lossy(&trained.stderr).into_owned();
+    assert!(trained.status.success(), "{told}");
+    assert!(told.contains(&format!("kept for validation, not trained on: {}\n", stacks[4])), "{told}");
+
+    let told = String::from_utf8_lossy(&train(&[&scan], "one").stderr).into_owned();
+    assert!(told.contains("validation uses the recordings that are trained on"), "{told}");
+
+    let empty = folder.path().join("empty").to_str().unwrap().to_owned();
+    std::fs::create_dir(&empty).unwrap();
+    let many = format!("{}:20", stacks[2]);
+    for (wrong, expected) in [
+        ("/no/such/bench", "there is no folder /no/such/bench; name folders of recorded scans"),
+        (empty.as_str(), "empty"),
+        (&many, "cannot be scanned: a range of 20 planes needs"),
+    ] {
+        let refused = train(&[wrong], "refused");
+        let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(refused.status.code() == Some(1) && told.contains(expected), "{wrong}: {told}");
+    }
+}
