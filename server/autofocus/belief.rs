@@ -5,11 +5,11 @@ use std::sync::LazyLock;
 
 use tch::{Device, Kind, Tensor, nn};
 
-use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, WIDER_INPUT};
+use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, SEEN_INPUT, WIDER_INPUT};
 use super::registration::{CHANGES, changes};
 use super::spectrum::{FEATURES, SHARPNESS, Spectrum, features, spectrum};
 use super::weights::{self, WeightsError};
-use super::{Decision, IN_FOCUS, Observation, Policy};
+use super::{BlurRate, Decision, IN_FOCUS, Observation, Policy};
 use crate::imaging::{Patch, View, WIDER};
 
 /// Most focal power a frame: a lens can jump, but a surgeon should not see it.
@@ -25,12 +25,17 @@ const LOOK: f64 = 0.06;
 /// Focal power that a test of the belief moves the lens by.
 const TEST: f64 = 0.1;
 
+/// Blur in pixels a unit of focal power that the network meets as 0: in the middle of what optics have.
+const USUAL_BLUR: f64 = 6.0;
+
 /// Changes of focal power below this do not count as a move.
 const STILL: f32 = 0.005;
 
 /// The tracker's memory of the frame before.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
+    /// How fast the optic blurs, where that is known.
+    blur: Option<BlurRate>,
     last: Option<Box<Frame>>,
     asked: Option<f32>,
     stand: Stand,
@@ -122,6 +127,12 @@ impl Frame {
 }
 
 impl Trace {
+    /// A trace of nothing yet, seen through an optic that is known to blur as fast as `blur` says.
+    #[must_use]
+    pub fn knowing(blur: Option<BlurRate>) -> Self {
+        Self { blur, ..Self::default() }
+    }
+
     /// The network's input for a frame that shows `view`, seen at `focal_power`.
     pub fn input(&mut self, view: &View, focal_power: f64) -> [f32; BELIEF_INPUT] {
         let focal_power = focal_power as f32;
@@ -134,7 +145,8 @@ impl Trace {
         self.stand.see(now.near.features[SHARPNESS], moved);
 
         let mut input = [0.0; BELIEF_INPUT];
-        let (near, wider) = input.split_at_mut(NEAR_INPUT);
+        let (seen, known) = input.split_at_mut(SEEN_INPUT);
+        let (near, wider) = seen.split_at_mut(NEAR_INPUT);
         let rest = now.near.describe(&before.near, near);
         let (stands, moved) = rest.split_at_mut(BINS);
         spread_over_bins(f64::from(focal_power), stands);
@@ -149,6 +161,11 @@ impl Trace {
                 let rest = look.describe(before, part);
                 rest[0] = 1.0;
             }
+        }
+
+        if let Some(blur) = self.blur {
+            known[0] = 1.0;
+            known[1] = (blur.get() / USUAL_BLUR).ln() as f32;
         }
 
         self.last = Some(now);
@@ -269,13 +286,13 @@ fn target(focal_power: f64, belief: &[f32]) -> f64 {
 }
 
 /// Fills `store`, which holds a belief network, from safetensors `bytes`. Also takes weights of a
-/// network that saw the patch alone: what is seen of wider patches then counts for nothing, and the
-/// network computes what it computed before.
+/// network that saw the patch alone, or that was told nothing of the optic: what it did not have then
+/// counts for nothing, and the network computes what it computed before.
 ///
 /// # Errors
 /// When the bytes are damaged or another network's.
 pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
-    weights::load_widening(store, bytes, "memory.weight_ih_l0", NEAR_INPUT)
+    weights::load_widening(store, bytes, "memory.weight_ih_l0", &[NEAR_INPUT, SEEN_INPUT])
 }
 
 /// The belief tracker as a policy. One instance follows one scan.
@@ -319,6 +336,10 @@ impl Policy for BeliefTracker {
         let target = self.trace.aim(seen.focal_power.get(), &belief);
         self.trace.ask(target);
         Decision { target, metric: None, belief: Some(belief.into()) }
+    }
+
+    fn learn_of(&mut self, blur: BlurRate) {
+        self.trace.blur = Some(blur);
     }
 }
 
@@ -417,18 +438,34 @@ mod tests {
     }
 
     #[test]
-    fn weights_that_knew_the_patch_alone_compute_what_they_did() {
-        let [old, new] = [NEAR_INPUT, BELIEF_INPUT].map(|inputs| {
-            let store = nn::VarStore::new(Device::Cpu);
-            let network = BeliefNetwork::new(&store.root(), inputs);
-            (store, network)
-        });
-        load(&new.0, &weights::save(&old.0, "a test").unwrap()).unwrap();
-        let inputs = Tensor::randn([1, 4, BELIEF_INPUT as i64], (Kind::Float, Device::Cpu));
-        let near = inputs.narrow(2, 0, NEAR_INPUT as i64);
-        let blank = old.1.blank(1, Device::Cpu);
-        let (expected, found) = (old.1.forward(&near, &blank).0, new.1.forward(&inputs, &blank).0);
-        assert!(found.allclose(&expected, 1e-5, 1e-6, false));
+    fn how_fast_the_optic_blurs_is_told_where_it_is_known() {
+        let patch = Patch(std::array::from_fn(|i| if i % 4 < 2 { 90.0 } else { 160.0 }));
+        let view = View { patch, wider: [None; 2] };
+        let unknown = Trace::default().input(&view, 0.5);
+        assert!(unknown[SEEN_INPUT..].iter().all(|value| value.abs() < f32::EPSILON));
+
+        let known = Trace::knowing(BlurRate::new(12.0)).input(&view, 0.5);
+        assert_eq!(known[..SEEN_INPUT], unknown[..SEEN_INPUT]);
+        assert!((known[SEEN_INPUT] - 1.0).abs() < f32::EPSILON);
+        assert!((known[SEEN_INPUT + 1] - std::f32::consts::LN_2).abs() < 1e-6);
+    }
+
+    #[test]
+    fn weights_that_were_given_less_compute_what_they_did() {
+        for width in [NEAR_INPUT, SEEN_INPUT] {
+            let [old, new] = [width, BELIEF_INPUT].map(|inputs| {
+                let store = nn::VarStore::new(Device::Cpu);
+                let network = BeliefNetwork::new(&store.root(), inputs);
+                (store, network)
+            });
+            load(&new.0, &weights::save(&old.0, "a test").unwrap()).unwrap();
+
+            let inputs = Tensor::randn([1, 4, BELIEF_INPUT as i64], (Kind::Float, Device::Cpu));
+            let narrow = inputs.narrow(2, 0, width as i64);
+            let blank = old.1.blank(1, Device::Cpu);
+            let (expected, found) = (old.1.forward(&narrow, &blank).0, new.1.forward(&inputs, &blank).0);
+            assert!(found.allclose(&expected, 1e-5, 1e-6, false));
+        }
     }
 
     #[test]

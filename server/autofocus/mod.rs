@@ -32,6 +32,40 @@ pub const IN_FOCUS: f64 = 0.1;
 pub trait Policy: Send {
     /// One step. What comes back is not trusted: the control loop checks it.
     fn step(&mut self, seen: &Observation<'_>) -> Decision;
+
+    /// Tells the policy, before its first step, how fast the optic blurs. Most have no use for that.
+    fn learn_of(&mut self, _blur: BlurRate) {}
+}
+
+/// How fast an optic blurs: pixels of blur (standard deviation) in the picture for a change of focal
+/// power by 1. `parfocal scan info` measures it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlurRate(f64);
+
+impl BlurRate {
+    /// Least and most that an optic can have.
+    pub const RANGE: std::ops::RangeInclusive<f64> = 0.1..=200.0;
+
+    /// `pixels` a unit of focal power; `None` outside [`BlurRate::RANGE`].
+    #[must_use]
+    pub fn new(pixels: f64) -> Option<Self> {
+        Self::RANGE.contains(&pixels).then_some(Self(pixels))
+    }
+
+    /// Pixels a unit of focal power.
+    #[must_use]
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+}
+
+impl std::str::FromStr for BlurRate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let pixels = text.parse().map_err(|_| format!("'{text}' is no number of pixels"))?;
+        Self::new(pixels).ok_or_else(|| format!("must be from {} to {} pixels", Self::RANGE.start(), Self::RANGE.end()))
+    }
 }
 
 /// What a policy sees: one view, and the focal power that it was exposed at.

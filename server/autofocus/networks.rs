@@ -24,7 +24,9 @@ pub const NEAR_INPUT: usize = 2 * FEATURES + CHANGES + BINS + 3;
 /// What it sees of a wider patch: features and changes as of the patch, and whether there is one at all.
 pub const WIDER_INPUT: usize = 2 * FEATURES + CHANGES + 1;
 /// What it sees of a frame: the patch first, then the wider ones.
-pub const BELIEF_INPUT: usize = NEAR_INPUT + WIDER.len() * WIDER_INPUT;
+pub const SEEN_INPUT: usize = NEAR_INPUT + WIDER.len() * WIDER_INPUT;
+/// Inputs of the belief tracker: what it sees, whether it knows how fast the optic blurs, and how fast.
+pub const BELIEF_INPUT: usize = SEEN_INPUT + 2;
 
 const HIDDEN: i64 = 256;
 const SIDE: i64 = PATCH_SIDE as i64;

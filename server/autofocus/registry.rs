@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::Policy;
+use super::{BlurRate, Policy};
 
 /// A policy's name, as in docs/scripting.md; valid once a [`Registry`] has taken it. Cheap to clone.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -75,6 +75,7 @@ pub enum PolicyError {
 #[derive(Clone, Default)]
 pub struct Registry {
     policies: Vec<Registered>,
+    blur: Option<BlurRate>,
 }
 
 #[derive(Clone)]
@@ -127,6 +128,13 @@ impl Registry {
         self
     }
 
+    /// This registry with its policies told how fast the optic blurs, where that is known.
+    #[must_use]
+    pub const fn knowing(mut self, blur: Option<BlurRate>) -> Self {
+        self.blur = blur;
+        self
+    }
+
     /// The SHA-256 of each learned policy's weights.
     #[must_use]
     pub fn weights(&self) -> BTreeMap<PolicyName, String> {
@@ -162,7 +170,13 @@ impl Registry {
         let policy = self.policies.iter().find(|policy| policy.name == *name);
 
         match policy.map(|policy| &policy.source) {
-            Some(Source::Constructor(build)) => Ok(build()),
+            Some(Source::Constructor(build)) => {
+                let mut policy = build();
+                if let Some(blur) = self.blur {
+                    policy.learn_of(blur);
+                }
+                Ok(policy)
+            }
             Some(Source::Missing(reason)) => {
                 Err(PolicyError::Unavailable { name: name.clone(), reason: reason.to_string() })
             }

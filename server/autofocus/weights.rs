@@ -21,15 +21,15 @@ pub enum WeightsError {
 /// # Errors
 /// When the bytes are damaged, or hold a different set of tensors than the network has.
 pub fn load(store: &nn::VarStore, bytes: &[u8]) -> Result<(), WeightsError> {
-    load_widening(store, bytes, "", 0)
+    load_widening(store, bytes, "", &[])
 }
 
 /// Like [`load`], for a network that sees more than it once did: where the matrix `widened` has
-/// `columns` columns in the file, they become the first of the network's, and the others become 0.
+/// one of `widths` columns in the file, they become the first of the network's, and the others become 0.
 ///
 /// # Errors
 /// As for [`load`].
-pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, columns: usize) -> Result<(), WeightsError> {
+pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, widths: &[usize]) -> Result<(), WeightsError> {
     let file = SafeTensors::deserialize(bytes).map_err(|error| WeightsError::Damaged(error.to_string()))?;
 
     let variables = store.variables();
@@ -42,7 +42,8 @@ pub fn load_widening(store: &nn::VarStore, bytes: &[u8], widened: &str, columns:
 
         let shape: Vec<i64> = view.shape().iter().map(|&side| i64::try_from(side).unwrap_or(i64::MAX)).collect();
         let size = variable.size();
-        let narrow = name == widened && size.len() == 2 && shape == [size[0], i64::try_from(columns).unwrap_or(0)];
+        let known = |width: &usize| shape == [size[0], i64::try_from(*width).unwrap_or(0)];
+        let narrow = name == widened && size.len() == 2 && widths.iter().any(known);
         if view.dtype() != Dtype::F32 || (shape != size && !narrow) {
             return Err(WeightsError::Mismatch(format!("tensor '{name}' has shape {shape:?}, not {size:?}")));
         }
@@ -126,13 +127,13 @@ mod tests {
         let wide = store(5);
         let bytes = save(&narrow, "a test").unwrap();
 
-        load_widening(&wide, &bytes, "layer.weight", 3).unwrap();
+        load_widening(&wide, &bytes, "layer.weight", &[3]).unwrap();
         let [from, to] = [&narrow, &wide].map(|store| store.variables()["layer.weight"].shallow_clone());
         assert_eq!(to.narrow(1, 0, 3), from);
         assert_eq!(floats(&to.narrow(1, 3, 2)), [0.0; 4]);
         // Of another width, or of another matrix, they do not fit.
         for (name, columns) in [("layer.weight", 4), ("layer.bias", 3)] {
-            let refused = load_widening(&store(5), &bytes, name, columns).unwrap_err();
+            let refused = load_widening(&store(5), &bytes, name, &[columns]).unwrap_err();
             assert!(matches!(refused, WeightsError::Mismatch(_)), "{refused}");
         }
     }

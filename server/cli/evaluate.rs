@@ -1,6 +1,7 @@
 //! `parfocal evaluate`: all policies on the same focal-time scans, and the paper's table with ours beside it.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::Arc;
 
 use clap::ArgGroup;
@@ -9,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{Failure, bar, print};
 use crate::autofocus::networks::compute_on_this_thread;
-use crate::autofocus::{PolicyName, Registry, scripted, shipped};
+use crate::autofocus::{BlurRate, PolicyName, Registry, scripted, shipped};
 use crate::camera::recorded::ScanFolder;
 use crate::evaluation::evaluate;
 use crate::evaluation::report::Subject;
@@ -42,6 +43,10 @@ pub struct Arguments {
     /// with three seeds, 31 to 33 unless --seed names the first. May be repeated.
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"])]
     stacks: Vec<String>,
+    /// Tell the policies how fast the optic blurs: pixels (standard deviation) for a change of focal power by 1, as
+    /// `parfocal scan info` measures them; with --stacks also `measured`, each stack by its own pictures.
+    #[arg(long, value_name = "PIXELS|measured")]
+    blur: Option<Blur>,
     /// A video (its first 1500 frames), an image or a folder of images to use instead of the reference pictures.
     #[arg(long, value_name = "PATH")]
     footage: Vec<PathBuf>,
@@ -116,6 +121,23 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> String {
     format!("cannot write the results to {}: {error}", folder.display())
 }
 
+/// What the policies are told of how fast the optic blurs.
+#[derive(Debug, Clone, Copy)]
+enum Blur {
+    /// This rate.
+    Rate(BlurRate),
+    /// The rate that is measured on each focal stack.
+    Measured,
+}
+
+impl FromStr for Blur {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text == "measured" { Ok(Self::Measured) } else { text.parse().map(Self::Rate) }
+    }
+}
+
 /// The policies asked for, each of which can run, and the registry that builds them.
 fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyName>), Failure> {
     compute_on_this_thread();
@@ -123,6 +145,18 @@ fn registry_and_policies(arguments: &Arguments) -> Result<(Registry, Vec<PolicyN
 
     if let Some(folder) = &arguments.weights {
         registry = shipped::with_folder(registry, folder)?;
+    }
+
+    match arguments.blur {
+        Some(Blur::Rate(rate)) => registry = registry.knowing(Some(rate)),
+        Some(Blur::Measured) if arguments.stacks.is_empty() => {
+            return Err(
+                "--blur measured works with --stacks; for other scans give the pixels, which `parfocal scan info` \
+                        tells of a recorded scan"
+                    .into(),
+            );
+        }
+        Some(Blur::Measured) | None => {}
     }
 
     let policies = policies(&arguments.policies, &registry);
@@ -211,12 +245,14 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let (registry, policies) = registry_and_policies(arguments)?;
     let sources: Vec<StackSource> = arguments.stacks.iter().map(|text| StackSource::parse(text)).collect();
 
+    let seed = arguments.seed.unwrap_or(FIRST_SEED);
+    let measured = matches!(arguments.blur, Some(Blur::Measured));
+
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
-    let (report, outcomes) =
-        evaluate_stacks(&registry, &policies, &sources, arguments.seed.unwrap_or(FIRST_SEED), &|name| {
-            bar.set_message(name.to_owned());
-            bar.inc(1);
-        })?;
+    let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, (seed, measured), &|name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    })?;
     bar.finish_and_clear();
 
     if let Some(folder) = &arguments.out {

@@ -18,7 +18,7 @@ use tracing_subscriber::EnvFilter;
 
 use super::announce::{announcement, reachable};
 use super::output::Failure;
-use crate::autofocus::{PolicyName, Registry, scripted, shipped};
+use crate::autofocus::{BlurRate, PolicyName, Registry, scripted, shipped};
 use crate::camera::{self, CameraSettings, calibration};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Library, Parts};
@@ -61,6 +61,10 @@ pub struct Arguments {
     /// Folder with weights of your own (`NAME.safetensors`) that replace those that ship.
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
+    /// How fast the optic blurs, for the policies that can use it: pixels (standard deviation) for a change of focal
+    /// power by 1, as `parfocal scan info` measures them.
+    #[arg(long, value_name = "PIXELS")]
+    blur: Option<BlurRate>,
     /// Calibration of the sensor: a TOML file, or a folder of `parfocal calibrate`; a typical unit's by default.
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
@@ -228,7 +232,7 @@ fn bound_real_time() -> std::io::Result<()> {
 
 /// The policies that ship and those from files, each tried once.
 fn registry(arguments: &Arguments) -> Result<Registry, Failure> {
-    let mut registry = Registry::standard();
+    let mut registry = Registry::standard().knowing(arguments.blur);
     if let Some(folder) = &arguments.weights {
         registry = shipped::with_folder(registry, folder)?;
     }

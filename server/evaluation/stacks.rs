@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::report::figure;
 use super::{EvaluateError, ORACLE, Outcome, Row, evaluate};
-use crate::autofocus::{PolicyName, Registry};
+use crate::autofocus::{BlurRate, PolicyName, Registry};
 use crate::files::replace;
 use crate::notices::tell;
 use crate::scans::stack::drift::{StackCourse, StackScans};
@@ -32,6 +32,7 @@ struct Item {
     scale: &'static str,
     planes: usize,
     scans: StackScans,
+    blur: Option<BlurRate>,
 }
 
 /// Lays three courses over `source` at each scale.
@@ -41,7 +42,7 @@ fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, UnfitStack>
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
         let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
         let scans = StackScans(courses.ok_or_else(too_small)?);
-        Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans })
+        Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans, blur: scaled.blur })
     };
 
     let (scaled, doubts) = source.at_scales()?;
@@ -60,6 +61,9 @@ pub struct StackResult {
     pub scale: &'static str,
     /// Planes of the range.
     pub planes: usize,
+    /// What the policies were told of how fast the optic blurs: pixels a unit of focal power.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blur: Option<f64>,
     /// One a policy, the oracle first.
     pub rows: Vec<Row>,
 }
@@ -94,7 +98,8 @@ pub struct StackReport {
     pub standings: Vec<Standing>,
 }
 
-/// Evaluates `policies` on the stacks of `sources`, the oracle and the baseline beside them.
+/// Evaluates `policies` on the stacks of `sources`, the oracle and the baseline beside them. The
+/// policies are told how fast each stack's optic blurs where `measured` says so.
 ///
 /// # Errors
 /// When a stack cannot be read or scanned, or a policy cannot run.
@@ -102,7 +107,7 @@ pub fn evaluate_stacks(
     registry: &Registry,
     policies: &[PolicyName],
     sources: &[StackSource],
-    seed: u64,
+    (seed, measured): (u64, bool),
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
     let mut policies = policies.to_vec();
@@ -116,9 +121,13 @@ pub fn evaluate_stacks(
     let mut all = Vec::new();
 
     for item in items.into_iter().flatten() {
-        let outcomes = evaluate(registry, &policies, &item.scans, progress)?;
+        let told = if measured { item.blur } else { None };
+        let registry = if told.is_some() { registry.clone().knowing(told) } else { registry.clone() };
+        let outcomes = evaluate(&registry, &policies, &item.scans, progress)?;
+
         let rows = outcomes.iter().map(Outcome::row).collect();
-        stacks.push(StackResult { stack: item.stack, scale: item.scale, planes: item.planes, rows });
+        let blur = told.map(BlurRate::get);
+        stacks.push(StackResult { stack: item.stack, scale: item.scale, planes: item.planes, blur, rows });
         all.push(outcomes);
     }
 
@@ -274,6 +283,7 @@ mod tests {
             stack: stack.to_owned(),
             scale,
             planes: 9,
+            blur: None,
             rows: vec![row(BASELINE, maes[0]), row("own", maes[1])],
         }
     }

@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::clip::{Area, Clip};
 use super::recorded::{Between, RecordedScan};
 use super::relief::StackScene;
+use crate::autofocus::BlurRate;
 use crate::imaging::{PATCH_SIDE, Patch, Square, View, WIDER};
 use crate::lens::FocalPower;
 use crate::simulation::cover::Cover;
@@ -280,6 +281,16 @@ impl Scan {
             }
             (Scene::Recorded(scan), _) => scan.optimum(scan.pose_at(self.time)),
             _ => FocalPower::nearest(focus),
+        }
+    }
+
+    /// How fast blur grows, where that is known: not of photographs.
+    #[must_use]
+    pub fn blur(&self) -> Option<BlurRate> {
+        match (&self.scene, &self.optics) {
+            (Scene::Flat(_), _) => BlurRate::new(self.sigma0),
+            (Scene::Stack(stack), Some(optics)) if !stack.photographed => BlurRate::new(optics.slope.abs()),
+            _ => None,
         }
     }
 

@@ -11,12 +11,14 @@ use super::optimiser::{Optimiser, half_cosine};
 use super::recipe::belief::BeliefRecipe;
 use super::run::checkpoint::{Checkpoint, CheckpointError};
 use super::trainer::Trainer;
+use crate::autofocus::BlurRate;
 use crate::autofocus::belief::{self, Trace, spread_over_bins};
 use crate::autofocus::networks::{BELIEF_INPUT, BINS, BeliefNetwork};
 use crate::autofocus::weights::WeightsError;
 use crate::imaging::{View, WIDER};
 use crate::scans::scenery::Scenery;
 use crate::scans::variety::Variety;
+use crate::simulation::normal::standard_normal;
 
 /// A training in progress.
 pub struct BeliefTrainer {
@@ -41,6 +43,11 @@ struct Actor {
 
 /// Share of scans in which not all wider patches are seen, as in a picture that is too small for them.
 const NARROW: f64 = 0.1;
+
+/// Share of scans in which the tracker is told how fast the optic blurs.
+const TOLD: f64 = 0.4;
+/// Spread of what it is told around the truth, as a standard deviation of the logarithm.
+const MEASURED: f64 = 0.15;
 
 /// Frames and what should have been believed: inputs `[N, T, BELIEF_INPUT]`, beliefs `[N, T, BINS]`.
 struct Batch {
@@ -184,8 +191,12 @@ impl Trainer for BeliefTrainer {
 impl Actor {
     fn draw(recipe: &BeliefRecipe, scenery: &Scenery, rng: &mut ChaCha8Rng) -> Self {
         let environment = Environment::draw(scenery, Variety { share: recipe.variety }, recipe.wandering, rng);
+        let told = rng.random_bool(TOLD);
         let wider = if rng.random_bool(NARROW) { rng.random_range(0..WIDER.len()) } else { WIDER.len() };
-        Self { environment, trace: Trace::default(), windows_left: recipe.windows_a_scan, wider }
+
+        let measured = |blur: BlurRate| BlurRate::new(blur.get() * (MEASURED * standard_normal(rng)).exp());
+        let blur = environment.blur().and_then(measured).filter(|_| told);
+        Self { environment, trace: Trace::knowing(blur), windows_left: recipe.windows_a_scan, wider }
     }
 
     /// The network's input at this frame.

@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
+use crate::autofocus::BlurRate;
 use crate::imaging::{Patch, View};
 use crate::lens::FocalPower;
 use crate::scans::scenery::Scenery;
@@ -63,6 +64,12 @@ impl Environment {
     #[must_use]
     pub fn optimum(&self) -> FocalPower {
         self.scan.optimum()
+    }
+
+    /// How fast blur grows, where the scene has one rate.
+    #[must_use]
+    pub fn blur(&self) -> Option<BlurRate> {
+        self.scan.blur()
     }
 
     /// The patch of this frame.

@@ -53,6 +53,41 @@ fn a_focal_stack_becomes_a_scan_that_policies_can_be_evaluated_on() {
 }
 
 #[test]
+fn policies_are_evaluated_on_a_stack_and_told_how_fast_its_optic_blurs() {
+    let folder = TempDir::new().unwrap();
+    let pictures = folder.path().join("pictures");
+    stack(&pictures, &[]);
+
+    let seven = format!("{}:7", text(&pictures));
+    let evaluate = |more: &[&str]| parfocal(&[&["evaluate", "--policies", "fixed", "--json"], more].concat());
+    let results = |more: &[&str]| -> Value {
+        let output = evaluate(&[&["--stacks", &seven, text(&pictures)], more].concat());
+        serde_json::from_str(&said(&output)).unwrap_or_else(|error| panic!("{error}: {}", complaint(&output)))
+    };
+
+    let untold = results(&[]);
+    // Two stacks at two scales each, three policies: the oracle and the baseline are always there.
+    let stacks = untold["stacks"].as_array().unwrap();
+    assert_eq!((stacks.len(), stacks[0]["rows"].as_array().unwrap().len()), (4, 3));
+    assert_eq!((&stacks[0]["planes"], &stacks[2]["planes"], &stacks[0]["blur"]), (&7.into(), &6.into(), &Value::Null));
+
+    // 7 of 13 planes are half of the range, so half of the blur.
+    let told = results(&["--blur", "measured"]);
+    let blur = told["stacks"][0]["blur"].as_f64().unwrap();
+    assert!((blur / 2.5 - 1.0).abs() < 0.2, "{blur}");
+    assert_eq!(told["stacks"][0]["rows"], stacks[0]["rows"], "fixed has no use for it");
+
+    for (wrong, expected) in [
+        (["--blur", "measured"].as_slice(), "--blur measured works with --stacks"),
+        (&["--blur", "0"], "must be from 0.1 to 200 pixels"),
+        (&["--blur", "much"], "'much' is no number of pixels"),
+    ] {
+        let output = evaluate(wrong);
+        assert!(!output.status.success() && complaint(&output).contains(expected), "{}", complaint(&output));
+    }
+}
+
+#[test]
 fn what_is_no_focal_stack_is_refused_before_anything_is_written() {
     let folder = TempDir::new().unwrap();
     let (pictures, out) = (folder.path().join("pictures"), folder.path().join("scan"));

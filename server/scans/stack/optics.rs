@@ -55,12 +55,18 @@ impl Optics {
     /// What `stack` shows.
     #[must_use]
     pub fn of(stack: &FocalStack) -> Self {
+        Self { magnification: magnification(stack), ..Self::of_focus(stack) }
+    }
+
+    /// What `stack` shows but for magnification, which takes longer than all the rest.
+    #[must_use]
+    pub fn of_focus(stack: &FocalStack) -> Self {
         let (width, height) = stack.size();
         let corner = |side: usize, index: usize| (side - PATCH_SIDE) * (2 * index + 1) / (2 * PLACES);
         let corners = (0..PLACES).flat_map(|row| (0..PLACES).map(move |column| (column, row)));
         let corners = corners.map(|(column, row)| (corner(width, column), corner(height, row)));
 
-        let mut optics = Self { magnification: magnification(stack), ..Self::default() };
+        let mut optics = Self::default();
         let mut rates = Vec::new();
         let mut softnesses = Vec::new();
         for (x, y) in corners {

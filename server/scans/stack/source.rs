@@ -4,7 +4,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::check::check;
-use super::{FocalStack, StackError, in_blocks};
+use super::optics::Optics;
+use super::{FocalStack, Plane, StackError, in_blocks};
+use crate::autofocus::BlurRate;
+use crate::imaging::GrayImage;
 use crate::scans::planes::{PlaneStack, PlanesError};
 
 /// The two scales, by the width in pixels that a stack's pictures are brought near to. It is unknown
@@ -56,6 +59,8 @@ pub struct ScaledStack {
     pub planes: usize,
     /// The pictures; their positions count the planes from 0.
     pub pictures: Arc<PlaneStack>,
+    /// How fast the optic blurs over that range, where the pictures show it.
+    pub blur: Option<BlurRate>,
 }
 
 impl StackSource {
@@ -83,7 +88,7 @@ impl StackSource {
     pub fn at_scales(&self) -> Result<(Vec<ScaledStack>, Vec<String>), UnfitStack> {
         let stack = FocalStack::load(&self.folder, None, 1)?;
         let doubts = check(&stack).unwrap_or_else(|error| vec![error.to_string()]);
-        let planes = self.planes.unwrap_or((2 * stack.planes().len() / 5).max(LEAST_PLANES));
+        let planes = self.planes.unwrap_or((2 * stack.planes().len() / 5).max(LEAST_PLANES)).max(1);
         let (width, _) = stack.size();
 
         let scaled = |(scale, wide): (&'static str, usize)| {
@@ -92,7 +97,12 @@ impl StackSource {
             let numbered: Vec<_> = pictures.enumerate().map(|(at, picture)| (at as f32, picture)).collect();
 
             let unfit = |source| UnfitStack::Planes { folder: self.folder.clone(), source };
-            Ok(ScaledStack { scale, planes, pictures: Arc::new(PlaneStack::new(&numbered).map_err(unfit)?) })
+            let pictures = Arc::new(PlaneStack::new(&numbered).map_err(unfit)?);
+
+            let plane = |(at, picture): (f32, GrayImage)| Plane { name: at.to_string(), position: at.into(), picture };
+            let optics = Optics::of_focus(&FocalStack::new(numbered.into_iter().map(plane).collect())?);
+            let blur = optics.blur_per_unit.and_then(|rate| BlurRate::new(rate * (planes - 1) as f64));
+            Ok(ScaledStack { scale, planes, pictures, blur })
         };
         let scaled = SCALES.into_iter().map(scaled).collect::<Result<_, UnfitStack>>()?;
         let named = |doubt: String| format!("{}: {doubt}", self.folder.display());
