@@ -9,7 +9,7 @@ use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, SEEN_INPUT,
 use super::registration::{CHANGES, changes};
 use super::spectrum::{FEATURES, SHARPNESS, Spectrum, features, spectrum};
 use super::weights::{self, WeightsError};
-use super::{BlurRate, Decision, IN_FOCUS, Observation, Policy};
+use super::{BlurRate, Decision, FieldOfView, IN_FOCUS, Observation, Policy};
 use crate::imaging::{Patch, View, WIDER};
 
 /// Most focal power a frame: a lens can jump, but a surgeon should not see it.
@@ -331,6 +331,10 @@ impl BeliefTracker {
 }
 
 impl Policy for BeliefTracker {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Wide
+    }
+
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         let belief = self.believe(seen);
         let target = self.trace.aim(seen.focal_power.get(), &belief);

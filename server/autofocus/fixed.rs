@@ -1,6 +1,6 @@
 //! The fixed policy: the lens never moves.
 
-use super::{Decision, Observation, Policy};
+use super::{Decision, FieldOfView, Observation, Policy};
 use crate::lens::FocalPower;
 
 /// Stays at the focal power it was started at, whatever it sees.
@@ -11,6 +11,10 @@ pub struct Fixed {
 }
 
 impl Policy for Fixed {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         let target = self.start.get_or_insert(seen.focal_power).get();
         Decision { target, ..Decision::default() }

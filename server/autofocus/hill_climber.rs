@@ -1,7 +1,7 @@
 //! The hill-climber: keeps one direction for as long as a focus metric rises, and turns back when it
 //! does not.
 
-use super::{Decision, Observation, Policy, STEP};
+use super::{Decision, FieldOfView, Observation, Policy, STEP};
 use crate::imaging::Patch;
 
 /// Distance to a bound that counts as being on it: sums of 0.05 miss 0 and 1 by their rounding.
@@ -29,6 +29,10 @@ impl HillClimber {
 }
 
 impl Policy for HillClimber {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         let metric = (self.metric)(&seen.view.patch);
         let focal_power = seen.focal_power.get();

@@ -6,7 +6,7 @@ use tch::{Device, Tensor, nn};
 
 use super::networks::{ACTIONS, ENCODING, Encoder, HISTORY, ValueHead};
 use super::weights::{self, WeightsError};
-use super::{Decision, Observation, Policy, STEP, mgm, mlr};
+use super::{Decision, FieldOfView, Observation, Policy, STEP, mgm, mlr};
 use crate::imaging::Patch;
 
 /// What a learned policy knows of each frame besides the focal power.
@@ -145,6 +145,10 @@ impl Learned {
 }
 
 impl Policy for Learned {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         tch::no_grad(|| {
             let metric = self.network.sight.metric(&seen.view.patch);

@@ -30,6 +30,9 @@ pub const IN_FOCUS: f64 = 0.1;
 
 /// Decides, frame by frame, which focal power to ask for next.
 pub trait Policy: Send {
+    /// What of a frame this policy uses; constant for an instance. Nothing wider need be shown to it.
+    fn field_of_view(&self) -> FieldOfView;
+
     /// One step. What comes back is not trusted: the control loop checks it.
     fn step(&mut self, seen: &Observation<'_>) -> Decision;
 
@@ -68,10 +71,19 @@ impl std::str::FromStr for BlurRate {
     }
 }
 
+/// How much of a frame a policy uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FieldOfView {
+    /// The patch alone, as the paper's policies do.
+    Patch,
+    /// The patch and the wider patches around it, which cost the control loop sixteen times the pixels.
+    Wide,
+}
+
 /// What a policy sees: one view, and the focal power that it was exposed at.
 #[derive(Debug, Clone, Copy)]
 pub struct Observation<'a> {
-    /// The patch and what is around it. The paper's policies use the patch alone.
+    /// The patch, and the wider patches if the policy's field of view has them.
     pub view: &'a View,
     /// Focal power that it was exposed at.
     pub focal_power: FocalPower,

@@ -15,7 +15,7 @@ use tch::{CModule, Kind, Tensor};
 
 use super::learned::{action_step, best_action};
 use super::networks::{ACTIONS, HISTORY};
-use super::{Decision, Fixed, Observation, Policy, PolicyName, Registry};
+use super::{Decision, FieldOfView, Fixed, Observation, Policy, PolicyName, Registry};
 use crate::imaging::PATCH_SIDE;
 
 /// What a policy's name begins with if it is a file.
@@ -117,6 +117,10 @@ impl Scripted {
 }
 
 impl Policy for Scripted {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         self.remember(seen);
         match values(&self.module, self.patches.make_contiguous(), self.focal_powers.make_contiguous()) {

@@ -1,11 +1,12 @@
-//! The eye: what policies see of a frame, whichever kind of picture it carries.
+//! The eye: what policies see of a frame, whatever kind of picture it carries.
 
 use super::Hold;
 use super::pilot::HoldReason;
+use crate::autofocus::FieldOfView;
 use crate::camera::FrameImage;
-use crate::imaging::{ContentArea, PatchArea, Reconstructor, View, rgb_view};
+use crate::imaging::{ContentArea, Patch, PatchArea, Reconstructor, View, rgb_patch, rgb_view};
 
-/// Finds and reconstructs the patch and what is around it, and nothing else of the picture.
+/// Finds the patch and reconstructs what a policy uses of the picture, and nothing else.
 pub struct Eye {
     reconstructor: Reconstructor,
 }
@@ -17,25 +18,36 @@ impl Eye {
         Self { reconstructor }
     }
 
-    /// The view at the centre of `content`, or of the picture without one, and where its patch was.
+    /// Where the patch of `image` is: at the centre of `content`, or of the picture without one.
     ///
     /// # Errors
     /// When the picture is smaller than a patch.
-    pub fn look(&self, image: &FrameImage, content: Option<&ContentArea>) -> Result<(PatchArea, View), HoldReason> {
+    pub fn find(&self, image: &FrameImage, content: Option<&ContentArea>) -> Result<PatchArea, HoldReason> {
         let (width, height) = match image {
             FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
             FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
         };
 
-        let area = PatchArea::central(width, height, content).map_err(|error| {
-            HoldReason::new(Hold::CameraFailed, &format!("the camera's picture is no use: {error}"))
-        })?;
+        PatchArea::central(width, height, content)
+            .map_err(|error| HoldReason::new(Hold::CameraFailed, &format!("the camera's picture is no use: {error}")))
+    }
 
-        let view = match image {
-            FrameImage::Mosaic(mosaic) => self.reconstructor.gray_view(mosaic, area),
-            FrameImage::Rgb(rgb) => rgb_view(rgb, area),
-        };
+    /// The patch of `image` at `area`.
+    #[must_use]
+    pub fn patch(&self, image: &FrameImage, area: PatchArea) -> Patch {
+        match image {
+            FrameImage::Mosaic(mosaic) => self.reconstructor.gray_patch(mosaic, area),
+            FrameImage::Rgb(rgb) => rgb_patch(rgb, area),
+        }
+    }
 
-        Ok((area, view))
+    /// What a policy with this `field` of view sees of `image`, whose patch is at `area`.
+    #[must_use]
+    pub fn look(&self, image: &FrameImage, area: PatchArea, field: FieldOfView) -> View {
+        match (field, image) {
+            (FieldOfView::Patch, _) => View::from(self.patch(image, area)),
+            (FieldOfView::Wide, FrameImage::Mosaic(mosaic)) => self.reconstructor.gray_view(mosaic, area),
+            (FieldOfView::Wide, FrameImage::Rgb(rgb)) => rgb_view(rgb, area),
+        }
     }
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::Hold;
 use super::advice::{Advice, Failure};
 use super::runner::Runner;
-use crate::autofocus::{Observation, PolicyName, Registry};
+use crate::autofocus::{FieldOfView, Observation, PolicyName, Registry};
 use crate::clock::{Clock, Moment};
 
 /// Time from a failure to the next attempt: long enough not to flood the log, short enough that the
@@ -73,6 +73,11 @@ impl Pilot {
     /// The policy in charge.
     pub const fn policy(&self) -> Option<&PolicyName> {
         self.policy.as_ref()
+    }
+
+    /// What the policy in charge uses of a frame.
+    pub fn field_of_view(&self) -> FieldOfView {
+        self.runner.as_ref().map_or(FieldOfView::Wide, Runner::field_of_view)
     }
 
     /// What the policy advises on seeing this. Waits at most one frame.

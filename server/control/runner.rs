@@ -12,7 +12,7 @@ use std::time::Duration;
 use rustix::thread::{Pid, gettid};
 
 use super::advice::{Advice, Failure};
-use crate::autofocus::{Observation, Policy, PolicyName, Registry, networks};
+use crate::autofocus::{FieldOfView, Observation, Policy, PolicyError, PolicyName, Registry, networks};
 use crate::clock::{Clock, Moment};
 use crate::imaging::View;
 use crate::lens::FocalPower;
@@ -37,6 +37,8 @@ pub struct Runner {
     thread: JoinHandle<()>,
     /// The thread's number, once it runs.
     id: Arc<OnceLock<Pid>>,
+    /// What the instance uses of a frame, once it is made.
+    field_of_view: Arc<OnceLock<FieldOfView>>,
     /// Whether the thread is at real-time priority.
     urgent: bool,
     asked_at: Option<Moment>,
@@ -57,15 +59,24 @@ impl Runner {
         let (answers_out, answers) = sync_channel(1);
         let id = Arc::new(OnceLock::new());
         let id_of_thread = id.clone();
+        let field_of_view = Arc::new(OnceLock::new());
+        let field_of_instance = field_of_view.clone();
 
         let thread = std::thread::Builder::new().name(THREAD.into()).spawn(move || {
             let _ = id_of_thread.set(gettid());
             priority::prefer();
             networks::compute_on_this_thread();
-            serve(&registry, &name, &*clock, &questions_in, &answers_out);
+            let build = || instance(&registry, &name, &field_of_instance);
+            serve(build, &*clock, &questions_in, &answers_out);
         })?;
 
-        Ok(Self { questions, answers, thread, id, urgent: false, asked_at: None, proven: false })
+        Ok(Self { questions, answers, thread, id, field_of_view, urgent: false, asked_at: None, proven: false })
+    }
+
+    /// What the instance uses of a frame. While it is being made, which takes a few frames, nobody
+    /// knows, so it is shown everything.
+    pub fn field_of_view(&self) -> FieldOfView {
+        self.field_of_view.get().copied().unwrap_or(FieldOfView::Wide)
     }
 
     /// Asks; does not wait. Until [`Self::answer`] stops waiting the thread is at real-time
@@ -135,14 +146,25 @@ impl Runner {
     }
 }
 
-fn serve(
+/// A fresh instance of policy `name`, whose field of view is noted in `field_of_view`.
+fn instance(
     registry: &Registry,
     name: &PolicyName,
+    field_of_view: &OnceLock<FieldOfView>,
+) -> Result<Box<dyn Policy>, PolicyError> {
+    let policy = registry.build(name)?;
+    let _ = field_of_view.set(policy.field_of_view());
+    Ok(policy)
+}
+
+/// Makes an instance with `build` and answers questions with it, until there are no more or it panics.
+fn serve(
+    build: impl FnOnce() -> Result<Box<dyn Policy>, PolicyError>,
     clock: &dyn Clock,
     questions: &Receiver<Question>,
     answers: &SyncSender<Answer>,
 ) {
-    let mut policy = match guarded(|| registry.build(name)) {
+    let mut policy = match guarded(build) {
         Ok(Ok(policy)) => policy,
         Ok(Err(error)) => return drop(answers.send(Err(Failure::Unavailable(error)))),
         Err(message) => return drop(answers.send(Err(Failure::Panicked(message)))),

@@ -14,7 +14,7 @@ use crate::autofocus::{Observation, PolicyName, Registry};
 use crate::camera::Frame;
 use crate::clock::Clock;
 use crate::ids::SegmentId;
-use crate::imaging::{ContentArea, View};
+use crate::imaging::{ContentArea, PatchArea};
 use crate::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth};
 
 /// The loop's state between two frames. Driven by the loop's thread, or directly by a simulation
@@ -107,12 +107,12 @@ impl Stepper {
     pub fn step(&mut self, frame: Frame) -> Result<ControlledFrame, HoldReason> {
         // A lens that is away may be anywhere.
         let measured = self.lens.measured().map(|_| self.attribution.focal_power(frame.middle()));
-        let (area, view) = self.eye.look(&frame.image, self.content_area.as_ref())?;
+        let patch = self.eye.find(&frame.image, self.content_area.as_ref())?;
 
         let asks = self.asks_policy(&frame);
         let policy = self.pilot.policy().filter(|_| asks == Ok(true)).cloned();
         let outcome = match asks {
-            Ok(true) => self.ask(&frame, &view).map(Some),
+            Ok(true) => self.ask(&frame, patch).map(Some),
             Ok(false) => Ok(None),
             Err(reason) => Err(reason),
         };
@@ -132,7 +132,7 @@ impl Stepper {
             optimal: frame.truth.map(|truth| truth.optimal),
         };
         let belief = advice.and_then(|advice| advice.belief);
-        Ok(ControlledFrame { frame, patch: area, content_area: self.content_area, record, belief })
+        Ok(ControlledFrame { frame, patch, content_area: self.content_area, record, belief })
     }
 
     /// Between frames that do not come: keeps telling the lens, so that a hand on the slider works
@@ -160,9 +160,12 @@ impl Stepper {
         Ok(self.placed)
     }
 
-    fn ask(&mut self, frame: &Frame, view: &View) -> Result<Advice, HoldReason> {
+    /// Asks the policy about `frame`, whose patch is at `patch`. Only now is a view made, and no wider
+    /// than the policy needs.
+    fn ask(&mut self, frame: &Frame, patch: PatchArea) -> Result<Advice, HoldReason> {
+        let view = self.eye.look(&frame.image, patch, self.pilot.field_of_view());
         let focal_power = self.attribution.focal_power(frame.middle());
-        self.pilot.ask(&Observation { view, focal_power })
+        self.pilot.ask(&Observation { view: &view, focal_power })
     }
 
     /// Tells the lens what was decided, and remembers the reason if it is to be held instead.

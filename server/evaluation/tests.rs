@@ -5,7 +5,7 @@ use crate::scans::simulated::{ScanSettings, Scene};
 use std::sync::Arc;
 
 use super::*;
-use crate::autofocus::{Decision, Observation, Policy};
+use crate::autofocus::{Decision, FieldOfView, Observation, Policy};
 use crate::lens::FocalPower;
 use crate::scans::clip::Clip;
 use crate::scans::recorded::PARTS;
@@ -53,6 +53,10 @@ fn figures_of_a_number_of_poses_that_parts_do_not_divide_are_those_of_the_whole_
 struct GivesUp(usize);
 
 impl Policy for GivesUp {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         self.0 += 1;
         let target = if self.0 < 3 { seen.focal_power.get() } else { f64::NAN };

@@ -38,8 +38,8 @@ impl View {
         loop {
             match self.camera.next_frame(PATIENCE) {
                 Ok(frame) => {
-                    let (_, view) = self.eye.look(&frame.image, None)?;
-                    return Ok((frame.middle(), mgm(&view.patch)));
+                    let area = self.eye.find(&frame.image, None)?;
+                    return Ok((frame.middle(), mgm(&self.eye.patch(&frame.image, area))));
                 }
                 Err(error @ CameraError::BadSource(_)) => return Err(error.into()),
                 Err(error) if self.clock.now().since(begun) >= PATIENCE => return Err(error.into()),

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Condvar, LazyLock, Mutex};
 use std::time::Duration;
 
-use parfocal::autofocus::{Decision, Observation, Policy, PolicyName, Registry};
+use parfocal::autofocus::{Decision, FieldOfView, Observation, Policy, PolicyName, Registry};
 use parfocal::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
 use parfocal::clock::{Clock, Moment};
 use parfocal::control::{Command, Drive};
@@ -94,6 +94,10 @@ impl Script {
 struct Scripted(Arc<ScriptState>);
 
 impl Policy for Scripted {
+    fn field_of_view(&self) -> FieldOfView {
+        FieldOfView::Patch
+    }
+
     fn step(&mut self, seen: &Observation<'_>) -> Decision {
         self.0.seen.lock().unwrap().push(seen.focal_power.get());
         let mut threads = self.0.threads.lock().unwrap();

@@ -1,10 +1,10 @@
 //! Single steps, on a clock that the test moves: 20 ms a frame.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use jiff::Timestamp;
-use parfocal::autofocus::PolicyName;
+use parfocal::autofocus::{Decision, FieldOfView, Observation, Policy, PolicyName, Registry};
 use parfocal::clock::{Clock, ManualClock};
 use parfocal::control::{Command, Drive, Eye, Hold, StepRecord, Stepper};
 use parfocal::ids::SegmentId;
@@ -21,7 +21,7 @@ const PATIENT: Duration = Duration::from_secs(20);
 /// Frames in a second: the longest a recovery may take.
 const SECOND: usize = 50;
 
-struct Bench {
+struct Fixture {
     clock: Arc<ManualClock>,
     lens: FakeLens,
     script: Script,
@@ -29,7 +29,7 @@ struct Bench {
     number: u64,
 }
 
-impl Bench {
+impl Fixture {
     fn new(patience: Duration) -> Self {
         Self::with_lens(patience, FakeLens::at(power(0.5)))
     }
@@ -74,84 +74,126 @@ impl Bench {
 
 #[test]
 fn a_policy_is_followed() {
-    let mut bench = Bench::new(PATIENT);
-    bench.stepper.obey(drive("scripted", None));
-    let record = bench.step();
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.stepper.obey(drive("scripted", None));
+    let record = fixture.step();
     assert_eq!((record.asked, record.held), (power(0.6), None));
     assert_eq!(record.policy, Some(PolicyName::new("scripted")));
     assert_eq!(record.metric, Some(0.6));
-    assert_eq!(bench.lens.position(), power(0.6));
-    bench.script.set(Deed::GoTo(0.65));
-    assert_eq!(bench.step().asked, power(0.65));
-    assert_eq!(bench.script.seen(), [0.5, 0.6], "each frame is attributed to where the lens was");
+    assert_eq!(fixture.lens.position(), power(0.6));
+    fixture.script.set(Deed::GoTo(0.65));
+    assert_eq!(fixture.step().asked, power(0.65));
+    assert_eq!(fixture.script.seen(), [0.5, 0.6], "each frame is attributed to where the lens was");
+}
+
+/// Stays where it is, and notes how many wider patches each frame showed it.
+struct Spectator {
+    field_of_view: FieldOfView,
+    shown: Arc<Mutex<Vec<usize>>>,
+}
+
+impl Policy for Spectator {
+    fn field_of_view(&self) -> FieldOfView {
+        self.field_of_view
+    }
+
+    fn step(&mut self, seen: &Observation<'_>) -> Decision {
+        self.shown.lock().unwrap().push(seen.view.wider.iter().flatten().count());
+        Decision { target: seen.focal_power.get(), ..Decision::default() }
+    }
+}
+
+#[test]
+fn a_policy_is_shown_wider_patches_only_if_it_uses_them() {
+    for (field_of_view, expected) in [(FieldOfView::Patch, 0), (FieldOfView::Wide, 2)] {
+        let shown = Arc::new(Mutex::new(Vec::new()));
+        let notes = shown.clone();
+        let build = move || Box::new(Spectator { field_of_view, shown: notes.clone() }) as Box<dyn Policy>;
+        let registry = Registry::default().with("spectator", "notes what it is shown", build);
+
+        let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
+        let lens = Box::new(FakeLens::at(power(0.5)));
+        let mut stepper = Stepper::new(lens, Eye::new(reconstructor()), registry, clock.clone(), PATIENT);
+
+        clock.advance(Duration::from_secs(10));
+        stepper.obey(drive("spectator", None));
+        for number in 1..=3 {
+            clock.advance(FRAME);
+            let record = stepper.step(sized_frame(number, clock.now(), 128)).unwrap().record;
+            assert_eq!(record.held, None);
+        }
+
+        // The first frame may come before the policy is made, and is then shown as a whole.
+        assert_eq!(shown.lock().unwrap()[1..], [expected; 2], "{field_of_view:?}");
+    }
 }
 
 #[test]
 fn a_panic_holds_and_a_fresh_instance_takes_over() {
-    let mut bench = Bench::new(PATIENT);
-    bench.stepper.obey(drive("scripted", None));
-    bench.step();
-    bench.script.set(Deed::Panic);
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.stepper.obey(drive("scripted", None));
+    fixture.step();
+    fixture.script.set(Deed::Panic);
     for _ in 0..SECOND {
-        let record = bench.step();
+        let record = fixture.step();
         assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyPanicked)));
     }
-    assert!(bench.message().contains("being restarted"), "{}", bench.message());
-    assert!(bench.script.instances() < 8, "a policy that always panics is tried a few times a second");
-    bench.script.set(Deed::GoTo(0.7));
-    bench.recover();
-    assert_eq!(bench.lens.position(), power(0.7));
-    assert_eq!(bench.message(), "");
+    assert!(fixture.message().contains("being restarted"), "{}", fixture.message());
+    assert!(fixture.script.instances() < 8, "a policy that always panics is tried a few times a second");
+    fixture.script.set(Deed::GoTo(0.7));
+    fixture.recover();
+    assert_eq!(fixture.lens.position(), power(0.7));
+    assert_eq!(fixture.message(), "");
 }
 
 #[test]
 fn nonsense_holds_and_a_fresh_instance_takes_over() {
-    let mut bench = Bench::new(PATIENT);
-    bench.stepper.obey(drive("scripted", None));
-    bench.step();
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.stepper.obey(drive("scripted", None));
+    fixture.step();
     for nonsense in [f64::NAN, f64::INFINITY, -0.001, 1.001] {
-        bench.script.set(Deed::GoTo(nonsense));
+        fixture.script.set(Deed::GoTo(nonsense));
         for _ in 0..SECOND {
-            let record = bench.step();
+            let record = fixture.step();
             assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyNonsense)));
         }
-        assert!(bench.message().contains("invalid focal power"), "{}", bench.message());
-        bench.script.set(Deed::GoTo(0.6));
-        bench.recover();
+        assert!(fixture.message().contains("invalid focal power"), "{}", fixture.message());
+        fixture.script.set(Deed::GoTo(0.6));
+        fixture.recover();
     }
 }
 
 #[test]
 fn a_hanging_policy_is_given_up_and_replaced() {
-    let mut bench = Bench::new(Duration::from_millis(50));
-    bench.stepper.obey(drive("scripted", None));
-    bench.recover_in_time(Duration::ZERO);
-    bench.script.set(Deed::Hang);
+    let mut fixture = Fixture::new(Duration::from_millis(50));
+    fixture.stepper.obey(drive("scripted", None));
+    fixture.recover_in_time(Duration::ZERO);
+    fixture.script.set(Deed::Hang);
     for _ in 0..4 * SECOND {
-        let record = bench.step();
+        let record = fixture.step();
         assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicySlow)));
     }
-    assert!(bench.message().contains("hangs again and again"), "{}", bench.message());
-    assert!(bench.script.instances() <= 5, "no more threads are left hanging than a few");
-    bench.stepper.obey(drive("fixed", None));
-    bench.recover_in_time(Duration::ZERO);
-    bench.stepper.obey(drive("scripted", None));
-    assert_eq!(bench.step().held, Some(Hold::PolicySlow));
-    bench.script.set(Deed::GoTo(0.7));
-    bench.recover_in_time(FRAME);
-    assert_eq!(bench.lens.position(), power(0.7), "what the hung ones answered too late is not followed");
+    assert!(fixture.message().contains("hangs again and again"), "{}", fixture.message());
+    assert!(fixture.script.instances() <= 5, "no more threads are left hanging than a few");
+    fixture.stepper.obey(drive("fixed", None));
+    fixture.recover_in_time(Duration::ZERO);
+    fixture.stepper.obey(drive("scripted", None));
+    assert_eq!(fixture.step().held, Some(Hold::PolicySlow));
+    fixture.script.set(Deed::GoTo(0.7));
+    fixture.recover_in_time(FRAME);
+    assert_eq!(fixture.lens.position(), power(0.7), "what the hung ones answered too late is not followed");
 }
 
 #[test]
 fn a_policy_that_is_late_once_keeps_its_memory() {
-    let mut bench = Bench::new(Duration::from_millis(50));
-    bench.stepper.obey(drive("scripted", None));
-    bench.recover_in_time(Duration::ZERO);
-    bench.script.set(Deed::Hang);
-    assert_eq!(bench.step().held, Some(Hold::PolicySlow));
-    bench.script.set(Deed::GoTo(0.7));
-    bench.recover_in_time(Duration::ZERO);
-    assert_eq!(bench.script.instances(), 1);
+    let mut fixture = Fixture::new(Duration::from_millis(50));
+    fixture.stepper.obey(drive("scripted", None));
+    fixture.recover_in_time(Duration::ZERO);
+    fixture.script.set(Deed::Hang);
+    assert_eq!(fixture.step().held, Some(Hold::PolicySlow));
+    fixture.script.set(Deed::GoTo(0.7));
+    fixture.recover_in_time(Duration::ZERO);
+    assert_eq!(fixture.script.instances(), 1);
 }
 
 #[test]
@@ -161,92 +203,92 @@ fn a_lens_that_fails_holds_and_comes_back() {
             lens.panic(on && panics);
             lens.fail((on && !panics).then(|| LensError::Refused("over temperature".into())));
         };
-        let mut bench = Bench::new(PATIENT);
-        bench.stepper.obey(drive("scripted", None));
-        bench.step();
-        fail(&bench.lens, true);
-        bench.script.set(Deed::GoTo(0.7));
+        let mut fixture = Fixture::new(PATIENT);
+        fixture.stepper.obey(drive("scripted", None));
+        fixture.step();
+        fail(&fixture.lens, true);
+        fixture.script.set(Deed::GoTo(0.7));
         for _ in 0..SECOND {
-            let record = bench.step();
+            let record = fixture.step();
             assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::LensFailed)));
         }
-        assert!(bench.message().contains(words), "{}", bench.message());
-        assert_eq!(bench.script.seen().len(), 2, "the policy learns nothing from a lens that does not move");
-        fail(&bench.lens, false);
-        bench.recover();
-        assert_eq!(bench.lens.position(), power(0.7));
+        assert!(fixture.message().contains(words), "{}", fixture.message());
+        assert_eq!(fixture.script.seen().len(), 2, "the policy learns nothing from a lens that does not move");
+        fail(&fixture.lens, false);
+        fixture.recover();
+        assert_eq!(fixture.lens.position(), power(0.7));
     }
 }
 
 #[test]
 fn a_hand_on_the_slider_is_obeyed_without_frames_and_as_soon_as_the_lens_listens() {
-    let mut bench = Bench::new(PATIENT);
-    bench.lens.fail(Some(LensError::Gone("unplugged".into())));
-    bench.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.9)), segment: None });
-    assert_eq!(bench.stepper.hold_reason().unwrap().hold, Hold::LensFailed);
-    bench.lens.fail(None);
-    bench.stepper.idle();
-    assert_eq!((bench.lens.position(), bench.stepper.hold_reason()), (power(0.9), None));
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.lens.fail(Some(LensError::Gone("unplugged".into())));
+    fixture.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.9)), segment: None });
+    assert_eq!(fixture.stepper.hold_reason().unwrap().hold, Hold::LensFailed);
+    fixture.lens.fail(None);
+    fixture.stepper.idle();
+    assert_eq!((fixture.lens.position(), fixture.stepper.hold_reason()), (power(0.9), None));
 }
 
 #[test]
 fn a_pause_holds_and_asks_no_policy() {
-    let mut bench = Bench::new(PATIENT);
-    bench.stepper.obey(drive("scripted", None));
-    bench.step();
-    bench.stepper.obey(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
-    bench.script.set(Deed::GoTo(0.1));
-    let record = bench.step();
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.stepper.obey(drive("scripted", None));
+    fixture.step();
+    fixture.stepper.obey(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
+    fixture.script.set(Deed::GoTo(0.1));
+    let record = fixture.step();
     assert_eq!((record.asked, record.held, record.policy), (power(0.6), Some(Hold::Paused), None));
 }
 
 #[test]
 fn a_pause_at_a_focal_power_goes_there_as_soon_as_the_lens_listens_and_stays() {
-    let mut bench = Bench::new(PATIENT);
-    bench.lens.fail(Some(LensError::Gone("unplugged".into())));
-    bench.stepper.obey(Command::Drive { drive: Drive::Hold { at: Some(power(0.8)) }, segment: None });
-    bench.step();
-    bench.lens.fail(None);
-    let record = bench.step();
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.lens.fail(Some(LensError::Gone("unplugged".into())));
+    fixture.stepper.obey(Command::Drive { drive: Drive::Hold { at: Some(power(0.8)) }, segment: None });
+    fixture.step();
+    fixture.lens.fail(None);
+    let record = fixture.step();
     assert_eq!((record.asked, record.held, record.policy), (power(0.8), Some(Hold::Paused), None));
-    assert_eq!(bench.lens.position(), power(0.8));
+    assert_eq!(fixture.lens.position(), power(0.8));
 }
 
 #[test]
 fn an_unknown_policy_holds_and_says_so() {
-    let mut bench = Bench::new(PATIENT);
-    bench.stepper.obey(drive("no-such", None));
-    assert_eq!(bench.step().held, Some(Hold::PolicyUnavailable));
-    assert!(bench.message().contains("parfocal policies"), "{}", bench.message());
+    let mut fixture = Fixture::new(PATIENT);
+    fixture.stepper.obey(drive("no-such", None));
+    assert_eq!(fixture.step().held, Some(Hold::PolicyUnavailable));
+    assert!(fixture.message().contains("parfocal policies"), "{}", fixture.message());
 }
 
 #[test]
 fn no_message_tells_which_policy_runs() {
     for deed in [Deed::Panic, Deed::Hang, Deed::GoTo(2.0)] {
-        let mut bench = Bench::new(Duration::from_millis(10));
-        bench.script.set(deed);
-        bench.stepper.obey(drive("scripted", None));
+        let mut fixture = Fixture::new(Duration::from_millis(10));
+        fixture.script.set(deed);
+        fixture.stepper.obey(drive("scripted", None));
         for _ in 0..SECOND {
-            bench.step();
-            assert!(!bench.message().is_empty() && !bench.message().contains("scripted"));
+            fixture.step();
+            assert!(!fixture.message().is_empty() && !fixture.message().contains("scripted"));
         }
-        bench.script.set(Deed::GoTo(0.5));
+        fixture.script.set(Deed::GoTo(0.5));
     }
 }
 
 #[test]
 fn drive_and_segment_change_together_between_two_frames() {
-    let mut bench = Bench::new(PATIENT);
+    let mut fixture = Fixture::new(PATIENT);
     let segments = [1, 2].map(|id| SegmentId(Uuid::from_u128(id)));
     for (name, segment) in [("scripted", segments[0]), ("fixed", segments[1])] {
-        bench.stepper.obey(drive(name, Some(segment)));
+        fixture.stepper.obey(drive(name, Some(segment)));
         for _ in 0..3 {
-            let record = bench.step();
+            let record = fixture.step();
             assert_eq!((record.policy, record.segment), (Some(PolicyName::new(name)), Some(segment)));
         }
     }
-    bench.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.2)), segment: None });
-    let record = bench.step();
+    fixture.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.2)), segment: None });
+    let record = fixture.step();
     assert_eq!((record.policy, record.segment, record.asked), (None, None, power(0.2)));
 }
 
@@ -255,17 +297,17 @@ fn drive_and_segment_change_together_between_two_frames() {
 #[test]
 fn a_policy_begins_once_the_lens_is_at_its_start() {
     let lens = FakeLens::at(power(0.9)).slow(Duration::from_millis(2), Duration::from_millis(15));
-    let mut bench = Bench::with_lens(PATIENT, lens);
-    bench.step();
+    let mut fixture = Fixture::with_lens(PATIENT, lens);
+    fixture.step();
     let start = Drive::Policy { name: PolicyName::new("scripted"), start: Some(power(0.5)) };
-    bench.stepper.obey(Command::Drive { drive: start, segment: None });
-    assert_eq!(bench.lens.position(), power(0.5), "without waiting for a frame");
+    fixture.stepper.obey(Command::Drive { drive: start, segment: None });
+    assert_eq!(fixture.lens.position(), power(0.5), "without waiting for a frame");
     for pace in [Duration::ZERO, FRAME] {
-        let early = bench.step_after(pace);
+        let early = fixture.step_after(pace);
         assert_eq!((early.policy, early.asked, early.held), (None, power(0.5), None));
     }
-    assert_eq!(bench.step().asked, power(0.6));
-    assert_eq!(bench.script.seen(), [0.5]);
+    assert_eq!(fixture.step().asked, power(0.6));
+    assert_eq!(fixture.script.seen(), [0.5]);
 }
 
 /// Half a step of 0.4 is left after 15 ln 2 / ln 20 = 3.47 ms: a frame whose exposure of 20 ms ended 15.47 ms after the
@@ -273,53 +315,53 @@ fn a_policy_begins_once_the_lens_is_at_its_start() {
 #[test]
 fn a_long_exposure_is_attributed_to_its_middle() {
     let lens = FakeLens::at(power(0.5)).slow(Duration::from_millis(2), Duration::from_millis(15));
-    let mut bench = Bench::with_lens(PATIENT, lens);
-    bench.script.set(Deed::GoTo(0.9));
-    bench.stepper.obey(drive("scripted", None));
-    bench.step();
-    bench.clock.advance(Duration::from_micros(15_470));
-    let mut late = frame(2, bench.clock.now());
+    let mut fixture = Fixture::with_lens(PATIENT, lens);
+    fixture.script.set(Deed::GoTo(0.9));
+    fixture.stepper.obey(drive("scripted", None));
+    fixture.step();
+    fixture.clock.advance(Duration::from_micros(15_470));
+    let mut late = frame(2, fixture.clock.now());
     late.exposure = FRAME;
-    bench.stepper.step(late).unwrap();
-    let seen = bench.script.seen();
+    fixture.stepper.step(late).unwrap();
+    let seen = fixture.script.seen();
     assert!((seen[1] - 0.7).abs() < 1e-3, "{seen:?}");
 }
 
 /// The same, of a lens whose driver takes it to move at once and that was measured to move so.
 #[test]
 fn measured_dynamics_replace_the_drivers_and_stand_in_the_telemetry() {
-    let mut bench = Bench::new(PATIENT);
+    let mut fixture = Fixture::new(PATIENT);
     let dynamics = LensDynamics { delay: Duration::from_millis(2), settling: Duration::from_millis(15) };
-    bench.stepper = bench.stepper.moving(dynamics);
-    bench.script.set(Deed::GoTo(0.9));
-    bench.stepper.obey(drive("scripted", None));
-    assert_eq!(bench.step().measured, Some(power(0.5)), "exposed before the first command");
-    bench.clock.advance(Duration::from_micros(15_470));
-    let mut late = frame(2, bench.clock.now());
+    fixture.stepper = fixture.stepper.moving(dynamics);
+    fixture.script.set(Deed::GoTo(0.9));
+    fixture.stepper.obey(drive("scripted", None));
+    assert_eq!(fixture.step().measured, Some(power(0.5)), "exposed before the first command");
+    fixture.clock.advance(Duration::from_micros(15_470));
+    let mut late = frame(2, fixture.clock.now());
     late.exposure = FRAME;
-    let record = bench.stepper.step(late).unwrap().record;
+    let record = fixture.stepper.step(late).unwrap().record;
     assert!((record.measured.unwrap().get() - 0.7).abs() < 1e-3, "{record:?}");
-    assert!((bench.script.seen()[1] - 0.7).abs() < 1e-3);
+    assert!((fixture.script.seen()[1] - 0.7).abs() < 1e-3);
 }
 
 #[test]
 fn the_patch_follows_the_content_area() {
-    let mut bench = Bench::new(PATIENT);
+    let mut fixture = Fixture::new(PATIENT);
     let mut patch_of = |stepper: &mut Stepper| {
-        bench.number += 1;
-        let seen = stepper.step(sized_frame(bench.number, bench.clock.now(), 100)).unwrap();
+        fixture.number += 1;
+        let seen = stepper.step(sized_frame(fixture.number, fixture.clock.now(), 100)).unwrap();
         (seen.patch.x, seen.patch.y)
     };
-    assert_eq!(patch_of(&mut bench.stepper), (34, 34));
+    assert_eq!(patch_of(&mut fixture.stepper), (34, 34));
     let area = ContentArea { x: 40.0, y: 60.0, radius: 30.0, confidence: 1.0 };
-    bench.stepper.obey(Command::ContentArea(Some(area)));
-    assert_eq!(patch_of(&mut bench.stepper), (24, 44));
+    fixture.stepper.obey(Command::ContentArea(Some(area)));
+    assert_eq!(patch_of(&mut fixture.stepper), (24, 44));
 }
 
 #[test]
 fn a_picture_without_room_for_a_patch_is_a_fault_of_the_camera() {
-    let mut bench = Bench::new(PATIENT);
-    let Err(reason) = bench.stepper.step(sized_frame(1, bench.clock.now(), 16)) else { panic!("it has no patch") };
+    let mut fixture = Fixture::new(PATIENT);
+    let Err(reason) = fixture.stepper.step(sized_frame(1, fixture.clock.now(), 16)) else { panic!("it has no patch") };
     assert_eq!(reason.hold, Hold::CameraFailed);
     assert!(reason.message.contains("16x16"), "{}", reason.message);
 }
@@ -333,21 +375,21 @@ proptest! {
     fn the_lens_only_ever_gets_a_focal_power(
         answers in prop::collection::vec((prop_oneof![any::<f64>(), -0.5..1.5_f64], any::<bool>()), 1..20)
     ) {
-        let mut bench = Bench::new(PATIENT);
-        bench.stepper.obey(drive("scripted", None));
+        let mut fixture = Fixture::new(PATIENT);
+        fixture.stepper.obey(drive("scripted", None));
         let (mut expected, mut lens_failed) = (0.5, false);
         for (answer, lens_fails) in answers {
-            bench.script.set(Deed::GoTo(answer));
-            bench.lens.fail(lens_fails.then(|| LensError::Stalled("as the test asked".into())));
+            fixture.script.set(Deed::GoTo(answer));
+            fixture.lens.fail(lens_fails.then(|| LensError::Stalled("as the test asked".into())));
             // Longer than the pause before a fresh instance, so that each answer gets its chance.
-            bench.clock.advance(Duration::from_secs(1));
-            let record = bench.step();
+            fixture.clock.advance(Duration::from_secs(1));
+            let record = fixture.step();
             if (0.0..=1.0).contains(&answer) && !lens_fails && !lens_failed {
                 expected = answer;
             }
             lens_failed = lens_fails;
             prop_assert_eq!(record.asked.get().to_bits(), expected.to_bits());
-            prop_assert_eq!(bench.lens.position(), record.asked);
+            prop_assert_eq!(fixture.lens.position(), record.asked);
         }
     }
 }
