@@ -46,7 +46,7 @@ pub(super) fn luma([red, green, blue]: [f32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::block_means;
+    use crate::imaging::{Scale, block_means};
 
     #[test]
     fn weights_are_those_of_rec_709() {
@@ -82,7 +82,7 @@ mod tests {
         rgb_to_gray(&rgb, &mut gray);
         let seen = rgb_view(&rgb, area);
         assert_eq!(seen.patch, rgb_patch(&rgb, area));
-        for (patch, (scale, left, top)) in seen.wider.into_iter().zip([(2, 44, 34), (4, 12, 2)]) {
+        for (patch, (scale, left, top)) in seen.wider.into_iter().zip([(Scale::Two, 44, 34), (Scale::Four, 12, 2)]) {
             assert_eq!(patch.unwrap(), block_means(&gray.data[top * 160 + left..], 160, scale));
         }
     }

@@ -24,6 +24,6 @@ pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
 pub use jpeg::{JpegEncoder, JpegError};
 pub use luma::{rgb_patch, rgb_to_gray, rgb_view};
 pub use reconstruct::Reconstructor;
-pub use reduce::reduced;
+pub use reduce::{fill_block_means, in_blocks, reduced};
 pub use references::{Average, BadReference};
-pub use view::{Square, View, WIDER, block_means, fill_block_means};
+pub use view::{Scale, Square, View, WIDER, block_means};

@@ -1,4 +1,4 @@
-//! Gray pictures, of at most 16384 pixels a side, made smaller by area means.
+//! Gray pictures made smaller: each new pixel is the mean of what it covers.
 
 use std::ops::Range;
 
@@ -11,12 +11,51 @@ use super::frame::GrayImage;
 /// The `image` crate cannot do this for gray levels: it clamps floating-point samples to 0..=1.
 #[must_use]
 pub fn reduced(picture: &GrayImage, width: usize, height: usize) -> GrayImage {
-    let columns = covered(picture.width, width);
-    let lines = covered(picture.height, height);
+    means(picture, &covered(picture.width, width), &covered(picture.height, height))
+}
+
+/// `picture` with the mean of each whole block of `scale` x `scale` pixels as one pixel. What is left
+/// over at the right and below is cut off. A picture smaller than a block stays as it is.
+#[must_use]
+pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
+    let scale = scale.max(1);
+    let width = picture.width / scale;
+    let height = picture.height / scale;
+    if scale == 1 || width == 0 || height == 0 {
+        return picture.clone();
+    }
+
+    means(picture, &covered(width * scale, width), &covered(height * scale, height))
+}
+
+/// Fills `out`, `columns` values a row, with the means of blocks of `SCALE` x `SCALE` pixels of
+/// `levels`, which has `width` pixels a row and begins with the first block.
+///
+/// It does for part of a picture what [`in_blocks`] does for a whole one, and is much faster: each
+/// frame's view is made with it.
+pub fn fill_block_means<const SCALE: usize>(levels: &[f32], width: usize, columns: usize, out: &mut [f32]) {
+    const { assert!(SCALE > 0, "a block has pixels") };
+    let mut sums = vec![0.0f32; columns * SCALE];
+    let share = 1.0 / (SCALE * SCALE) as f32;
+
+    for (row, out) in out.chunks_exact_mut(columns).enumerate() {
+        sums.fill(0.0);
+        for line in levels.chunks(width).skip(row * SCALE).take(SCALE) {
+            sums.iter_mut().zip(line).for_each(|(sum, level)| *sum += level);
+        }
+
+        for (value, block) in out.iter_mut().zip(sums.as_chunks::<SCALE>().0) {
+            *value = share * block.iter().sum::<f32>();
+        }
+    }
+}
+
+/// The picture whose pixels are the means of what `columns` and `lines` cover of `picture`.
+fn means(picture: &GrayImage, columns: &[Cover], lines: &[Cover]) -> GrayImage {
     let mut data = Vec::with_capacity(columns.len() * lines.len());
     let mut sum = vec![0.0; picture.width];
 
-    for line in &lines {
+    for line in lines {
         sum.fill(0.0);
         for (y, weight) in line.pixels() {
             let row = &picture.data[y * picture.width..(y + 1) * picture.width];
@@ -75,6 +114,18 @@ mod tests {
         assert_eq!(reduced(&picture, 4, 2), picture);
         // Never larger.
         assert_eq!(reduced(&picture, 9, 9), picture);
+    }
+
+    #[test]
+    fn whole_blocks_become_their_means_and_the_rest_is_cut_off() {
+        let picture = gray(5, 4, &std::array::from_fn::<f32, 20, _>(|v| v as f32));
+        assert_eq!(in_blocks(&picture, 2), gray(2, 2, &[3.0, 5.0, 13.0, 15.0]));
+        assert_eq!(in_blocks(&picture, 1), picture);
+        assert_eq!(in_blocks(&picture, 6), picture);
+
+        let mut fast = [0.0; 4];
+        fill_block_means::<2>(&picture.data, 5, 2, &mut fast);
+        assert_eq!(gray(2, 2, &fast), in_blocks(&picture, 2));
     }
 
     #[test]

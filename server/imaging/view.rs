@@ -2,9 +2,30 @@
 //! scales.
 
 use super::geometry::{PATCH_SIDE, Patch};
+use super::reduce::fill_block_means;
 
-/// Scales of the wider patches, finest first: pixels along each axis whose mean is one value.
-pub const WIDER: [usize; 2] = [2, 4];
+/// The scale of a wider patch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Each value is the mean of 2x2 pixels.
+    Two,
+    /// Each value is the mean of 4x4 pixels.
+    Four,
+}
+
+/// Scales of the wider patches, finest first.
+pub const WIDER: [Scale; 2] = [Scale::Two, Scale::Four];
+
+impl Scale {
+    /// Pixels along each axis whose mean is one value.
+    #[must_use]
+    pub const fn pixels(self) -> usize {
+        match self {
+            Self::Two => 2,
+            Self::Four => 4,
+        }
+    }
+}
 
 /// The patch of a frame, and wider ones around it.
 ///
@@ -35,8 +56,8 @@ impl Square {
     /// `corner`, moved as little as needed to lie inside a picture of `width` x `height` pixels.
     /// `None` where the picture is smaller than the square.
     #[must_use]
-    pub fn around(corner: (usize, usize), scale: usize, (width, height): (usize, usize)) -> Option<Self> {
-        let side = PATCH_SIDE * scale;
+    pub fn around(corner: (usize, usize), scale: Scale, (width, height): (usize, usize)) -> Option<Self> {
+        let side = PATCH_SIDE * scale.pixels();
         let margin = (side - PATCH_SIDE) / 2;
 
         let first = |corner: usize, length: usize| {
@@ -81,41 +102,16 @@ impl From<Patch> for View {
     }
 }
 
-/// The patch whose values are the means of blocks of `scale` x `scale` pixels of `levels`, which has
-/// `width` pixels a row and begins with the patch's first block.
+/// The patch at `scale`: its values are the means of blocks of `levels`, which has `width` pixels a row
+/// and begins with the patch's first block.
 #[must_use]
-pub fn block_means(levels: &[f32], width: usize, scale: usize) -> Patch {
+pub fn block_means(levels: &[f32], width: usize, scale: Scale) -> Patch {
     let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
-    fill_block_means(levels, width, scale, PATCH_SIDE, &mut patch.0);
-    patch
-}
-
-/// Fills `out`, `columns` values a row, with the means of blocks of `scale` x `scale` pixels of
-/// `levels`, which has `width` pixels a row and begins with the first block.
-///
-/// Scales are those of [`WIDER`]; for another one nothing is filled.
-pub fn fill_block_means(levels: &[f32], width: usize, scale: usize, columns: usize, out: &mut [f32]) {
     match scale {
-        2 => fill_blocks::<2>(levels, width, columns, out),
-        4 => fill_blocks::<4>(levels, width, columns, out),
-        _ => (),
+        Scale::Two => fill_block_means::<2>(levels, width, PATCH_SIDE, &mut patch.0),
+        Scale::Four => fill_block_means::<4>(levels, width, PATCH_SIDE, &mut patch.0),
     }
-}
-
-fn fill_blocks<const SCALE: usize>(levels: &[f32], width: usize, columns: usize, out: &mut [f32]) {
-    let mut sums = vec![0.0f32; columns * SCALE];
-    let share = 1.0 / (SCALE * SCALE) as f32;
-
-    for (row, out) in out.chunks_exact_mut(columns).enumerate() {
-        sums.fill(0.0);
-        for line in levels.chunks(width).skip(row * SCALE).take(SCALE) {
-            sums.iter_mut().zip(line).for_each(|(sum, level)| *sum += level);
-        }
-
-        for (value, block) in out.iter_mut().zip(sums.as_chunks::<SCALE>().0) {
-            *value = share * block.iter().sum::<f32>();
-        }
-    }
+    patch
 }
 
 #[cfg(test)]
@@ -143,9 +139,8 @@ mod tests {
     #[test]
     fn wider_patches_are_means_of_blocks_around_the_same_centre() {
         let seen = view((100, 90), (300, 250));
-        for (scale, left, top) in [(2, 84, 74), (4, 52, 42)] {
-            let index = WIDER.iter().position(|&wider| wider == scale).unwrap();
-            let patch = seen.wider[index].unwrap();
+        for (patch, (scale, left, top)) in seen.wider.into_iter().zip([(2, 84, 74), (4, 52, 42)]) {
+            let patch = patch.unwrap();
             for (i, found) in patch.0.iter().enumerate() {
                 let expected = mean(left + scale * (i % PATCH_SIDE), top + scale * (i / PATCH_SIDE), scale);
                 assert!((found - expected).abs() < 1e-3, "scale {scale}, {i}: {found} {expected}");
@@ -155,11 +150,11 @@ mod tests {
 
     #[test]
     fn wider_patches_keep_inside_the_picture() {
-        assert_eq!(Square::around((3, 200), 4, (300, 240)), Some(Square { x: 0, y: 112, side: 128 }));
+        assert_eq!(Square::around((3, 200), Scale::Four, (300, 240)), Some(Square { x: 0, y: 112, side: 128 }));
         let seen = view((3, 200), (300, 240));
         assert!((seen.wider[1].unwrap().0[0] - mean(0, 112, 4)).abs() < 1e-3);
         // That of the middle scale need not move down, but it must move to the right.
-        assert_eq!(Square::around((3, 200), 2, (300, 240)), Some(Square { x: 0, y: 176, side: 64 }));
+        assert_eq!(Square::around((3, 200), Scale::Two, (300, 240)), Some(Square { x: 0, y: 176, side: 64 }));
         assert!((seen.wider[0].unwrap().0[33] - mean(2, 178, 2)).abs() < 1e-3);
     }
 

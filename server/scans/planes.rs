@@ -235,7 +235,7 @@ fn peak(positions: &[f32], curve: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::block_means;
+    use crate::imaging::{Scale, block_means};
     use crate::simulation::texture::texture;
 
     #[test]
@@ -275,10 +275,10 @@ mod tests {
         let level = |index: usize, i: usize| pictures[index].1.data[i].round();
         let mixed: Vec<f32> = (0..160 * 160).map(|i| 0.5 * (level(0, i) + level(1, i))).collect();
         // The widest patch would begin 28 pixels to the left of the picture.
-        for (patch, (scale, left, top)) in seen.wider.into_iter().zip([(2, 4, 54), (4, 0, 22)]) {
+        for (patch, (scale, left, top)) in seen.wider.into_iter().zip([(Scale::Two, 4, 54), (Scale::Four, 0, 22)]) {
             let expected = block_means(&mixed[top * 160 + left..], 160, scale);
             let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);
-            assert!(pairs.into_iter().all(|(one, other)| (one - other).abs() < 1e-3), "scale {scale}");
+            assert!(pairs.into_iter().all(|(one, other)| (one - other).abs() < 1e-3), "scale {scale:?}");
         }
     }
 

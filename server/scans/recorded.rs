@@ -343,7 +343,7 @@ impl ScanSet for Recorded {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::block_means;
+    use crate::imaging::{Scale, block_means};
     use crate::simulation::texture::texture;
 
     /// One pose at focal powers 0, 0.5 and 1 whose patches are even: 0, 100 and 200.
@@ -380,7 +380,7 @@ mod tests {
 
         let expected = [1, 2].map(|seed| {
             let data = &picture(seed).data;
-            [block_means(&data[32 * 128 + 32..], 128, 2), block_means(data, 128, 4)]
+            [block_means(&data[32 * 128 + 32..], 128, Scale::Two), block_means(data, 128, Scale::Four)]
         });
         for (power, between, share) in [(0.3, Between::Nearest, 0.0), (0.25, Between::Interpolated, 0.25)] {
             let seen = scan.see(0, FocalPower::nearest(power), between);

@@ -229,7 +229,7 @@ impl Scan {
         let pattern = (0..pixels).map(|_| settings.pattern as f32 * cheap_normal(&mut noise)).collect();
         let mut wider_noise = ChaCha8Rng::seed_from_u64(seed ^ 0x7769_6465_7221);
         let wider_pattern = WIDER.map(|scale| {
-            let strength = settings.pattern as f32 / scale as f32;
+            let strength = settings.pattern as f32 / scale.pixels() as f32;
             (0..pixels).map(|_| strength * cheap_normal(&mut wider_noise)).collect()
         });
 
@@ -352,7 +352,7 @@ impl Scan {
         expose(patch, gain, (detail * self.contrast) as f32, offset);
 
         if self.settings.noise > 0.0 {
-            let noise = self.settings.noise as f32 / WIDER[index] as f32;
+            let noise = self.settings.noise as f32 / WIDER[index].pixels() as f32;
             for value in &mut patch.0 {
                 *value += noise * cheap_normal(&mut self.wider_noise);
             }
@@ -595,7 +595,7 @@ mod tests {
                 let expected = block_means(&blurred.data[square.y * 256 + square.x..], 256, scale);
                 let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);
                 let off = pairs.map(|(one, other)| (one - other).powi(2)).sum::<f32>() / expected.0.len() as f32;
-                assert!(off.sqrt() < 0.5, "sigma {sigma}, scale {scale}: {}", off.sqrt());
+                assert!(off.sqrt() < 0.5, "sigma {sigma}, scale {scale:?}: {}", off.sqrt());
             }
         }
     }

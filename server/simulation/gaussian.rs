@@ -24,6 +24,30 @@ pub fn kernel(sigma: f64, reach: usize) -> Vec<f64> {
     both.into_iter().map(|sample| sample / sum).collect()
 }
 
+/// The discrete Gaussian (Lindeberg 1990) of standard deviation `sigma`, up to `reach` pixels either
+/// way: `exp(-t) I_n(t)` with t = `sigma` squared. `sigma` must be below 1, where samples of a Gaussian
+/// as in [`kernel`] would have less than its variance.
+#[must_use]
+pub fn discrete_kernel(sigma: f64, reach: usize) -> Vec<f64> {
+    let half = 0.5 * sigma * sigma;
+
+    // The series of the modified Bessel function; its terms shrink by a factor of more than 4.
+    let bessel = |order: i32| -> f64 {
+        let mut term = (1..=order).fold(1.0, |term, factor| term * half / f64::from(factor));
+        let mut sum = term;
+        for index in 1..12 {
+            term *= half * half / f64::from(index * (index + order));
+            sum += term;
+        }
+        sum
+    };
+
+    let reach = reach as i32;
+    let weights: Vec<f64> = (-reach..=reach).map(|tap| bessel(tap.abs())).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| weight / sum).collect()
+}
+
 /// `values` smoothed by a Gaussian of `sigma` places, cut at four of them. Beyond both ends the values
 /// are mirrored.
 #[must_use]
@@ -55,6 +79,16 @@ mod tests {
             // One and two standard deviations from the middle: exp(-1/2) and exp(-2).
             assert!((kernel[4] / kernel[0] - 0.606_530_660).abs() < 1e-9);
             assert!((kernel[8] / kernel[0] - 0.135_335_283).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_discrete_kernel_has_its_variance() {
+        for sigma in [0.05, 0.2, 0.5, 0.8, 0.99] {
+            let kernel = discrete_kernel(sigma, 4);
+            let variance: f64 =
+                kernel.iter().zip(-4..=4).map(|(weight, tap): (_, i32)| weight * f64::from(tap * tap)).sum();
+            assert!((variance / (sigma * sigma) - 1.0).abs() < 0.02, "{sigma}: {variance}");
         }
     }
 

@@ -1,8 +1,7 @@
 //! Pictures from mosaics, against closed forms.
 
 use super::*;
-use crate::imaging::Reference;
-use crate::imaging::block_means;
+use crate::imaging::{Reference, Scale, block_means};
 
 fn mosaic(width: usize, height: usize, sample: impl Fn(usize, usize) -> u16) -> MosaicFrame {
     let samples = (0..width * height).map(|i| sample(i % width, i / width)).collect();
@@ -164,10 +163,10 @@ fn wider_patches_are_means_of_the_gray_picture() {
         assert_eq!(view.patch, reconstructor.gray_patch(&seen, area));
 
         // The widest patch would begin 8 cells above the picture.
-        for (patch, (scale, left, top)) in view.wider.into_iter().zip([(2, 54, 24), (4, 22, 0)]) {
+        for (patch, (scale, left, top)) in view.wider.into_iter().zip([(Scale::Two, 54, 24), (Scale::Four, 22, 0)]) {
             let expected = block_means(&gray.data[top * 160 + left..], 160, scale);
             let pairs = patch.as_ref().unwrap().0.iter().zip(&expected.0);
-            assert!(pairs.into_iter().all(|(one, other)| (one - other).abs() < 0.02), "scale {scale}");
+            assert!(pairs.into_iter().all(|(one, other)| (one - other).abs() < 0.02), "scale {scale:?}");
         }
     }
 }

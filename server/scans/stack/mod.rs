@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use crate::camera::footage::{self, pictures_in};
-use crate::imaging::{Calibration, DecodeError, GrayImage, Reconstructor, decode, reduced};
+use crate::imaging::{Calibration, DecodeError, GrayImage, Reconstructor, decode, in_blocks};
 
 /// Least number of pictures in which a peak and an order can be recognised.
 pub const LEAST_PLANES: usize = 5;
@@ -209,21 +209,6 @@ impl FocalStack {
     }
 }
 
-/// Means of whole blocks of `scale` x `scale` pixels; what is left over at the right and below is cut off.
-#[must_use]
-pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
-    let scale = scale.max(1);
-    let width = picture.width / scale;
-    let height = picture.height / scale;
-    if scale == 1 || width == 0 || height == 0 {
-        return picture.clone();
-    }
-
-    let rows = picture.data.chunks_exact(picture.width).take(height * scale);
-    let data = rows.flat_map(|row| row[..width * scale].iter().copied()).collect();
-    reduced(&GrayImage { width: width * scale, height: height * scale, data }, width, height)
-}
-
 fn mixed(low: &Plane, high: &Plane, part: f64) -> Plane {
     let levels = low.picture.data.iter().zip(&high.picture.data);
     let data = levels.map(|(low, high)| low + part as f32 * (high - low)).collect();
@@ -388,12 +373,5 @@ mod tests {
         assert!(told([five(), vec![plane(2.0, 0.0)]].concat()).contains("both at position 2"));
         let other = Plane { picture: GrayImage { width: 1, height: 4, data: vec![0.0; 4] }, ..plane(9.0, 0.0) };
         assert!(told([five(), vec![other]].concat()).contains("9.png is 1x4 pixels, but 4.png is 2x2"));
-    }
-
-    #[test]
-    fn blocks_become_their_means() {
-        let picture = GrayImage { width: 5, height: 4, data: (0..20).map(|v| v as f32).collect() };
-        let small = in_blocks(&picture, 2);
-        assert_eq!((small.width, small.height, small.data), (2, 2, vec![3.0, 5.0, 13.0, 15.0]));
     }
 }

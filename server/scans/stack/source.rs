@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::check::check;
 use super::optics::Optics;
-use super::{FocalStack, Plane, StackError, in_blocks};
+use super::{FocalStack, Plane, StackError};
 use crate::autofocus::BlurRate;
-use crate::imaging::GrayImage;
+use crate::imaging::{GrayImage, in_blocks};
 use crate::scans::planes::{PlaneStack, PlanesError};
 
 /// The two scales, by the width in pixels that a stack's pictures are brought near to. It is unknown
