@@ -111,31 +111,14 @@ fn video(path: &Path) -> Result<Vec<Arc<GrayImage>>, FootageError> {
     Ok(frames)
 }
 
-/// The binary PGM pictures that follow one another in `bytes`, up to the first that is not whole.
-fn pictures(mut bytes: &[u8]) -> impl Iterator<Item = GrayImage> + '_ {
+/// The pictures that follow one another in `stream`, up to the first that is not whole.
+fn pictures(mut stream: &[u8]) -> impl Iterator<Item = GrayImage> + '_ {
     std::iter::from_fn(move || {
-        let (picture, rest) = picture(bytes)?;
-        bytes = rest;
-        Some(picture)
+        let picture = footage::next_pnm(&mut stream).ok().flatten()?.into_luma8();
+        let (width, height) = picture.dimensions();
+        let data = picture.into_raw().into_iter().map(f32::from).collect();
+        Some(GrayImage { width: width as usize, height: height as usize, data })
     })
-}
-
-/// One PGM: `P5 WIDTH HEIGHT 255`, one white space, then a byte a pixel.
-fn picture(bytes: &[u8]) -> Option<(GrayImage, &[u8])> {
-    let mut rest = bytes.strip_prefix(b"P5")?;
-    let mut header = [0usize; 3];
-
-    for number in &mut header {
-        rest = rest.trim_ascii_start();
-        let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
-        *number = std::str::from_utf8(&rest[..digits]).ok()?.parse().ok()?;
-        rest = &rest[digits..];
-    }
-
-    let [width, height, _] = header;
-    let pixels = rest.get(1..1 + width.checked_mul(height)?)?;
-    let data = pixels.iter().map(|&byte| f32::from(byte)).collect();
-    Some((GrayImage { width, height, data }, &rest[1 + width * height..]))
 }
 
 /// A clip of these pictures, within the content area of the first where it has one.

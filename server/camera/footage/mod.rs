@@ -5,10 +5,12 @@
 
 mod clip;
 mod defocus;
+mod pnm;
 mod reel;
 mod size;
 mod video;
 
+pub use pnm::{PnmError, next_pnm};
 pub use reel::picture_reader;
 pub(crate) use reel::{is_picture, pictures_in};
 pub use video::{FootageError, Video, ffmpeg};

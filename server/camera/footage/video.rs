@@ -1,14 +1,12 @@
 //! Videos, decoded by the `ffmpeg` program.
 
 use std::ffi::OsString;
-use std::io::{BufRead, BufReader, Read};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
+use super::pnm::next_pnm;
 use crate::imaging::RgbImage;
-
-/// Bytes beyond which a picture is implausible, and the stream damaged.
-const MOST_BYTES: usize = 1 << 28;
 
 /// Why footage cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -85,7 +83,9 @@ impl Iterator for Video {
     type Item = RgbImage;
 
     fn next(&mut self) -> Option<RgbImage> {
-        ppm(&mut self.pictures).ok().flatten()
+        let picture = next_pnm(&mut self.pictures).ok().flatten()?.into_rgb8();
+        let (width, height) = picture.dimensions();
+        RgbImage::new(width as usize, height as usize, picture.into_raw()).ok()
     }
 }
 
@@ -121,64 +121,4 @@ pub fn ffmpeg(path: &Path) -> Command {
     let mut command = Command::new("ffmpeg");
     command.args(["-v", "error", "-nostdin", "-i"]).arg(name).stdin(Stdio::null());
     command
-}
-
-/// Reads a binary PPM picture: `P6`, width, height and 255 between white space, then three bytes a pixel.
-/// `None` at the stream's end.
-fn ppm(stream: &mut impl BufRead) -> std::io::Result<Option<RgbImage>> {
-    let damaged = || std::io::Error::from(std::io::ErrorKind::InvalidData);
-    let mut magic = Vec::new();
-    if stream.take(3).read_to_end(&mut magic)? == 0 {
-        return Ok(None);
-    }
-
-    let mut numbers = [0_usize; 3];
-    for number in &mut numbers {
-        *number = decimal(stream)?;
-    }
-    let [width, height, depth] = numbers;
-
-    let bytes = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(3)).filter(|size| *size <= MOST_BYTES);
-    let bytes = bytes.filter(|_| magic == b"P6\n" && depth == 255).ok_or_else(damaged)?;
-
-    let mut data = vec![0; bytes];
-    stream.read_exact(&mut data)?;
-
-    RgbImage::new(width, height, data).map(Some).map_err(|_| damaged())
-}
-
-/// A decimal number and the one white space after it.
-fn decimal(stream: &mut impl BufRead) -> std::io::Result<usize> {
-    let mut number = 0_usize;
-    loop {
-        let mut byte = [0];
-        stream.read_exact(&mut byte)?;
-        match byte[0] {
-            digit @ b'0'..=b'9' => number = number.saturating_mul(10).saturating_add(usize::from(digit - b'0')),
-            space if space.is_ascii_whitespace() => return Ok(number),
-            _ => return Err(std::io::ErrorKind::InvalidData.into()),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pictures_are_read_one_after_another() {
-        let mut stream: &[u8] = b"P6\n2 1\n255\n\x01\x02\x03\x04\x05\x06P6\n1 1\n255\n\x07\x08\x09";
-        assert_eq!(ppm(&mut stream).unwrap().unwrap(), RgbImage::new(2, 1, vec![1, 2, 3, 4, 5, 6]).unwrap());
-        assert_eq!(ppm(&mut stream).unwrap().unwrap(), RgbImage::new(1, 1, vec![7, 8, 9]).unwrap());
-        assert!(ppm(&mut stream).unwrap().is_none());
-    }
-
-    #[test]
-    fn damaged_streams_are_errors() {
-        for mut stream in
-            [&b"P6\n2 1\n255\n\x01\x02"[..], b"P5\n1 1\n255\n\x01", b"P6\n9999999 9999999\n255\n", b"P6\nx"]
-        {
-            assert!(ppm(&mut stream).is_err());
-        }
-    }
 }

@@ -1,0 +1,65 @@
+//! The pictures that ffmpeg writes to a pipe, one after another, as PNM.
+
+use std::io::BufRead;
+
+use image::codecs::pnm::PnmDecoder;
+use image::{DynamicImage, ImageDecoder, ImageError};
+
+/// Bytes beyond which a picture is implausible, and the stream damaged.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// Why a stream holds no further picture though it goes on.
+#[derive(Debug, thiserror::Error)]
+pub enum PnmError {
+    /// The stream broke off or failed.
+    #[error(transparent)]
+    Stream(#[from] std::io::Error),
+    /// What follows is not a PNM picture, or not a whole one.
+    #[error(transparent)]
+    Damaged(#[from] ImageError),
+    /// The picture claims to be larger than any that ffmpeg was asked for.
+    #[error("a picture of {0} bytes is too large")]
+    TooLarge(u64),
+}
+
+/// The next picture of `stream`, which is left right after it; `None` at the stream's end.
+///
+/// # Errors
+/// When the stream fails, or what follows is not a whole picture.
+pub fn next_pnm(stream: &mut impl BufRead) -> Result<Option<DynamicImage>, PnmError> {
+    if stream.fill_buf()?.is_empty() {
+        return Ok(None);
+    }
+
+    let decoder = PnmDecoder::new(stream)?;
+    let bytes = decoder.total_bytes();
+    if bytes > MOST_BYTES {
+        return Err(PnmError::TooLarge(bytes));
+    }
+
+    Ok(Some(DynamicImage::from_decoder(decoder)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_read_one_after_another() {
+        let mut stream: &[u8] = b"P6\n2 1\n255\n\x01\x02\x03\x04\x05\x06P5 1 2 255 \x07\x08";
+        let mut next = || next_pnm(&mut stream).unwrap();
+
+        let colour = next().unwrap().into_rgb8();
+        assert_eq!((colour.dimensions(), colour.into_raw()), ((2, 1), vec![1, 2, 3, 4, 5, 6]));
+        let gray = next().unwrap().into_luma8();
+        assert_eq!((gray.dimensions(), gray.into_raw()), ((1, 2), vec![7, 8]));
+        assert!(next().is_none());
+    }
+
+    #[test]
+    fn damaged_streams_are_errors() {
+        for mut stream in [&b"P6\n2 1\n255\n\x01\x02"[..], b"P6\n9999999 9999999\n255\n", b"P6\nx", b"P", b"text"] {
+            assert!(next_pnm(&mut stream).is_err());
+        }
+    }
+}
