@@ -189,9 +189,10 @@ mod tests {
     #[test]
     fn the_belief_tracker_gives_what_pytorch_gives() {
         let store = nn::VarStore::new(Device::Cpu);
-        let network = BeliefNetwork::new(&store.root(), NEAR_INPUT);
+        let network = BeliefNetwork::new(&store.root(), BELIEF_INPUT);
         fill(&store);
-        let inputs = wave(2 * 5 * NEAR_INPUT, 0.29, 1.0, 0.0).view([2, 5, NEAR_INPUT as i64]);
+
+        let inputs = wave(2 * 5 * BELIEF_INPUT, 0.29, 1.0, 0.0).view([2, 5, BELIEF_INPUT as i64]);
         let (logits, _) = network.forward(&inputs, &network.blank(2, Device::Cpu));
         let found = logits.select(1, 4).contiguous().view([-1]);
         assert!(found.allclose(&from_pytorch("belief_logits"), 1e-4, 1e-5, false));

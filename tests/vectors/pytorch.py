@@ -1,10 +1,13 @@
-"""Makes the vectors that the networks are tested against: run `python3 tests/vectors/pytorch.py` with PyTorch 2.11 installed.
+"""Makes the vectors that the networks are tested against.
 
-The networks are built here from the paper's description and from docs alone. Weights and inputs are sines, so that the
-tests can make the same ones and only outputs need be stored.
+Run `python3 tests/vectors/pytorch.py` with PyTorch 2.11 installed.
 
-Imported, it only defines the networks that the shipped weights fit: `CnnLearned` (cnn-learned), `MetricLearned` (mgm-learned and
-mlr-learned) and `Belief` (parfocal). The paper's three take focal powers f in 0..1 as 2 (f - 0.5); `scaled_focal_powers` does that.
+The networks are built here from the paper's description and from docs alone. Weights and inputs are sines, so
+that the tests can make the same ones and only outputs need be stored.
+
+Imported, it only defines the networks that the shipped weights fit: `CnnLearned` (cnn-learned), `MetricLearned`
+(mgm-learned and mlr-learned) and `Belief` (parfocal). The paper's three take focal powers f in 0..1 as
+2 (f - 0.5); `scaled_focal_powers` does that.
 """
 
 import json
@@ -78,9 +81,8 @@ class MetricLearned(nn.Module):
 
 
 class Belief(nn.Module):
-    """Inputs `[N, T, inputs]`, as `server/autofocus/belief.rs` makes them of frames, to logits `[N, T, 41]` of the optimum's bins.
-
-    The weights that ship take 175 inputs. Earlier ones took the first 87 of them, and so do the vectors.
+    """Inputs `[N, T, 175]`, as `server/autofocus/belief.rs` makes them of frames, to logits `[N, T, 41]` of the
+    optimum's bins. Older weights took the first 87 inputs alone.
     """
 
     def __init__(self, inputs, units, bins):
@@ -113,7 +115,7 @@ def main():
     fill(cnn)
     patches = wave(8 * 1024, 0.113, 100.0, 128.0).view(8, 1024)
     values = cnn(patches, wave(8, 0.7, 1.0))
-    inputs, units, bins = 87, 192, 41
+    inputs, units, bins = 175, 192, 41
     belief = Belief(inputs, units, bins)
     fill(belief)
     logits = belief(wave(2 * 5 * inputs, 0.29, 1.0).view(2, 5, inputs))
