@@ -1,5 +1,6 @@
 //! The model card: what users of trained weights should know about them, as Markdown.
 
+use crate::autofocus::shipped::{Design, design};
 use crate::evaluation::Row;
 use crate::scans::benchmark::SEED;
 
@@ -19,11 +20,18 @@ pub(super) struct Made<'a> {
 pub(super) fn validated(made: &Made<'_>, row: &Row, count: usize) -> String {
     let origin = made.origin.map_or("random weights".to_owned(), |file| format!("the weights {file}"));
 
+    let input = match design(made.policy) {
+        Some(Design::Belief) => {
+            "32x32 gray patches (0..255), two wider patches around each (32x32 means of 2x2 and of 4x4 pixels), and \
+             focal powers (0..1)"
+        }
+        Some(Design::Values(_)) | None => "32x32 gray patches (0..255) and focal powers (0..1)",
+    };
+
     format!(
         "# {}\n\nTrained by `parfocal train` {}, seed {}, {} updates, recipe in `recipe.toml`, \
          beginning with {origin}, on {}.\n\n\
-         Input: 32x32 gray patches (0..255) and focal powers (0..1). Weights: safetensors, float32, PyTorch's names \
-         and layouts. Not a medical device.\n\n\
+         Input: {input}. Weights: safetensors, float32, PyTorch's names and layouts. Not a medical device.\n\n\
          On {count} validation scans, half of them varied: {}.\n",
         made.policy,
         env!("CARGO_PKG_VERSION"),
