@@ -8,7 +8,7 @@ use parfocal::store::NewSession;
 use parfocal::trial::action::Action;
 use parfocal::trial::role::Role;
 
-use crate::bench::Bench;
+use crate::fixture::Trial;
 
 /// A folder with the paper's trial in balanced order.
 fn balanced(folder: &Path) {
@@ -17,15 +17,15 @@ fn balanced(folder: &Path) {
     std::fs::write(folder.join("balanced.toml"), text).unwrap();
 }
 
-async fn made(bench: &Bench, session: SessionId) -> NewSession {
-    bench.store.reader().session(session).await.unwrap().unwrap().made
+async fn made(trial: &Trial, session: SessionId) -> NewSession {
+    trial.store.reader().session(session).await.unwrap().unwrap().made
 }
 
-async fn session_that_is_left(bench: &Bench) -> NewSession {
-    let session = bench.begin("balanced").await;
-    let made = made(bench, session).await;
+async fn session_that_is_left(trial: &Trial) -> NewSession {
+    let session = trial.begin("balanced").await;
+    let made = made(trial, session).await;
     let abort = Action::Abort { reason: "to make room".to_owned() };
-    bench.conductor.act(Role::Operator, session, abort).await.unwrap();
+    trial.conductor.act(Role::Operator, session, abort).await.unwrap();
     made
 }
 
@@ -33,11 +33,11 @@ async fn session_that_is_left(bench: &Bench) -> NewSession {
 async fn six_sessions_are_a_balanced_set_and_the_seventh_begins_another() {
     let folder = tempfile::tempdir().unwrap();
     balanced(folder.path());
-    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
+    let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;
     let mut sessions = Vec::new();
     for _ in 0..7 {
-        let session = bench.whole_session("balanced").await;
-        sessions.push(made(&bench, session).await);
+        let session = trial.whole_session("balanced").await;
+        sessions.push(made(&trial, session).await);
     }
     let (set, next) = sessions.split_at(6);
     assert!(set.iter().all(|session| session.seed == set[0].seed));
@@ -57,9 +57,9 @@ async fn six_sessions_are_a_balanced_set_and_the_seventh_begins_another() {
 async fn an_aborted_session_gives_its_place_back() {
     let folder = tempfile::tempdir().unwrap();
     balanced(folder.path());
-    let bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
-    let first = session_that_is_left(&bench).await;
-    let second = session_that_is_left(&bench).await;
+    let trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;
+    let first = session_that_is_left(&trial).await;
+    let second = session_that_is_left(&trial).await;
     assert!(second.seed == first.seed && second.set_index == 0);
     assert_ne!(first.commitment, second.commitment);
 }
@@ -68,28 +68,28 @@ async fn an_aborted_session_gives_its_place_back() {
 async fn unblinding_closes_the_set_and_its_seed_is_told_when_all_of_it_are_unblinded() {
     let folder = tempfile::tempdir().unwrap();
     balanced(folder.path());
-    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
-    let first = bench.whole_session("balanced").await;
-    let second = bench.whole_session("balanced").await;
-    bench.unblind(first).await;
-    let seed = made(&bench, first).await.seed;
-    assert!(!bench.store.reader().balanced_set(seed).await.unwrap().may_tell_seed());
-    let third = bench.whole_session("balanced").await;
-    assert!(made(&bench, third).await.seed != seed, "the order of the first tells those of its set apart");
-    bench.unblind(second).await;
-    assert!(bench.store.reader().balanced_set(seed).await.unwrap().may_tell_seed());
+    let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;
+    let first = trial.whole_session("balanced").await;
+    let second = trial.whole_session("balanced").await;
+    trial.unblind(first).await;
+    let seed = made(&trial, first).await.seed;
+    assert!(!trial.store.reader().balanced_set(seed).await.unwrap().may_tell_seed());
+    let third = trial.whole_session("balanced").await;
+    assert!(made(&trial, third).await.seed != seed, "the order of the first tells those of its set apart");
+    trial.unblind(second).await;
+    assert!(trial.store.reader().balanced_set(seed).await.unwrap().may_tell_seed());
 }
 
 #[tokio::test]
 async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
     let folder = tempfile::tempdir().unwrap();
     balanced(folder.path());
-    let bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
-    let left = session_that_is_left(&bench).await.session;
+    let trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;
+    let left = session_that_is_left(&trial).await.session;
     // In the place that was given back, and so by the same order.
-    let second = bench.begin("balanced").await;
+    let second = trial.begin("balanced").await;
     let unblind = || {
-        bench.conductor.act(
+        trial.conductor.act(
             Role::Researcher,
             left,
             Action::Unblind { reason: "to see".to_owned(), despite_outstanding: true },
@@ -97,7 +97,7 @@ async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
     };
     let refused = unblind().await.unwrap_err();
     assert!(refused.to_string().contains("same balanced set"), "{refused}");
-    bench.conductor.act(Role::Operator, second, Action::Abort { reason: "over".to_owned() }).await.unwrap();
+    trial.conductor.act(Role::Operator, second, Action::Abort { reason: "over".to_owned() }).await.unwrap();
     unblind().await.unwrap();
 }
 
@@ -105,30 +105,30 @@ async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
 async fn an_aborted_session_does_not_unblind_the_one_in_its_place() {
     let folder = tempfile::tempdir().unwrap();
     balanced(folder.path());
-    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 3).await;
-    let left = session_that_is_left(&bench).await.session;
-    let second = bench.whole_session("balanced").await;
-    let (one, other) = (made(&bench, left).await, made(&bench, second).await);
+    let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;
+    let left = session_that_is_left(&trial).await.session;
+    let second = trial.whole_session("balanced").await;
+    let (one, other) = (made(&trial, left).await, made(&trial, second).await);
     assert!(one.segments.iter().zip(&other.segments).all(|(one, other)| one.1 == other.1), "both have the same order");
-    let refused = bench
+    let refused = trial
         .conductor
         .act(Role::Researcher, left, Action::Unblind { reason: "to see".to_owned(), despite_outstanding: true })
         .await
         .unwrap_err();
     assert!(refused.to_string().contains("unblind that one first"), "{refused}");
-    bench.unblind(second).await;
-    bench.unblind(left).await;
+    trial.unblind(second).await;
+    trial.unblind(left).await;
 }
 
 #[tokio::test]
 async fn a_fixed_seed_makes_other_practice_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Bench::start(folder.path()).await;
-    let first = bench.begin("practice").await;
-    bench.conductor.act(Role::Operator, first, Action::Abort { reason: "restart".to_owned() }).await.unwrap();
-    drop(bench);
-    let bench = Bench::start(folder.path()).await;
-    let second = bench.begin("practice").await;
+    let trial = Trial::start(folder.path()).await;
+    let first = trial.begin("practice").await;
+    trial.conductor.act(Role::Operator, first, Action::Abort { reason: "restart".to_owned() }).await.unwrap();
+    drop(trial);
+    let trial = Trial::start(folder.path()).await;
+    let second = trial.begin("practice").await;
     assert_ne!(first, second);
-    assert!(made(&bench, first).await.seed != made(&bench, second).await.seed);
+    assert!(made(&trial, first).await.seed != made(&trial, second).await.seed);
 }

@@ -17,26 +17,26 @@ use parfocal::trial::role::Role;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use crate::bench::Bench;
+use crate::fixture::Trial;
 use crate::storage::step;
 
 /// A server with one whole session with telemetry.
-pub async fn with_session(folder: &Path) -> (Bench, SessionId) {
-    let mut bench = Bench::start(folder).await;
-    let session = bench.begin("paper").await;
+pub async fn with_session(folder: &Path) -> (Trial, SessionId) {
+    let mut trial = Trial::start(folder).await;
+    let session = trial.begin("paper").await;
     let (sender, receiver) = tokio::sync::mpsc::channel(1024);
-    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
     for setting in 0..6 {
-        let segment = bench.whole_setting().await;
+        let segment = trial.whole_setting().await;
         for frame in 1..=10 {
             sender.send(step(setting * 10 + frame, Some(segment))).await.unwrap();
         }
     }
     drop(sender);
     writer.await.unwrap();
-    bench.answer_all().await;
-    bench.surgeon(Action::FinishQuestions { segment: None }).await;
-    (bench, session)
+    trial.answer_all().await;
+    trial.surgeon(Action::FinishQuestions { segment: None }).await;
+    (trial, session)
 }
 
 pub fn rows(folder: &Path, table: &str) -> Vec<BTreeMap<String, String>> {
@@ -59,9 +59,9 @@ pub fn failed(checks: &[Check]) -> Vec<&str> {
 #[tokio::test]
 async fn a_blinded_export_holds_everything_but_the_policies() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
+    let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    let summary = export(bench.store.reader(), session, &out, false).await.unwrap();
+    let summary = export(trial.store.reader(), session, &out, false).await.unwrap();
     assert_eq!(files(&out), summary.files.iter().cloned().collect());
 
     let comments = rows(&out, "comments");
@@ -93,11 +93,11 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
 #[tokio::test]
 async fn a_blinded_export_tells_no_hold_for_the_policys_sake() {
     let data = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(data.path()).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.whole_setting().await;
+    let mut trial = Trial::start(data.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.whole_setting().await;
     let (sender, receiver) = tokio::sync::mpsc::channel(16);
-    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
     let holds = [
         None,
         Some(Hold::PolicySlow),
@@ -114,7 +114,7 @@ async fn a_blinded_export_tells_no_hold_for_the_policys_sake() {
     drop(sender);
     writer.await.unwrap();
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     let held: Vec<_> = rows(&out, "telemetry").iter().map(|row| row["held"] == "true").collect();
     assert_eq!(held, [false, false, false, false, false, true, true, true]);
 }
@@ -122,10 +122,10 @@ async fn a_blinded_export_tells_no_hold_for_the_policys_sake() {
 #[tokio::test]
 async fn every_file_has_its_checksum_and_every_column_its_description() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
-    bench.unblind(session).await;
+    let (trial, session) = with_session(data.path()).await;
+    trial.unblind(session).await;
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, true).await.unwrap();
+    export(trial.store.reader(), session, &out, true).await.unwrap();
 
     let sums = std::fs::read_to_string(out.join("SHA256SUMS")).unwrap();
     let listed: BTreeMap<&str, &str> =
@@ -154,15 +154,15 @@ async fn every_file_has_its_checksum_and_every_column_its_description() {
 #[tokio::test]
 async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
-    let refused = export(bench.store.reader(), session, &data.path().join("early"), true).await.unwrap_err();
+    let (trial, session) = with_session(data.path()).await;
+    let refused = export(trial.store.reader(), session, &data.path().join("early"), true).await.unwrap_err();
     assert!(matches!(refused, ExportError::StillBlinded(_)), "{refused}");
     assert!(!data.path().join("early").exists());
 
-    bench.unblind(session).await;
+    trial.unblind(session).await;
     let (blinded, unblinded) = (data.path().join("blinded"), data.path().join("unblinded"));
-    export(bench.store.reader(), session, &blinded, false).await.unwrap();
-    export(bench.store.reader(), session, &unblinded, true).await.unwrap();
+    export(trial.store.reader(), session, &blinded, false).await.unwrap();
+    export(trial.store.reader(), session, &unblinded, true).await.unwrap();
     let more: Vec<String> = files(&unblinded).difference(&files(&blinded)).cloned().collect();
     assert_eq!(more, ["allocation.csv", "allocation.json", "policy_steps.csv", "weights.csv"]);
     for file in files(&blinded).iter().filter(|file| !matches!(file.as_str(), "SHA256SUMS" | "datapackage.json")) {
@@ -185,7 +185,7 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
 #[tokio::test]
 async fn an_export_never_overwrites_and_a_session_that_is_not_there_is_named() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
+    let (trial, session) = with_session(data.path()).await;
     // As the command does it while the server runs.
     let reader = Reader::open(data.path()).await.unwrap();
     let out = data.path().join("a/new/export");
@@ -196,18 +196,18 @@ async fn an_export_never_overwrites_and_a_session_that_is_not_there_is_named() {
     let nobody = "00000000-0000-4000-8000-000000000000".parse().unwrap();
     let unknown = export(&reader, nobody, &data.path().join("x"), false).await.unwrap_err().to_string();
     assert!(unknown.contains(&session.to_string()), "{unknown}");
-    drop(bench);
+    drop(trial);
 }
 
 #[tokio::test]
 async fn an_export_of_a_session_under_way_is_of_one_moment() {
     let data = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(data.path()).await;
-    let session = bench.begin("paper").await;
-    bench.whole_setting().await;
+    let mut trial = Trial::start(data.path()).await;
+    let session = trial.begin("paper").await;
+    trial.whole_setting().await;
     let snapshot = Reader::open(data.path()).await.unwrap().snapshot().await.unwrap();
-    bench.say("said while it is being exported").await;
-    bench.whole_setting().await;
+    trial.say("said while it is being exported").await;
+    trial.whole_setting().await;
     let now = Reader::open(data.path()).await.unwrap();
     assert_eq!(snapshot.comments(session).await.unwrap().len(), 1);
     assert_eq!(now.comments(session).await.unwrap().len(), 3);
@@ -222,11 +222,11 @@ async fn an_export_of_a_session_under_way_is_of_one_moment() {
 #[tokio::test]
 async fn the_pages_zip_is_the_commands_folder() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
+    let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     let (zip, bytes) = ZipStream::new(format!("parfocal-{session}"));
-    let prepared = Export::prepare(bench.conductor.reader(), session, false).await.unwrap();
+    let prepared = Export::prepare(trial.conductor.reader(), session, false).await.unwrap();
     let (written, bytes) = tokio::join!(prepared.into_zip(zip), bytes.try_collect::<Vec<_>>());
     written.unwrap();
     let archive = bytes.unwrap().concat();
@@ -242,14 +242,14 @@ async fn the_pages_zip_is_the_commands_folder() {
 #[tokio::test]
 async fn no_text_of_an_export_runs_as_a_formula_and_none_is_lost() {
     let data = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(data.path()).await;
-    let session = bench.begin("paper").await;
+    let mut trial = Trial::start(data.path()).await;
+    let session = trial.begin("paper").await;
     let said = ["=1+1", "-3 dioptres too far", "@once", "\t=tab", "'=quoted", "sharp = good", "'quoted'"];
     for text in said {
-        bench.say(text).await;
+        trial.say(text).await;
     }
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
 
     let cells: Vec<_> = rows(&out, "comments").into_iter().map(|row| row["text"].clone()).collect();
     let expected = ["'=1+1", "'-3 dioptres too far", "'@once", "'\t=tab", "''=quoted", "sharp = good", "'quoted'"];
@@ -271,13 +271,13 @@ async fn no_text_of_an_export_runs_as_a_formula_and_none_is_lost() {
 #[tokio::test]
 async fn an_emergency_unblinding_is_flagged_in_the_export() {
     let data = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(data.path()).await;
-    let session = bench.begin("paper").await;
-    bench.whole_setting().await;
-    bench.unblind(session).await;
-    bench.conductor.act(Role::Operator, session, Action::Abort { reason: "adverse event".to_owned() }).await.unwrap();
+    let mut trial = Trial::start(data.path()).await;
+    let session = trial.begin("paper").await;
+    trial.whole_setting().await;
+    trial.unblind(session).await;
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "adverse event".to_owned() }).await.unwrap();
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     let row = &rows(&out, "sessions")[0];
     assert_eq!((row["unblinded"].as_str(), row["status"].as_str()), ("while-under-way", "aborted"));
     assert_eq!(json(&out, "datapackage.json")["parfocal"]["unblinded"], "while-under-way");
@@ -286,24 +286,24 @@ async fn an_emergency_unblinding_is_flagged_in_the_export() {
 #[tokio::test]
 async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
     let data = tempfile::tempdir().unwrap();
-    let bench = Bench::start(data.path()).await;
+    let trial = Trial::start(data.path()).await;
     let befalls = async |working: bool, message: &str| {
-        bench.clock.advance(Duration::from_secs(2));
-        let (wall, at, device) = (bench.clock.wall(), bench.clock.now(), "lens".to_owned());
+        trial.clock.advance(Duration::from_secs(2));
+        let (wall, at, device) = (trial.clock.wall(), trial.clock.now(), "lens".to_owned());
         let event = DeviceEvent { wall, at, device, working, message: message.to_owned() };
-        bench.store.device_event(&event).await.unwrap();
+        trial.store.device_event(&event).await.unwrap();
     };
     befalls(true, "follows commands").await;
-    bench.wait(Duration::from_secs(1)).await;
-    let session = bench.begin("paper").await;
+    trial.wait(Duration::from_secs(1)).await;
+    let session = trial.begin("paper").await;
     befalls(false, "the lens does not answer; trying again").await;
     befalls(true, "follows commands again").await;
-    bench.wait(Duration::from_secs(1)).await;
+    trial.wait(Duration::from_secs(1)).await;
     let abort = Action::Abort { reason: "the lens broke".to_owned() };
-    bench.conductor.act(Role::Operator, session, abort).await.unwrap();
+    trial.conductor.act(Role::Operator, session, abort).await.unwrap();
     befalls(false, "unplugged when all was over").await;
 
-    let log = bench.conductor.session_detail(session).await.unwrap().log;
+    let log = trial.conductor.session_detail(session).await.unwrap().log;
     let log: Vec<&str> = log.iter().map(|line| line.text.as_str()).collect();
     let expected = [
         "Session made",
@@ -315,7 +315,7 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
     assert_eq!(log, expected);
 
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     let devices = rows(&out, "devices");
     let devices: Vec<_> = devices.iter().map(|row| (row["working"].as_str(), row["message"].as_str())).collect();
     let expected = [

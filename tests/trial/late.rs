@@ -16,8 +16,8 @@ use parfocal::trial::remark::{Holding, NewAnswer, Origin, WaitClock};
 use parfocal::trial::role::Role;
 use uuid::Uuid;
 
-use crate::bench::Bench;
 use crate::exports::{failed, rows};
+use crate::fixture::Trial;
 
 const SECOND: Duration = Duration::from_secs(1);
 const MINUTE: Duration = Duration::from_mins(1);
@@ -37,51 +37,51 @@ fn origin(device: DeviceId, sequence: i64, waited: Duration) -> Origin {
 }
 
 /// An answer about the sharpness of the setting whose questions are asked now.
-fn sharpness(bench: &mut Bench, point: u8, origin: Origin) -> NewAnswer {
-    let view = bench.view();
-    let (key, question) = (bench.key(), "sharpness".to_owned());
+fn sharpness(trial: &mut Trial, point: u8, origin: Origin) -> NewAnswer {
+    let view = trial.view();
+    let (key, question) = (trial.key(), "sharpness".to_owned());
     NewAnswer { key, session: view.session, segment: view.segment, question, value: AnswerValue::Point(point), origin }
 }
 
 /// A session of the paper, at the questions after its first setting.
-async fn at_questions(folder: &Path) -> (Bench, SessionId) {
-    let bench = Bench::start(folder).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
-    bench.wait(10 * SECOND).await;
-    bench.surgeon(Action::FinishSegment { segment }).await;
-    (bench, session)
+async fn at_questions(folder: &Path) -> (Trial, SessionId) {
+    let trial = Trial::start(folder).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    trial.wait(10 * SECOND).await;
+    trial.surgeon(Action::FinishSegment { segment }).await;
+    (trial, session)
 }
 
-async fn abort(bench: &Bench, session: SessionId) {
-    bench.conductor.act(Role::Operator, session, Action::Abort { reason: "fire alarm".to_owned() }).await.unwrap();
+async fn abort(trial: &Trial, session: SessionId) {
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "fire alarm".to_owned() }).await.unwrap();
 }
 
-async fn unblind(bench: &Bench, session: SessionId, despite_outstanding: bool) -> Result<(), ConductError> {
+async fn unblind(trial: &Trial, session: SessionId, despite_outstanding: bool) -> Result<(), ConductError> {
     let reason = "analysis begins".to_owned();
-    bench.conductor.act(Role::Researcher, session, Action::Unblind { reason, despite_outstanding }).await
+    trial.conductor.act(Role::Researcher, session, Action::Unblind { reason, despite_outstanding }).await
 }
 
 #[tokio::test]
 async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut bench, session) = at_questions(folder.path()).await;
-    bench.wait(60 * SECOND).await;
+    let (mut trial, session) = at_questions(folder.path()).await;
+    trial.wait(60 * SECOND).await;
     // "5" is given on tablet B, while tablet A, which has no network, holds a "3" that was given 50 s before.
-    let five = sharpness(&mut bench, 5, origin(TABLET_B, 1, Duration::ZERO));
-    bench.conductor.answer(five).await.unwrap();
-    bench.wait(30 * SECOND).await;
-    let three = sharpness(&mut bench, 3, origin(TABLET_A, 7, 80 * SECOND));
-    bench.conductor.answer(three).await.unwrap();
-    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(5));
-    drop(bench);
+    let five = sharpness(&mut trial, 5, origin(TABLET_B, 1, Duration::ZERO));
+    trial.conductor.answer(five).await.unwrap();
+    trial.wait(30 * SECOND).await;
+    let three = sharpness(&mut trial, 3, origin(TABLET_A, 7, 80 * SECOND));
+    trial.conductor.answer(three).await.unwrap();
+    assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5));
+    drop(trial);
 
-    let bench = Bench::start(folder.path()).await;
-    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(5), "over a restart too");
-    let detail = bench.conductor.session_detail(session).await.unwrap();
+    let trial = Trial::start(folder.path()).await;
+    assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5), "over a restart too");
+    let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!((&detail.answers[0].value, detail.answers[0].devices_disagree), (&AnswerValue::Point(5), true));
-    let timeline = bench.conductor.timeline(session, 10).await.unwrap();
+    let timeline = trial.conductor.timeline(session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!(
         (&aside.value, &aside.counted, aside.late),
@@ -90,7 +90,7 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
     assert!((aside.seconds - 20.0).abs() < 1e-9, "it stands where it was given: {aside:?}");
 
     let out = folder.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     let answers = rows(&out, "answers");
     let told: Vec<_> = answers
         .iter()
@@ -106,65 +106,65 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
 #[tokio::test]
 async fn of_two_tabs_the_one_that_answered_last_counts_whatever_the_devices_clock_did() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut bench, session) = at_questions(folder.path()).await;
-    bench.wait(60 * SECOND).await;
-    let five = sharpness(&mut bench, 5, origin(TABLET_A, 8, 30 * SECOND));
-    bench.conductor.answer(five).await.unwrap();
+    let (mut trial, session) = at_questions(folder.path()).await;
+    trial.wait(60 * SECOND).await;
+    let five = sharpness(&mut trial, 5, origin(TABLET_A, 8, 30 * SECOND));
+    trial.conductor.answer(five).await.unwrap();
     // The wait of the first tab's answer was measured across a clock that was set.
-    let three = sharpness(&mut bench, 3, origin(TABLET_A, 7, Duration::ZERO));
-    bench.conductor.answer(three).await.unwrap();
-    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(5));
-    assert_eq!(bench.conductor.timeline(session, 10).await.unwrap().set_aside, []);
-    assert!(!bench.conductor.session_detail(session).await.unwrap().answers[0].devices_disagree);
+    let three = sharpness(&mut trial, 3, origin(TABLET_A, 7, Duration::ZERO));
+    trial.conductor.answer(three).await.unwrap();
+    assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5));
+    assert_eq!(trial.conductor.timeline(session, 10).await.unwrap().set_aside, []);
+    assert!(!trial.conductor.session_detail(session).await.unwrap().answers[0].devices_disagree);
 }
 
 #[tokio::test]
 async fn a_servers_clock_that_was_set_back_while_it_was_down_makes_no_later_answer_an_earlier_one() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut bench, _) = at_questions(folder.path()).await;
-    bench.wait(60 * MINUTE).await;
-    let five = sharpness(&mut bench, 5, origin(TABLET_B, 1, Duration::ZERO));
-    bench.conductor.answer(five).await.unwrap();
-    drop(bench);
+    let (mut trial, _) = at_questions(folder.path()).await;
+    trial.wait(60 * MINUTE).await;
+    let five = sharpness(&mut trial, 5, origin(TABLET_B, 1, Duration::ZERO));
+    trial.conductor.answer(five).await.unwrap();
+    drop(trial);
     // Both its clocks begin again where they were an hour before.
-    let mut bench = Bench::start(folder.path()).await;
-    let two = sharpness(&mut bench, 2, origin(TABLET_A, 1, Duration::ZERO));
-    bench.wait(SECOND).await;
-    bench.conductor.answer(two).await.unwrap();
-    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(2));
+    let mut trial = Trial::start(folder.path()).await;
+    let two = sharpness(&mut trial, 2, origin(TABLET_A, 1, Duration::ZERO));
+    trial.wait(SECOND).await;
+    trial.conductor.answer(two).await.unwrap();
+    assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(2));
 }
 
 #[tokio::test]
 async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arrivals_are_kept_and_marked() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut bench, session) = at_questions(folder.path()).await;
-    let held = [3, 5, 1].map(|point| sharpness(&mut bench, point, origin(TABLET_A, point.into(), Duration::ZERO)));
-    let mut comments = ["in time", "too late"].map(|text| bench.comment(text));
-    abort(&bench, session).await;
-    bench.wait(29 * MINUTE).await;
-    bench.conductor.answer(held[0].clone()).await.unwrap();
-    bench.conductor.comment(comments[0].clone()).await.unwrap();
-    drop(bench);
+    let (mut trial, session) = at_questions(folder.path()).await;
+    let held = [3, 5, 1].map(|point| sharpness(&mut trial, point, origin(TABLET_A, point.into(), Duration::ZERO)));
+    let mut comments = ["in time", "too late"].map(|text| trial.comment(text));
+    abort(&trial, session).await;
+    trial.wait(29 * MINUTE).await;
+    trial.conductor.answer(held[0].clone()).await.unwrap();
+    trial.conductor.comment(comments[0].clone()).await.unwrap();
+    drop(trial);
 
     // The server was started anew meanwhile; a session of its own is under way there.
-    let bench = Bench::start(folder.path()).await;
-    bench.wait(MINUTE).await;
-    bench.conductor.answer(held[1].clone()).await.unwrap();
-    bench.begin("paper").await;
-    bench.wait(SECOND).await;
-    bench.conductor.answer(held[2].clone()).await.unwrap();
+    let trial = Trial::start(folder.path()).await;
+    trial.wait(MINUTE).await;
+    trial.conductor.answer(held[1].clone()).await.unwrap();
+    trial.begin("paper").await;
+    trial.wait(SECOND).await;
+    trial.conductor.answer(held[2].clone()).await.unwrap();
     comments[1].segment = None;
-    bench.conductor.comment(comments[1].clone()).await.unwrap();
+    trial.conductor.comment(comments[1].clone()).await.unwrap();
 
-    let detail = bench.conductor.session_detail(session).await.unwrap();
+    let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.iter().map(|line| &line.value).collect::<Vec<_>>(), [&AnswerValue::Point(5)]);
-    let timeline = bench.conductor.timeline(session, 10).await.unwrap();
+    let timeline = trial.conductor.timeline(session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!((&aside.value, aside.late, timeline.set_aside.len()), (&AnswerValue::Point(1), true, 1));
     assert_eq!(timeline.comments.iter().map(|comment| comment.late).collect::<Vec<_>>(), [false, true]);
 
     let out = folder.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     let column = |table: &str, name: &str| rows(&out, table).iter().map(|row| row[name].clone()).collect::<Vec<_>>();
     assert_eq!(column("answers", "value"), ["3", "5", "1"]);
     assert_eq!(column("answers", "counts"), ["false", "true", "false"]);
@@ -181,89 +181,89 @@ async fn a_protocol_says_how_long_what_a_tablet_holds_counts() {
         .replace("name = \"paper\"", "name = \"short-grace\"")
         .replace("repeats = 2", "repeats = 2\ngrace_minutes = 1");
     std::fs::write(folder.path().join("short-grace.toml"), protocol).unwrap();
-    let mut bench = Bench::start_with(folder.path(), Some(folder.path()), 7).await;
-    let session = bench.begin("short-grace").await;
-    let early = bench.comment("in time");
-    let late = bench.comment("too late");
-    abort(&bench, session).await;
-    bench.wait(MINUTE).await;
-    bench.conductor.comment(early).await.unwrap();
-    bench.wait(SECOND).await;
-    bench.conductor.comment(late).await.unwrap();
-    let kept = bench.store.reader().comments(session).await.unwrap();
+    let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 7).await;
+    let session = trial.begin("short-grace").await;
+    let early = trial.comment("in time");
+    let late = trial.comment("too late");
+    abort(&trial, session).await;
+    trial.wait(MINUTE).await;
+    trial.conductor.comment(early).await.unwrap();
+    trial.wait(SECOND).await;
+    trial.conductor.comment(late).await.unwrap();
+    let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(kept.iter().map(|(_, comment)| comment.late).collect::<Vec<_>>(), [false, true]);
 }
 
 #[tokio::test]
 async fn unblinding_asks_while_something_may_be_outstanding_and_then_nothing_counts_any_more() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut bench, session) = at_questions(folder.path()).await;
-    bench.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
-    let mut late = sharpness(&mut bench, 1, origin(TABLET_A, 1, Duration::ZERO));
-    abort(&bench, session).await;
-    let refused = unblind(&bench, session, false).await.unwrap_err();
+    let (mut trial, session) = at_questions(folder.path()).await;
+    trial.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
+    let mut late = sharpness(&mut trial, 1, origin(TABLET_A, 1, Duration::ZERO));
+    abort(&trial, session).await;
+    let refused = unblind(&trial, session, false).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("counts until")), "{refused}");
-    assert!(!bench.conductor.session_detail(session).await.unwrap().line.unblinded);
+    assert!(!trial.conductor.session_detail(session).await.unwrap().line.unblinded);
 
-    unblind(&bench, session, true).await.unwrap();
-    bench.conductor.answer(late.clone()).await.unwrap();
+    unblind(&trial, session, true).await.unwrap();
+    trial.conductor.answer(late.clone()).await.unwrap();
     // The same once the session is off the screens.
-    bench.conductor.dismiss(Role::Operator, session).unwrap();
-    late.key = bench.key();
-    bench.conductor.answer(late).await.unwrap();
-    let detail = bench.conductor.session_detail(session).await.unwrap();
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+    late.key = trial.key();
+    trial.conductor.answer(late).await.unwrap();
+    let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.iter().map(|line| &line.value).collect::<Vec<_>>(), [&AnswerValue::Point(6)]);
-    let kept = bench.store.reader().answers(session).await.unwrap();
+    let kept = trial.store.reader().answers(session).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.late).collect::<Vec<_>>(), [false, true, true]);
 }
 
 #[tokio::test]
 async fn unblinding_asks_until_each_tablet_has_said_since_the_end_that_it_holds_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut bench, session) = at_questions(folder.path()).await;
+    let (mut trial, session) = at_questions(folder.path()).await;
     let told = |device, holding| Holding { session, device, holding };
-    bench.conductor.holding(told(TABLET_A, 0)).await.unwrap();
-    let answer = sharpness(&mut bench, 4, origin(TABLET_B, 1, Duration::ZERO));
-    bench.conductor.answer(answer).await.unwrap();
-    bench.wait(SECOND).await;
-    abort(&bench, session).await;
-    bench.wait(31 * MINUTE).await;
+    trial.conductor.holding(told(TABLET_A, 0)).await.unwrap();
+    let answer = sharpness(&mut trial, 4, origin(TABLET_B, 1, Duration::ZERO));
+    trial.conductor.answer(answer).await.unwrap();
+    trial.wait(SECOND).await;
+    abort(&trial, session).await;
+    trial.wait(31 * MINUTE).await;
 
-    let refused = unblind(&bench, session, false).await.unwrap_err().to_string();
+    let refused = unblind(&trial, session, false).await.unwrap_err().to_string();
     assert!(refused.contains("2 surgeon's devices have not said"), "{refused}");
-    bench.conductor.holding(told(TABLET_A, 0)).await.unwrap();
-    bench.conductor.holding(told(TABLET_B, 1)).await.unwrap();
-    let refused = unblind(&bench, session, false).await.unwrap_err().to_string();
+    trial.conductor.holding(told(TABLET_A, 0)).await.unwrap();
+    trial.conductor.holding(told(TABLET_B, 1)).await.unwrap();
+    let refused = unblind(&trial, session, false).await.unwrap_err().to_string();
     assert!(refused.contains("1 surgeon's device has not said"), "{refused}");
-    bench.conductor.holding(told(TABLET_B, 0)).await.unwrap();
-    unblind(&bench, session, false).await.unwrap();
+    trial.conductor.holding(told(TABLET_B, 0)).await.unwrap();
+    unblind(&trial, session, false).await.unwrap();
 
     let elsewhere = Holding { session: SessionId(Uuid::from_u128(1)), ..told(TABLET_A, 0) };
-    assert!(matches!(bench.conductor.holding(elsewhere).await, Err(ConductError::NotFound(_))));
+    assert!(matches!(trial.conductor.holding(elsewhere).await, Err(ConductError::NotFound(_))));
 }
 
 #[tokio::test]
 async fn an_emergency_unblinding_does_not_wait_and_the_sessions_answers_go_on_to_count_until_its_end() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut bench, session) = at_questions(folder.path()).await;
-    unblind(&bench, session, false).await.unwrap();
-    bench.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
-    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(6));
-    let after = sharpness(&mut bench, 1, Origin::default());
-    abort(&bench, session).await;
-    bench.conductor.answer(after).await.unwrap();
-    let kept = bench.store.reader().answers(session).await.unwrap();
+    let (mut trial, session) = at_questions(folder.path()).await;
+    unblind(&trial, session, false).await.unwrap();
+    trial.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
+    assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(6));
+    let after = sharpness(&mut trial, 1, Origin::default());
+    abort(&trial, session).await;
+    trial.conductor.answer(after).await.unwrap();
+    let kept = trial.store.reader().answers(session).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.late).collect::<Vec<_>>(), [false, true]);
 }
 
 #[tokio::test]
 async fn a_database_of_the_version_before_keeps_everything_and_its_last_answers_count() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.whole_session("paper").await;
-    assert_eq!(bench.view().phase, Phase::Completed);
-    let before = bench.conductor.session_detail(session).await.unwrap().answers;
-    drop(bench);
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.whole_session("paper").await;
+    assert_eq!(trial.view().phase, Phase::Completed);
+    let before = trial.conductor.session_detail(session).await.unwrap().answers;
+    drop(trial);
 
     let pool = crate::storage::raw(folder.path()).await;
     MIGRATOR.undo(&pool, 4).await.unwrap();
@@ -275,14 +275,14 @@ async fn a_database_of_the_version_before_keeps_everything_and_its_last_answers_
     sqlx::query("UPDATE runs SET version = 'before'").execute(&pool).await.unwrap();
     pool.close().await;
 
-    let bench = Bench::start(folder.path()).await;
-    let after = bench.conductor.session_detail(session).await.unwrap().answers;
+    let trial = Trial::start(folder.path()).await;
+    let after = trial.conductor.session_detail(session).await.unwrap().answers;
     assert_eq!(after.len(), before.len());
     let sharp = after.iter().find(|line| line.question == "sharpness" && line.setting == Some(1)).unwrap();
     assert_eq!((&sharp.value, sharp.changed), (&AnswerValue::Point(2), true));
-    assert_eq!(bench.store.reader().comments(session).await.unwrap().len(), 6);
+    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 6);
     let out = folder.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     assert!(rows(&out, "answers").iter().all(|row| row["late"] == "false" && row["device"].is_empty()));
     assert_eq!(failed(&verify(&out)), [""; 0]);
 }

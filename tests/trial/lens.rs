@@ -7,12 +7,12 @@ use parfocal::lens::FocalPower;
 use parfocal::trial::action::{Action, Focus};
 use parfocal::trial::role::Role;
 
-use crate::bench::Bench;
+use crate::fixture::Trial;
 
 #[tokio::test]
 async fn the_operator_moves_the_lens_before_a_session_is_made_and_after_it_is_closed() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
+    let mut trial = Trial::start(folder.path()).await;
     let by_hand = Focus::FocalPower(0.25);
     let by_policy = Focus::Policy("fixed".to_owned());
     let moved = [
@@ -20,40 +20,40 @@ async fn the_operator_moves_the_lens_before_a_session_is_made_and_after_it_is_cl
         Command::Drive { drive: Drive::Policy { name: PolicyName::new("fixed"), start: None }, segment: None },
     ];
 
-    bench.conductor.focus(Role::Operator, &by_hand).unwrap();
-    bench.conductor.focus(Role::Operator, &by_policy).unwrap();
-    assert_eq!(bench.commanded(), moved);
+    trial.conductor.focus(Role::Operator, &by_hand).unwrap();
+    trial.conductor.focus(Role::Operator, &by_policy).unwrap();
+    assert_eq!(trial.commanded(), moved);
 
-    let session = bench.begin("practice").await;
-    bench.commanded();
+    let session = trial.begin("practice").await;
+    trial.commanded();
     for focus in [&by_hand, &by_policy, &Focus::Policy("unknown".to_owned()), &Focus::FocalPower(2.0)] {
-        let refused = bench.conductor.focus(Role::Operator, focus);
+        let refused = trial.conductor.focus(Role::Operator, focus);
         assert!(matches!(refused, Err(ConductError::Conflict(_))), "{focus:?}");
     }
-    bench.conductor.act(Role::Operator, session, Action::Abort { reason: "over".to_owned() }).await.unwrap();
-    bench.commanded();
-    assert!(bench.conductor.focus(Role::Operator, &by_hand).is_err(), "an ended session is still on the screens");
-    assert_eq!(bench.commanded(), []);
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "over".to_owned() }).await.unwrap();
+    trial.commanded();
+    assert!(trial.conductor.focus(Role::Operator, &by_hand).is_err(), "an ended session is still on the screens");
+    assert_eq!(trial.commanded(), []);
 
-    bench.conductor.dismiss(Role::Operator, session).unwrap();
-    bench.conductor.focus(Role::Operator, &by_hand).unwrap();
-    assert_eq!(bench.commanded(), moved[..1]);
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+    trial.conductor.focus(Role::Operator, &by_hand).unwrap();
+    assert_eq!(trial.commanded(), moved[..1]);
 }
 
 #[tokio::test]
 async fn nobody_but_the_operator_moves_the_lens_and_only_to_where_it_can_go() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
+    let mut trial = Trial::start(folder.path()).await;
     for role in [Role::Surgeon, Role::Researcher, Role::System] {
-        let refused = bench.conductor.focus(role, &Focus::FocalPower(0.25));
+        let refused = trial.conductor.focus(role, &Focus::FocalPower(0.25));
         assert!(matches!(refused, Err(ConductError::Forbidden(_))), "{role:?}");
     }
 
-    let unknown = bench.conductor.focus(Role::Operator, &Focus::Policy("unknown".to_owned()));
+    let unknown = trial.conductor.focus(Role::Operator, &Focus::Policy("unknown".to_owned()));
     assert!(matches!(unknown, Err(ConductError::NotFound(_))));
     for value in [f64::NAN, -0.1, 1.1] {
-        let invalid = bench.conductor.focus(Role::Operator, &Focus::FocalPower(value));
+        let invalid = trial.conductor.focus(Role::Operator, &Focus::FocalPower(value));
         assert!(matches!(invalid, Err(ConductError::Invalid(_))), "{value}");
     }
-    assert_eq!(bench.commanded(), []);
+    assert_eq!(trial.commanded(), []);
 }

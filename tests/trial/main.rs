@@ -1,8 +1,8 @@
 //! Trials from outside: conductor, store and export together, on a real database file.
 
 mod balance;
-mod bench;
 mod exports;
+mod fixture;
 mod late;
 mod lens;
 mod remarks;

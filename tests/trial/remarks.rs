@@ -9,34 +9,34 @@ use parfocal::trial::question::{AnswerValue, QuestionKind};
 use parfocal::trial::remark::{NewAnswer, Origin, Said};
 use parfocal::trial::role::Role;
 
-use crate::bench::Bench;
+use crate::fixture::Trial;
 
 #[tokio::test]
 async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
-    bench.wait(Duration::from_secs(10)).await;
-    let mut comment = bench.comment("now");
-    let before = bench.store.run();
-    drop(bench);
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    trial.wait(Duration::from_secs(10)).await;
+    let mut comment = trial.comment("now");
+    let before = trial.store.run();
+    drop(trial);
 
-    let bench = Bench::start(folder.path()).await;
-    bench.clock.advance(Duration::from_secs(40));
+    let trial = Trial::start(folder.path()).await;
+    trial.clock.advance(Duration::from_secs(40));
     comment.origin.waited_millis = Some(30_000);
-    bench.conductor.comment(comment.clone()).await.unwrap();
+    trial.conductor.comment(comment.clone()).await.unwrap();
     // Sent once more, it has waited longer, and is still the same comment.
     comment.origin.waited_millis = Some(31_000);
-    bench.conductor.comment(comment.clone()).await.unwrap();
+    trial.conductor.comment(comment.clone()).await.unwrap();
     comment.key.0 = uuid::Uuid::from_u128(1);
     comment.run = Some(99);
-    bench.conductor.comment(comment).await.unwrap();
-    let timeline = bench.conductor.timeline(session, 100).await.unwrap();
+    trial.conductor.comment(comment).await.unwrap();
+    let timeline = trial.conductor.timeline(session, 100).await.unwrap();
     assert_eq!(timeline.comments.len(), 2);
     assert!((timeline.comments[0].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments[0]);
-    let kept = bench.store.reader().comments(session).await.unwrap();
+    let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(
         (kept[0].0, kept[0].1.frame_run, kept[0].1.origin.waited_millis),
         (before + 1, Some(before), Some(30_000))
@@ -47,18 +47,18 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
 #[tokio::test]
 async fn answers_come_back_after_a_restart_and_a_changed_answer_keeps_the_old_one() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
-    bench.surgeon(Action::FinishSegment { segment }).await;
-    bench.answer("sharpness", AnswerValue::Point(2)).await.unwrap();
-    bench.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
-    drop(bench);
-    let bench = Bench::start(folder.path()).await;
-    assert_eq!(bench.view().answers["sharpness"], AnswerValue::Point(6));
-    assert_eq!(bench.store.reader().answers(session).await.unwrap().len(), 2);
-    let detail = bench.conductor.session_detail(session).await.unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    trial.surgeon(Action::FinishSegment { segment }).await;
+    trial.answer("sharpness", AnswerValue::Point(2)).await.unwrap();
+    trial.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
+    drop(trial);
+    let trial = Trial::start(folder.path()).await;
+    assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(6));
+    assert_eq!(trial.store.reader().answers(session).await.unwrap().len(), 2);
+    let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.len(), 1);
     assert!(detail.answers[0].changed);
 }
@@ -66,56 +66,56 @@ async fn answers_come_back_after_a_restart_and_a_changed_answer_keeps_the_old_on
 #[tokio::test]
 async fn a_comment_sent_twice_is_one_and_a_key_used_for_another_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    let comment = bench.comment("once");
-    bench.conductor.comment(comment.clone()).await.unwrap();
-    bench.conductor.comment(comment.clone()).await.unwrap();
-    assert_eq!(bench.view().comments, 1);
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let comment = trial.comment("once");
+    trial.conductor.comment(comment.clone()).await.unwrap();
+    trial.conductor.comment(comment.clone()).await.unwrap();
+    assert_eq!(trial.view().comments, 1);
     let mut other = comment;
     other.said = Said::Text("another".to_owned());
-    assert!(matches!(bench.conductor.comment(other).await, Err(ConductError::Conflict(_))));
-    assert_eq!(bench.store.reader().comments(session).await.unwrap().len(), 1);
+    assert!(matches!(trial.conductor.comment(other).await, Err(ConductError::Conflict(_))));
+    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 1);
 }
 
 #[tokio::test]
 async fn what_is_said_is_kept_whatever_the_state() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let first = bench.begin("paper").await;
-    let early = bench.comment("on the notice");
-    let segment = bench.whole_setting().await;
-    bench.conductor.comment(early).await.unwrap();
-    bench.conductor.act(Role::Operator, first, Action::Pause { reason: String::new() }).await.unwrap();
-    bench.say("while paused").await;
-    bench.conductor.act(Role::Operator, first, Action::Abort { reason: "fire alarm".to_owned() }).await.unwrap();
-    let mut late = bench.comment("after the end");
+    let mut trial = Trial::start(folder.path()).await;
+    let first = trial.begin("paper").await;
+    let early = trial.comment("on the notice");
+    let segment = trial.whole_setting().await;
+    trial.conductor.comment(early).await.unwrap();
+    trial.conductor.act(Role::Operator, first, Action::Pause { reason: String::new() }).await.unwrap();
+    trial.say("while paused").await;
+    trial.conductor.act(Role::Operator, first, Action::Abort { reason: "fire alarm".to_owned() }).await.unwrap();
+    let mut late = trial.comment("after the end");
     late.segment = Some(segment);
-    bench.conductor.comment(late.clone()).await.unwrap();
+    trial.conductor.comment(late.clone()).await.unwrap();
     // Even when another session has begun.
-    bench.begin("paper").await;
-    late.key = bench.key();
-    bench.conductor.comment(late).await.unwrap();
-    let kept = bench.store.reader().comments(first).await.unwrap();
+    trial.begin("paper").await;
+    late.key = trial.key();
+    trial.conductor.comment(late).await.unwrap();
+    let kept = trial.store.reader().comments(first).await.unwrap();
     assert_eq!(kept.len(), 5);
     assert_eq!(kept[1].1.segment, Some(segment), "a late comment stays with the segment that its page was showing");
-    assert_eq!(bench.view().comments, 0);
+    assert_eq!(trial.view().comments, 0);
 }
 
 #[tokio::test]
 async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_read() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let first = bench.begin("paper").await;
-    let late = bench.comment("after the upgrade");
-    bench.conductor.act(Role::Operator, first, Action::Abort { reason: "upgrade".to_owned() }).await.unwrap();
-    bench.begin("paper").await;
+    let mut trial = Trial::start(folder.path()).await;
+    let first = trial.begin("paper").await;
+    let late = trial.comment("after the upgrade");
+    trial.conductor.act(Role::Operator, first, Action::Abort { reason: "upgrade".to_owned() }).await.unwrap();
+    trial.begin("paper").await;
     let pool = crate::storage::raw(folder.path()).await;
     let change = "DROP TRIGGER sessions_no_update; UPDATE sessions SET protocol_toml = 'of another version'";
     sqlx::raw_sql(change).execute(&pool).await.unwrap();
     let segment = late.segment;
-    bench.conductor.comment(late).await.unwrap();
-    let kept = bench.store.reader().comments(first).await.unwrap();
+    trial.conductor.comment(late).await.unwrap();
+    let kept = trial.store.reader().comments(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, comment)| comment.segment).collect::<Vec<_>>(), [segment]);
     let answer = |key, segment| NewAnswer {
         key,
@@ -125,41 +125,41 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
         value: AnswerValue::Point(4),
         origin: Origin::default(),
     };
-    let (key, other) = (bench.key(), bench.key());
-    bench.conductor.answer(answer(key, segment)).await.unwrap();
-    let elsewhere = bench.view().segment;
-    assert!(matches!(bench.conductor.answer(answer(other, elsewhere)).await, Err(ConductError::NotFound(_))));
-    let kept = bench.store.reader().answers(first).await.unwrap();
+    let (key, other) = (trial.key(), trial.key());
+    trial.conductor.answer(answer(key, segment)).await.unwrap();
+    let elsewhere = trial.view().segment;
+    assert!(matches!(trial.conductor.answer(answer(other, elsewhere)).await, Err(ConductError::NotFound(_))));
+    let kept = trial.store.reader().answers(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.value.clone()).collect::<Vec<_>>(), [AnswerValue::Point(4)]);
-    let told = bench.conductor.session_detail(first).await.unwrap_err().to_string();
+    let told = trial.conductor.session_detail(first).await.unwrap_err().to_string();
     assert!(told.contains(&first.to_string()) && told.contains("go on with the version that made it"), "{told}");
 }
 
 #[tokio::test]
 async fn emoji_are_kept_whole_and_a_megabyte_is_refused_with_the_limit() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
     let emoji = "👩🏽‍⚕️🔬 ≠ 🧠\u{202e}\0 Ünïcödé";
-    bench.say(emoji).await;
-    let kept = bench.store.reader().comments(session).await.unwrap();
+    trial.say(emoji).await;
+    let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(kept[0].1.said, Said::Text(emoji.to_owned()));
-    let megabyte = bench.comment(&"x".repeat(1_000_000));
-    let refused = bench.conductor.comment(megabyte).await.unwrap_err();
+    let megabyte = trial.comment(&"x".repeat(1_000_000));
+    let refused = trial.conductor.comment(megabyte).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Invalid(text) if text.contains("16384")), "{refused}");
-    let blank = bench.comment(" \n");
-    assert!(matches!(bench.conductor.comment(blank).await, Err(ConductError::Invalid(_))));
+    let blank = trial.comment(" \n");
+    assert!(matches!(trial.conductor.comment(blank).await, Err(ConductError::Invalid(_))));
 }
 
 #[tokio::test]
 async fn a_questionnaire_half_filled_is_kept_item_by_item() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    while bench.view().phase == Phase::Notice {
-        bench.whole_setting().await;
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    while trial.view().phase == Phase::Notice {
+        trial.whole_setting().await;
     }
-    let view = bench.view();
+    let view = trial.view();
     let sus = view.questions.iter().find(|question| question.kind == QuestionKind::Sus).unwrap().id.clone();
     let item = |place: usize, point: u8| {
         let mut items = vec![0; 10];
@@ -168,33 +168,33 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
     };
     let origin = Origin::default();
     let answer =
-        NewAnswer { key: bench.key(), session, segment: None, question: sus.clone(), value: item(0, 4), origin };
-    bench.conductor.answer(answer.clone()).await.unwrap();
-    drop(bench);
-    let mut bench = Bench::start(folder.path()).await;
-    bench.conductor.act(Role::Surgeon, session, Action::Resume).await.unwrap();
-    assert_eq!(bench.view().answers[&sus], item(0, 4), "kept over a restart");
+        NewAnswer { key: trial.key(), session, segment: None, question: sus.clone(), value: item(0, 4), origin };
+    trial.conductor.answer(answer.clone()).await.unwrap();
+    drop(trial);
+    let mut trial = Trial::start(folder.path()).await;
+    trial.conductor.act(Role::Surgeon, session, Action::Resume).await.unwrap();
+    assert_eq!(trial.view().answers[&sus], item(0, 4), "kept over a restart");
     for (place, point) in [(1, 2), (2, 3), (3, 1), (4, 4), (5, 3), (6, 2), (7, 2), (8, 4)] {
-        bench.answer(&sus, item(place, point)).await.unwrap();
+        trial.answer(&sus, item(place, point)).await.unwrap();
     }
     // A tablet that never got the answer sends it again, after all that.
-    bench.conductor.answer(answer).await.unwrap();
+    trial.conductor.answer(answer).await.unwrap();
     for question in view.questions.iter().filter(|question| question.id != sus) {
         let value = match &question.kind {
             QuestionKind::Ranking => AnswerValue::Points(vec![2, 1, 3, 4, 5, 6]),
             _ => AnswerValue::Text("fine".to_owned()),
         };
-        bench.answer(&question.id, value).await.unwrap();
+        trial.answer(&question.id, value).await.unwrap();
     }
     let done = Action::FinishQuestions { segment: None };
-    let refused = bench.conductor.act(Role::Surgeon, session, done.clone()).await.unwrap_err();
+    let refused = trial.conductor.act(Role::Surgeon, session, done.clone()).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("still to be answered")), "{refused}");
-    bench.answer(&sus, item(9, 2)).await.unwrap();
-    bench.surgeon(done).await;
-    let detail = bench.conductor.session_detail(session).await.unwrap();
+    trial.answer(&sus, item(9, 2)).await.unwrap();
+    trial.surgeon(done).await;
+    let detail = trial.conductor.session_detail(session).await.unwrap();
     let kept = detail.answers.iter().find(|answer| answer.question == sus).unwrap();
     assert_eq!(kept.value, AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]));
     assert_eq!(kept.sus_score, Some(67.5));
-    let answers = bench.store.reader().answers(session).await.unwrap();
+    let answers = trial.store.reader().answers(session).await.unwrap();
     assert_eq!(answers.iter().filter(|(_, answer)| answer.question == sus).count(), 10, "one for each item");
 }

@@ -12,29 +12,29 @@ use parfocal::trial::action::Action;
 use parfocal::trial::phase::{Phase, SessionStatus};
 use parfocal::trial::role::Role;
 
-use crate::bench::{Bench, PARTICIPANT};
+use crate::fixture::{PARTICIPANT, Trial};
 
 #[tokio::test]
 async fn a_surgeon_goes_through_six_blinded_settings_and_everything_is_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.whole_session("paper").await;
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.whole_session("paper").await;
 
-    let lines = bench.conductor.sessions(false).await.unwrap();
+    let lines = trial.conductor.sessions(false).await.unwrap();
     assert_eq!(lines.len(), 1);
     assert_eq!((lines[0].session, lines[0].status), (session, SessionStatus::Completed));
     assert_eq!((lines[0].settings, lines[0].finished_settings, lines[0].comments), (6, 6, 6));
 
-    let detail = bench.conductor.session_detail(session).await.unwrap();
+    let detail = trial.conductor.session_detail(session).await.unwrap();
     // Four questions after each of six settings, three at the end.
     assert_eq!(detail.answers.len(), 6 * 4 + 3);
     assert!(detail.settings_detail.iter().all(|setting| setting.inspected_seconds == Some(20.0)));
     let sus = detail.answers.iter().find(|answer| answer.question == "usability").unwrap();
     assert_eq!(sus.sus_score, Some(67.5));
 
-    let timeline = bench.conductor.timeline(session, 100).await.unwrap();
+    let timeline = trial.conductor.timeline(session, 100).await.unwrap();
     let seconds: Vec<f64> = timeline.comments.iter().map(|comment| comment.seconds).collect();
-    assert_eq!(seconds, [20.0, 40.0, 60.0, 80.0, 100.0, 120.0], "only inspection takes time on this bench");
+    assert_eq!(seconds, [20.0, 40.0, 60.0, 80.0, 100.0, 120.0], "only inspection takes time on this trial");
     assert_eq!(timeline.comments[2].setting, Some(3));
     assert_eq!((timeline.settings[2].from, timeline.settings[2].to), (40.0, Some(60.0)));
 }
@@ -42,20 +42,20 @@ async fn a_surgeon_goes_through_six_blinded_settings_and_everything_is_kept() {
 #[tokio::test]
 async fn nothing_that_surgeon_or_operator_get_tells_a_policy() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let (mut surgeon, mut operator) = (bench.conductor.surgeon_view(), bench.conductor.operator_view());
-    let session = bench.begin("paper").await;
+    let mut trial = Trial::start(folder.path()).await;
+    let (mut surgeon, mut operator) = (trial.conductor.surgeon_view(), trial.conductor.operator_view());
+    let session = trial.begin("paper").await;
     let (mut seen, mut segments) = (String::new(), BTreeSet::new());
     for _ in 0..6 {
-        segments.insert(bench.whole_setting().await);
+        segments.insert(trial.whole_setting().await);
         seen += &serde_json::to_string(surgeon.borrow_and_update().as_deref().unwrap()).unwrap();
         seen += &serde_json::to_string(operator.borrow_and_update().as_deref().unwrap()).unwrap();
     }
     // An emergency unblinding by the researcher changes nothing of that.
-    bench.unblind(session).await;
-    seen += &serde_json::to_string(&bench.operator_view()).unwrap();
-    seen += &serde_json::to_string(&bench.conductor.sessions(true).await.unwrap()).unwrap();
-    seen += &serde_json::to_string(&bench.conductor.protocols()).unwrap();
+    trial.unblind(session).await;
+    seen += &serde_json::to_string(&trial.operator_view()).unwrap();
+    seen += &serde_json::to_string(&trial.conductor.sessions(true).await.unwrap()).unwrap();
+    seen += &serde_json::to_string(&trial.conductor.protocols()).unwrap();
     for tell in ["mgm", "mlr", "cnn", "CNN", "hill-climb", "\"fixed", "seed", "policy"] {
         assert!(!seen.contains(tell), "'{tell}' was sent");
     }
@@ -65,14 +65,14 @@ async fn nothing_that_surgeon_or_operator_get_tells_a_policy() {
 #[tokio::test]
 async fn the_researcher_learns_the_policies_at_unblinding_and_not_before() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.whole_session("paper").await;
-    let before = bench.conductor.session_detail(session).await.unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.whole_session("paper").await;
+    let before = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(before.unblinding, None);
     assert!(!serde_json::to_string(&before).unwrap().contains("mgm-"));
 
-    bench.unblind(session).await;
-    let told = bench.conductor.session_detail(session).await.unwrap().unblinding.unwrap();
+    trial.unblind(session).await;
+    let told = trial.conductor.session_detail(session).await.unwrap().unblinding.unwrap();
     assert!(!told.emergency);
     let mut policies: Vec<&str> = told.policies.iter().map(PolicyName::as_str).collect();
     policies.sort_unstable();
@@ -83,10 +83,10 @@ async fn the_researcher_learns_the_policies_at_unblinding_and_not_before() {
 #[tokio::test]
 async fn the_control_loop_is_told_each_policy_from_the_same_start_and_to_hold_in_between() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.whole_session("paper").await;
-    bench.unblind(session).await;
-    let told = bench.conductor.session_detail(session).await.unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.whole_session("paper").await;
+    trial.unblind(session).await;
+    let told = trial.conductor.session_detail(session).await.unwrap();
     let policies = told.unblinding.unwrap().policies;
 
     let mut expected = Vec::new();
@@ -99,149 +99,149 @@ async fn the_control_loop_is_told_each_policy_from_the_same_start_and_to_hold_in
     }
     // After the last setting the lens holds through the closing questions, and is told so again at the end.
     expected.push(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
-    assert_eq!(bench.commanded(), expected);
+    assert_eq!(trial.commanded(), expected);
 }
 
 #[tokio::test]
 async fn a_setting_ends_at_its_limit_and_prompts_come_and_go() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Bench::start(folder.path()).await;
-    bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
-    bench.wait(Duration::from_secs(20)).await;
-    assert_eq!(bench.view().prompt.as_deref(), Some("How does the focus feel now?"));
-    assert_eq!(bench.view().remaining_seconds, Some(100.0));
-    bench.wait(Duration::from_secs(15)).await;
-    assert_eq!(bench.view().prompt, None);
-    bench.wait(Duration::from_secs(84)).await;
-    assert_eq!(bench.view().phase, Phase::Inspecting);
-    bench.wait(Duration::from_secs(1)).await;
-    assert_eq!(bench.view().phase, Phase::Questions);
-    assert!(bench.operator_view().log[0].text.contains("120.0 s"), "{:?}", bench.operator_view().log[0]);
+    let trial = Trial::start(folder.path()).await;
+    trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    trial.wait(Duration::from_secs(20)).await;
+    assert_eq!(trial.view().prompt.as_deref(), Some("How does the focus feel now?"));
+    assert_eq!(trial.view().remaining_seconds, Some(100.0));
+    trial.wait(Duration::from_secs(15)).await;
+    assert_eq!(trial.view().prompt, None);
+    trial.wait(Duration::from_secs(84)).await;
+    assert_eq!(trial.view().phase, Phase::Inspecting);
+    trial.wait(Duration::from_secs(1)).await;
+    assert_eq!(trial.view().phase, Phase::Questions);
+    assert!(trial.operator_view().log[0].text.contains("120.0 s"), "{:?}", trial.operator_view().log[0]);
 }
 
 #[tokio::test]
 async fn a_restarted_server_goes_on_at_the_same_place_and_forgets_at_most_a_second() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    bench.whole_setting().await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
-    bench.wait(Duration::from_secs(30)).await;
-    bench.say("before").await;
-    bench.clock.advance(Duration::from_millis(900));
-    drop(bench);
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    trial.whole_setting().await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    trial.wait(Duration::from_secs(30)).await;
+    trial.say("before").await;
+    trial.clock.advance(Duration::from_millis(900));
+    drop(trial);
 
-    let mut bench = Bench::start(folder.path()).await;
-    let view = bench.view();
+    let mut trial = Trial::start(folder.path()).await;
+    let view = trial.view();
     assert_eq!((view.session, view.segment, view.phase), (session, Some(segment), Phase::Inspecting));
     assert_eq!((view.paused, view.may_resume, view.setting, view.comments), (true, true, 2, 2));
     assert_eq!(view.remaining_seconds, Some(90.0));
-    // No step of a policy was recorded on this bench: the lens waits where the setting began.
+    // No step of a policy was recorded on this trial: the lens waits where the setting began.
     let start = Some(FocalPower::MIDDLE);
-    assert_eq!(bench.commanded(), [Command::Drive { drive: Drive::Hold { at: start }, segment: Some(segment) }]);
-    bench.surgeon(Action::Resume).await;
-    let resumed = bench.commanded();
+    assert_eq!(trial.commanded(), [Command::Drive { drive: Drive::Hold { at: start }, segment: Some(segment) }]);
+    trial.surgeon(Action::Resume).await;
+    let resumed = trial.commanded();
     let goes_on =
         matches!(&resumed[..], [Command::Drive { drive: Drive::Policy { start: at, .. }, .. }] if *at == start);
     assert!(goes_on, "{resumed:?}");
-    bench.wait(Duration::from_secs(90)).await;
-    assert_eq!(bench.view().phase, Phase::Questions);
-    while bench.view().phase != Phase::Completed {
-        if bench.view().phase == Phase::Notice {
-            bench.whole_setting().await;
+    trial.wait(Duration::from_secs(90)).await;
+    assert_eq!(trial.view().phase, Phase::Questions);
+    while trial.view().phase != Phase::Completed {
+        if trial.view().phase == Phase::Notice {
+            trial.whole_setting().await;
         } else {
-            bench.answer_all().await;
-            bench.surgeon(Action::FinishQuestions { segment: bench.view().segment }).await;
+            trial.answer_all().await;
+            trial.surgeon(Action::FinishQuestions { segment: trial.view().segment }).await;
         }
     }
-    let detail = bench.conductor.session_detail(session).await.unwrap();
+    let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(detail.settings_detail[1].inspected_seconds, Some(120.0));
-    drop(bench);
-    let bench = Bench::start(folder.path()).await;
-    assert_eq!(bench.conductor.surgeon_view().borrow().as_deref(), None, "a completed session is not taken up again");
+    drop(trial);
+    let trial = Trial::start(folder.path()).await;
+    assert_eq!(trial.conductor.surgeon_view().borrow().as_deref(), None, "a completed session is not taken up again");
 }
 
 #[tokio::test]
 async fn one_session_at_a_time_and_only_with_known_codes_and_protocols() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Bench::start(folder.path()).await;
-    let create = |by, participant, protocol| bench.conductor.create(by, participant, protocol);
+    let trial = Trial::start(folder.path()).await;
+    let create = |by, participant, protocol| trial.conductor.create(by, participant, protocol);
     assert!(matches!(create(Role::Surgeon, PARTICIPANT, "paper").await, Err(ConductError::Forbidden(_))));
     assert!(matches!(create(Role::Operator, "S-99", "paper").await, Err(ConductError::NotFound(_))));
     let unknown = create(Role::Operator, PARTICIPANT, "papers").await.unwrap_err();
     assert!(unknown.to_string().contains("paper, practice"), "{unknown}");
-    let session = bench.begin("paper").await;
+    let session = trial.begin("paper").await;
     assert!(matches!(create(Role::Operator, PARTICIPANT, "paper").await, Err(ConductError::Conflict(_))));
-    assert!(matches!(bench.conductor.dismiss(Role::Operator, session), Err(ConductError::Conflict(_))));
-    let name = bench.conductor.add_participant(Role::Operator, "Dr Smith").await.unwrap_err();
+    assert!(matches!(trial.conductor.dismiss(Role::Operator, session), Err(ConductError::Conflict(_))));
+    let name = trial.conductor.add_participant(Role::Operator, "Dr Smith").await.unwrap_err();
     assert!(matches!(&name, ConductError::Invalid(text) if text.contains("never a name")), "{name}");
-    bench.conductor.act(Role::Operator, session, Action::Abort { reason: "test".to_owned() }).await.unwrap();
-    bench.conductor.dismiss(Role::Operator, session).unwrap();
-    assert_eq!(bench.conductor.surgeon_view().borrow().as_deref(), None);
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "test".to_owned() }).await.unwrap();
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+    assert_eq!(trial.conductor.surgeon_view().borrow().as_deref(), None);
     create(Role::Operator, PARTICIPANT, "paper").await.unwrap();
 }
 
 #[tokio::test]
 async fn practice_never_mixes_with_real_sessions() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let practice = bench.whole_session("practice").await;
-    let real = bench.whole_session("paper").await;
+    let mut trial = Trial::start(folder.path()).await;
+    let practice = trial.whole_session("practice").await;
+    let real = trial.whole_session("paper").await;
     let listed = |lines: Vec<parfocal::store::SessionLine>| lines.iter().map(|line| line.session).collect::<Vec<_>>();
-    assert_eq!(listed(bench.conductor.sessions(false).await.unwrap()), [real]);
-    assert_eq!(listed(bench.conductor.sessions(true).await.unwrap()), [real, practice]);
-    assert_eq!(bench.conductor.participants().await.unwrap()[0].sessions, 1);
+    assert_eq!(listed(trial.conductor.sessions(false).await.unwrap()), [real]);
+    assert_eq!(listed(trial.conductor.sessions(true).await.unwrap()), [real, practice]);
+    assert_eq!(trial.conductor.participants().await.unwrap()[0].sessions, 1);
 }
 
 #[tokio::test]
 async fn a_handler_that_is_dropped_midway_leaves_memory_and_disk_the_same() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
+    let trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
     {
-        let tap = bench.conductor.act(Role::Surgeon, session, Action::Acknowledge { segment });
+        let tap = trial.conductor.act(Role::Surgeon, session, Action::Acknowledge { segment });
         let mut tap = std::pin::pin!(tap);
         // Polled once, as by a browser that went away at once, then dropped.
         let _ = tap.as_mut().poll(&mut Context::from_waker(Waker::noop()));
     }
-    let mut views = bench.conductor.surgeon_view();
+    let mut views = trial.conductor.surgeon_view();
     views.wait_for(|view| view.as_ref().is_some_and(|view| view.phase == Phase::Inspecting)).await.unwrap();
-    assert_eq!(bench.store.reader().events(session).await.unwrap().len(), 3);
-    bench.surgeon(Action::FinishSegment { segment }).await;
-    assert_eq!(bench.view().phase, Phase::Questions);
+    assert_eq!(trial.store.reader().events(session).await.unwrap().len(), 3);
+    trial.surgeon(Action::FinishSegment { segment }).await;
+    assert_eq!(trial.view().phase, Phase::Questions);
 }
 
 #[tokio::test]
 async fn a_pause_asked_for_while_the_session_is_being_resumed_is_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
     let pause = |reason: &str| Action::Pause { reason: reason.to_owned() };
-    bench.conductor.act(Role::Operator, session, pause("a question")).await.unwrap();
-    bench.commanded();
+    trial.conductor.act(Role::Operator, session, pause("a question")).await.unwrap();
+    trial.commanded();
 
     // Another program keeps the database, so that the resumption is on its way to the disk for a while.
     let database = crate::storage::raw(folder.path()).await;
     let other_program = database.begin_with("BEGIN IMMEDIATE").await.unwrap();
-    let conductor = bench.conductor.clone();
+    let conductor = trial.conductor.clone();
     let resuming = tokio::spawn(async move { conductor.act(Role::Operator, session, Action::Resume).await });
     for _ in 0..20 {
         tokio::task::yield_now().await;
     }
-    bench.conductor.act(Role::Operator, session, pause("not yet")).await.unwrap();
+    trial.conductor.act(Role::Operator, session, pause("not yet")).await.unwrap();
     other_program.rollback().await.unwrap();
     resuming.await.unwrap().unwrap();
-    bench.conductor.tick().await;
+    trial.conductor.tick().await;
 
-    assert!(bench.view().paused && !bench.view().unrecorded);
-    assert_eq!(bench.commanded(), [], "the lens is not let go in between");
-    let events = bench.store.reader().events(session).await.unwrap();
+    assert!(trial.view().paused && !trial.view().unrecorded);
+    assert_eq!(trial.commanded(), [], "the lens is not let go in between");
+    let events = trial.store.reader().events(session).await.unwrap();
     let kinds: Vec<&str> = events.iter().map(|(_, event)| event.kind.name()).collect();
     assert_eq!(kinds[3..], ["paused", "resumed", "paused"]);
 }
@@ -249,32 +249,32 @@ async fn a_pause_asked_for_while_the_session_is_being_resumed_is_kept() {
 #[tokio::test]
 async fn a_stop_that_the_disk_does_not_take_is_done_all_the_same_and_recorded_once_it_does() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
-    bench.commanded();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    trial.commanded();
     let database = crate::storage::raw(folder.path()).await;
     let broken = "CREATE TRIGGER broken BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'broken'); END";
     sqlx::query(broken).execute(&database).await.unwrap();
 
-    bench.wait(Duration::from_mins(2)).await;
-    assert_eq!(bench.commanded(), [Command::Drive { drive: Drive::Hold { at: None }, segment: None }]);
-    assert!(bench.view().unrecorded && bench.view().phase == Phase::Questions);
-    assert!(bench.operator_view().unrecorded_because.is_some_and(|why| why.contains("broken")));
+    trial.wait(Duration::from_mins(2)).await;
+    assert_eq!(trial.commanded(), [Command::Drive { drive: Drive::Hold { at: None }, segment: None }]);
+    assert!(trial.view().unrecorded && trial.view().phase == Phase::Questions);
+    assert!(trial.operator_view().unrecorded_because.is_some_and(|why| why.contains("broken")));
     // Nothing is said to be done that is not on the disk, but for what stops.
-    let answer = bench.answer("sharpness", parfocal::trial::question::AnswerValue::Point(4)).await;
+    let answer = trial.answer("sharpness", parfocal::trial::question::AnswerValue::Point(4)).await;
     assert!(matches!(answer, Err(ConductError::Storage(_))), "{answer:?}");
     let finish = Action::FinishQuestions { segment: Some(segment) };
-    assert!(matches!(bench.conductor.act(Role::Surgeon, session, finish).await, Err(ConductError::Storage(_))));
-    bench.say("a comment is kept: its table is sound").await;
+    assert!(matches!(trial.conductor.act(Role::Surgeon, session, finish).await, Err(ConductError::Storage(_))));
+    trial.say("a comment is kept: its table is sound").await;
 
     sqlx::query("DROP TRIGGER broken").execute(&database).await.unwrap();
-    bench.conductor.tick().await;
-    assert!(!bench.view().unrecorded);
-    assert_eq!(bench.operator_view().unrecorded_because, None);
-    let events = bench.store.reader().events(session).await.unwrap();
+    trial.conductor.tick().await;
+    assert!(!trial.view().unrecorded);
+    assert_eq!(trial.operator_view().unrecorded_because, None);
+    let events = trial.store.reader().events(session).await.unwrap();
     let kinds: Vec<&str> = events.iter().map(|(_, event)| event.kind.name()).collect();
     assert_eq!(kinds, ["created", "started", "segment-started", "segment-finished"]);
-    bench.answer_all().await;
+    trial.answer_all().await;
 }

@@ -14,7 +14,7 @@ use parfocal::store::{MIGRATOR, Reader, Store, StoreError, telemetry};
 use parfocal::trial::action::Action;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
-use crate::bench::{Bench, a_clock, a_run};
+use crate::fixture::{Trial, a_clock, a_run};
 
 pub async fn raw(folder: &std::path::Path) -> SqlitePool {
     let options = SqliteConnectOptions::new().filename(folder.join("parfocal.db")).create_if_missing(true);
@@ -60,19 +60,19 @@ async fn migrations_go_up_and_down_and_up_again() {
 #[tokio::test]
 async fn a_second_server_on_the_folder_is_refused_and_reading_is_not() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Bench::start(folder.path()).await;
+    let trial = Trial::start(folder.path()).await;
     let refused = Store::open(folder.path(), &a_run(&a_clock())).await.unwrap_err();
     assert!(matches!(&refused, StoreError::InUse { process, .. } if *process == std::process::id().to_string()));
     let reader = Reader::open(folder.path()).await.unwrap();
     assert_eq!(reader.participants().await.unwrap().len(), 1);
-    drop(bench);
+    drop(trial);
     Store::open(folder.path(), &a_run(&a_clock())).await.unwrap();
 }
 
 #[tokio::test]
 async fn a_database_from_a_newer_version_is_refused_and_left_alone() {
     let folder = tempfile::tempdir().unwrap();
-    drop(Bench::start(folder.path()).await);
+    drop(Trial::start(folder.path()).await);
     let pool = raw(folder.path()).await;
     let newer = "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
                  VALUES (9999, 'of the future', 1, x'00', 0)";
@@ -102,24 +102,24 @@ async fn a_folder_that_cannot_be_used_is_named_with_what_to_do() {
 #[tokio::test]
 async fn on_a_full_disk_nothing_is_acknowledged_and_nothing_is_lost() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    bench.say("there was room").await;
-    bench.store.limit_pages(1).await.unwrap();
-    let comment = bench.comment(&"no room ".repeat(1000));
-    let refused = bench.conductor.comment(comment.clone()).await.unwrap_err();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    trial.say("there was room").await;
+    trial.store.limit_pages(1).await.unwrap();
+    let comment = trial.comment(&"no room ".repeat(1000));
+    let refused = trial.conductor.comment(comment.clone()).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Storage(text) if text.contains("disk is full")), "{refused}");
-    assert_eq!(bench.view().comments, 1);
-    bench.store.limit_pages(u32::MAX - 1).await.unwrap();
-    bench.conductor.comment(comment).await.unwrap();
-    assert_eq!(bench.store.reader().comments(session).await.unwrap().len(), 2);
+    assert_eq!(trial.view().comments, 1);
+    trial.store.limit_pages(u32::MAX - 1).await.unwrap();
+    trial.conductor.comment(comment).await.unwrap();
+    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 2);
 }
 
 #[tokio::test]
 async fn what_was_recorded_cannot_be_changed_or_removed() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    bench.whole_session("practice").await;
+    let mut trial = Trial::start(folder.path()).await;
+    trial.whole_session("practice").await;
     let pool = raw(folder.path()).await;
     for table in ["sessions", "segments", "events", "comments", "answers"] {
         for sql in [format!("DELETE FROM {table}"), format!("UPDATE {table} SET session = session")] {
@@ -154,22 +154,22 @@ async fn what_was_recorded_cannot_be_changed_or_removed() {
 #[tokio::test]
 async fn telemetry_is_written_with_its_segment_and_nothing_else_waits_for_it() {
     let folder = tempfile::tempdir().unwrap();
-    let mut bench = Bench::start(folder.path()).await;
-    let session = bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
-    bench.surgeon(Action::Acknowledge { segment }).await;
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
     let (sender, receiver) = tokio::sync::mpsc::channel(4096);
-    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
     for frame in 1..=1000 {
         let mut record = step(frame, Some(segment).filter(|_| frame > 500));
         record.metric = if frame == 501 { Some(f64::NAN) } else { record.metric };
         record.held = (frame == 502).then_some(Hold::Paused);
         sender.send(record).await.unwrap();
     }
-    bench.say("meanwhile").await;
+    trial.say("meanwhile").await;
     drop(sender);
     writer.await.unwrap();
-    assert_eq!(bench.store.telemetry_counts().written.load(Ordering::Relaxed), 1000);
+    assert_eq!(trial.store.telemetry_counts().written.load(Ordering::Relaxed), 1000);
     let pool = raw(folder.path()).await;
     let rows: i64 = sqlx::query_scalar("SELECT count(*) FROM telemetry").fetch_one(&pool).await.unwrap();
     assert_eq!(rows, 1000);
@@ -180,7 +180,7 @@ async fn telemetry_is_written_with_its_segment_and_nothing_else_waits_for_it() {
     .await
     .unwrap();
     assert_eq!(odd, (None, "paused".to_owned()));
-    let path = bench.store.reader().focal_path(session, 100).await.unwrap();
+    let path = trial.store.reader().focal_path(session, 100).await.unwrap();
     assert_eq!(path.len(), 100, "of the 500 steps in the segment every fifth");
     assert_eq!((path[0].frame, path[1].frame, path[0].setting), (501, 506, 1));
 }
@@ -188,11 +188,11 @@ async fn telemetry_is_written_with_its_segment_and_nothing_else_waits_for_it() {
 #[tokio::test]
 async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Bench::start(folder.path()).await;
-    bench.begin("paper").await;
-    let segment = bench.view().segment.unwrap();
+    let trial = Trial::start(folder.path()).await;
+    trial.begin("paper").await;
+    let segment = trial.view().segment.unwrap();
     let (sender, receiver) = tokio::sync::mpsc::channel(4096);
-    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
     for frame in 1..=1000 {
         sender.send(step(frame, Some(segment).filter(|_| (201..=300).contains(&frame)))).await.unwrap();
     }
@@ -203,11 +203,11 @@ async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
         let sql = "SELECT frame, segment IS NOT NULL FROM telemetry ORDER BY frame";
         sqlx::query_as::<_, (i64, bool)>(sql).fetch_all(&pool).await.unwrap()
     };
-    let up_to = bench.store.forget_steps_outside(0, 150, 400).await.unwrap();
+    let up_to = trial.store.forget_steps_outside(0, 150, 400).await.unwrap();
     assert_eq!((up_to, left().await.len()), (150, 850), "a few at a time");
     let mut looked_at = up_to;
     for _ in 0..10 {
-        looked_at = bench.store.forget_steps_outside(looked_at, 150, 400).await.unwrap();
+        looked_at = trial.store.forget_steps_outside(looked_at, 150, 400).await.unwrap();
     }
     let left = left().await;
     assert_eq!(left.iter().filter(|(_, inside)| *inside).count(), 100, "all of the setting's");
@@ -218,14 +218,14 @@ async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
 #[tokio::test]
 async fn telemetry_that_a_failing_disk_refused_is_tried_again() {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Bench::start(folder.path()).await;
+    let trial = Trial::start(folder.path()).await;
     let pool = raw(folder.path()).await;
     let trigger = "CREATE TRIGGER broken BEFORE INSERT ON telemetry BEGIN SELECT RAISE(ABORT, 'broken'); END";
     sqlx::query(trigger).execute(&pool).await.unwrap();
     let (sender, receiver) = tokio::sync::mpsc::channel(64);
-    let writer = tokio::spawn(telemetry::run_writer(bench.store.clone(), receiver));
+    let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
     sender.send(step(1, None)).await.unwrap();
-    let counts = bench.store.telemetry_counts();
+    let counts = trial.store.telemetry_counts();
     while counts.failed_batches.load(Ordering::Relaxed) == 0 {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }

@@ -11,10 +11,10 @@ use crate::exports::{failed, json, with_session};
 #[tokio::test]
 async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
-    bench.unblind(session).await;
+    let (trial, session) = with_session(data.path()).await;
+    trial.unblind(session).await;
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, true).await.unwrap();
+    export(trial.store.reader(), session, &out, true).await.unwrap();
     let checks = verify(&out);
     assert!(checks.iter().all(|check| matches!(check.verdict, Verdict::Passed(_))), "{checks:#?}");
 
@@ -64,10 +64,10 @@ fn reversed(text: &str, columns: usize) -> String {
 #[tokio::test]
 async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
-    bench.unblind(session).await;
+    let (trial, session) = with_session(data.path()).await;
+    trial.unblind(session).await;
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, true).await.unwrap();
+    export(trial.store.reader(), session, &out, true).await.unwrap();
     let kept: Vec<_> = std::fs::read_dir(&out)
         .unwrap()
         .map(|entry| entry.unwrap().path())
@@ -138,9 +138,9 @@ fn an_export_of_an_earlier_version_is_still_verified() {
 #[tokio::test]
 async fn a_blinded_export_is_verified_as_far_as_it_can_be() {
     let data = tempfile::tempdir().unwrap();
-    let (bench, session) = with_session(data.path()).await;
+    let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    export(bench.store.reader(), session, &out, false).await.unwrap();
+    export(trial.store.reader(), session, &out, false).await.unwrap();
     let checks = verify(&out);
     assert_eq!(failed(&checks), [""; 0]);
     let open: Vec<_> = checks.iter().filter(|check| matches!(check.verdict, Verdict::NotChecked(_))).collect();

@@ -22,9 +22,9 @@ const BUFFERS: usize = 8;
 /// size.
 const FAKE_PACKET: i32 = 16_000;
 
-/// The camera asked for, and how to set it up.
+/// Which camera to open, and how to set it up.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wanted {
+pub struct Setup {
     /// Identity, or address.
     pub id: String,
     /// Pixel format, if not the best that the camera has.
@@ -40,12 +40,12 @@ pub struct Wanted {
     fps: f64,
 }
 
-impl Wanted {
+impl Setup {
     /// Parses `source`, with `fps` as the rate.
     pub fn parse(source: &str, fps: f64) -> Result<Self, CameraError> {
         let bad = |error: BadOptions| CameraError::BadSource(format!("camera gige: {error}"));
         let (id, mut options) = Options::split(source).map_err(bad)?;
-        let wanted = Self {
+        let setup = Self {
             id: id.to_owned(),
             format: options.take("format").map_err(bad)?,
             width: options.take("width").map_err(bad)?,
@@ -57,7 +57,7 @@ impl Wanted {
         };
 
         options.finish().map_err(bad)?;
-        Ok(wanted)
+        Ok(setup)
     }
 }
 
@@ -103,30 +103,30 @@ pub enum Arrival {
 
 impl Device {
     /// Connects to the camera asked for, sets it up and starts it.
-    pub fn open(wanted: &Wanted) -> Result<Self, DeviceError> {
-        let camera = connect(&wanted.id)?;
+    pub fn open(setup: &Setup) -> Result<Self, DeviceError> {
+        let camera = connect(&setup.id)?;
 
         let vendor = camera.vendor_name()?;
         let model = camera.model_name()?;
         let fake = vendor == "Aravis";
 
-        let format = choose_format(&camera, wanted.format)?;
-        let (width, height) = set_region(&camera, wanted)?;
+        let format = choose_format(&camera, setup.format)?;
+        let (width, height) = set_region(&camera, setup)?;
         camera.set_acquisition_mode(AcquisitionMode::Continuous)?;
 
         // A camera that cannot do one of these runs as it is: exposure and rate can still be set by hand.
         let _ = camera.set_exposure_time_auto(Auto::Off);
         let _ = camera.set_gain_auto(Auto::Off);
 
-        if let Some(exposure) = wanted.exposure {
+        if let Some(exposure) = setup.exposure {
             camera.set_exposure_time(exposure)?;
         }
-        if let Some(gain) = wanted.gain {
+        if let Some(gain) = setup.gain {
             camera.set_gain(gain)?;
         }
-        set_frame_rate(&camera, wanted.fps);
+        set_frame_rate(&camera, setup.fps);
 
-        let packet = negotiate_packet(&camera, wanted.packet.or(fake.then_some(FAKE_PACKET)))?;
+        let packet = negotiate_packet(&camera, setup.packet.or(fake.then_some(FAKE_PACKET)))?;
         let stream = camera.create_stream()?;
         let payload = usize::try_from(camera.payload()?).unwrap_or_default();
         for _ in 0..BUFFERS {
@@ -233,11 +233,11 @@ fn choose_format(camera: &::aravis::Camera, wanted: Option<PixelFormat>) -> Resu
     Ok(format)
 }
 
-fn set_region(camera: &::aravis::Camera, wanted: &Wanted) -> Result<(usize, usize), DeviceError> {
+fn set_region(camera: &::aravis::Camera, setup: &Setup) -> Result<(usize, usize), DeviceError> {
     let width_most = camera.width_bounds()?.1;
     let height_most = camera.height_bounds()?.1;
-    let width = wanted.width.unwrap_or(width_most.min(SENSOR.0));
-    let height = wanted.height.unwrap_or(height_most.min(SENSOR.1));
+    let width = setup.width.unwrap_or(width_most.min(SENSOR.0));
+    let height = setup.height.unwrap_or(height_most.min(SENSOR.1));
 
     let fits = |side: i32, most: i32| side > 0 && side <= most && side % 4 == 0;
     if !fits(width, width_most) || !fits(height, height_most) {

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use ::aravis::Aravis;
 
-use self::device::{Device, Wanted};
+use self::device::{Device, Setup};
 use self::shared::Shared;
 use super::{Camera, CameraError, CameraHealth, CameraSettings, Controls, Frame};
 use crate::clock::Moment;
@@ -39,8 +39,8 @@ impl GigeCamera {
     /// [`CameraError::BadSource`] when it cannot be used right now; says why. It recovers from later
     /// failures by itself.
     pub fn open(source: &str, settings: CameraSettings) -> Result<Self, CameraError> {
-        let wanted = Wanted::parse(source, settings.fps)?;
-        if wanted.id == "list" {
+        let setup = Setup::parse(source, settings.fps)?;
+        if setup.id == "list" {
             return Err(CameraError::BadSource(listing()));
         }
 
@@ -50,14 +50,14 @@ impl GigeCamera {
             .spawn(move || {
                 // Opened here, so that Aravis's thread that receives packets inherits the priority.
                 crate::priority::raise_with_children(Place::Wire);
-                match Device::open(&wanted) {
+                match Device::open(&setup) {
                     Ok(device) => {
                         let shared = Arc::new(Shared::new(settings.clock, &device));
                         let _ = tell.send(Ok(((device.width, device.height), Arc::clone(&shared))));
-                        worker::run(&shared, &wanted, device);
+                        worker::run(&shared, &setup, device);
                     }
                     Err(error) => {
-                        let _ = tell.send(Err(format!("{}: {error}; {}", wanted.id, listing())));
+                        let _ = tell.send(Err(format!("{}: {error}; {}", setup.id, listing())));
                     }
                 }
             })

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::device::{Device, Wanted};
+use super::device::{Device, Setup};
 use super::session::Session;
 use super::shared::{Shared, words};
 
@@ -10,13 +10,13 @@ use super::shared::{Shared, words};
 const RETRY: Duration = Duration::from_millis(300);
 
 /// Streams from `device`, and from the same camera opened anew when it is lost, until told to stop.
-pub fn run(shared: &Shared, wanted: &Wanted, device: Device) {
+pub fn run(shared: &Shared, setup: &Setup, device: Device) {
     let mut number = 0;
     let mut changes = Vec::new();
     let mut connected = Some(device);
 
     while !shared.stopping() {
-        let trouble = match connected.take().map_or_else(|| Device::open(wanted), Ok) {
+        let trouble = match connected.take().map_or_else(|| Device::open(setup), Ok) {
             Ok(device) => {
                 shared.set_condition(Ok(words(&device)));
                 Session::new(shared, device, &mut number, &mut changes).stream()

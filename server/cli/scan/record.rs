@@ -18,7 +18,7 @@ use crate::lens;
 use crate::notices::tell;
 use crate::scans::benchmark::SEED;
 use crate::scans::recorded::{FOCAL_POWERS, HASTE, POSES, evenly_spread};
-use crate::scans::recording::{Bench, Devices, PhantomBench, RecordError, Stepper, StepperError, record};
+use crate::scans::recording::{Devices, PhantomPoses, PoseSource, RecordError, Stepper, StepperError, record};
 use crate::simulation::phantom::Trajectory;
 
 /// Arguments of `parfocal scan record`.
@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let interrupt = Interrupt::listen("stopping after this pose".to_owned())?;
     let progress = bar(arguments.poses, 0);
 
-    let (mut bench, header) = match &arguments.lens {
+    let (mut source, header) = match &arguments.lens {
         None if arguments.camera == "phantom" => phantom(arguments),
         None => Err(format!("name the lens in front of `{}` with --lens", arguments.camera).into()),
         Some(lens) => devices(arguments, lens, &interrupt, &progress),
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     progress.set_position(recording.folder().poses().len() as u64);
     progress.reset_eta();
 
-    let outcome = record(&mut recording, bench.as_mut(), &|| interrupt.asked(), &|| progress.inc(1));
+    let outcome = record(&mut recording, source.as_mut(), &|| interrupt.asked(), &|| progress.inc(1));
     progress.finish_and_clear();
     let done = recording.folder().poses().len();
     let out = arguments.out.display();
@@ -89,14 +89,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn phantom(arguments: &Arguments) -> Result<(Box<dyn Bench>, Header), Failure> {
+fn phantom(arguments: &Arguments) -> Result<(Box<dyn PoseSource>, Header), Failure> {
     if arguments.calibration.is_some() {
         return Err("the phantom's sensor needs no calibration: leave out --calibration, or give a --lens".into());
     }
 
     let trajectory = Trajectory::new(arguments.seed, arguments.poses, HASTE);
     let header = header(arguments, "brain phantom, held still at each pose (simulated)", None, true);
-    Ok((Box::new(PhantomBench::new(trajectory)), header))
+    Ok((Box::new(PhantomPoses::new(trajectory)), header))
 }
 
 fn devices(
@@ -104,7 +104,7 @@ fn devices(
     lens: &str,
     interrupt: &Interrupt,
     progress: &ProgressBar,
-) -> Result<(Box<dyn Bench>, Header), Failure> {
+) -> Result<(Box<dyn PoseSource>, Header), Failure> {
     let calibration = arguments.calibration.as_deref().map(calibration::read).transpose()?;
     let clock = Arc::new(SystemClock);
     let_lenses_go_first_beside_an_interrupt()?;

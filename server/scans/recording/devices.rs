@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use std::{fmt, io};
 
-use super::{Bench, RecordError, Taken};
+use super::{PoseSource, RecordError, Taken};
 use crate::camera::recorded::LEAST_SIDE;
 use crate::camera::{Camera, CameraError, FrameImage};
 use crate::clock::{Clock, Moment};
@@ -86,7 +86,7 @@ pub struct Devices {
     pub clock: Arc<dyn Clock>,
 }
 
-impl Bench for Devices {
+impl PoseSource for Devices {
     fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError> {
         self.stepper.go(pose)?;
         let pictures = powers.iter().map(|&power| self.picture(power)).collect::<Result<Vec<_>, _>>()?;

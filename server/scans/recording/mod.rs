@@ -10,7 +10,7 @@ pub use devices::{Devices, Stepper, StepperError};
 pub use from_stack::{Cut, CutError, Window, from_stack, windows};
 pub use import::{Imported, import};
 pub use import_error::ImportError;
-pub use phantom::PhantomBench;
+pub use phantom::PhantomPoses;
 
 use super::recorded::{Stack as PatchStack, capture_order, levels_at};
 use crate::camera::recorded::{Recording, ScanError, Shot};
@@ -18,8 +18,8 @@ use crate::camera::{CameraError, recorded::LEAST_SIDE};
 use crate::imaging::{GrayImage, PatchArea};
 use crate::lens::{FocalPower, LensError};
 
-/// A setup that scans are recorded with.
-pub trait Bench {
+/// Where the pictures of a scan's poses come from: devices at a bench, or a simulation.
+pub trait PoseSource {
     /// Goes to pose `pose` (from 1) and takes a picture at each of `powers`, in this order.
     ///
     /// # Errors
@@ -76,7 +76,7 @@ pub enum RecordError {
 /// [`RecordError::Stopped`] when it was told to stop; else when something failed.
 pub fn record(
     recording: &mut Recording,
-    bench: &mut dyn Bench,
+    source: &mut dyn PoseSource,
     stop: &dyn Fn() -> bool,
     progress: &dyn Fn(),
 ) -> Result<(), RecordError> {
@@ -91,7 +91,7 @@ pub fn record(
         let order = capture_order(seed, pose - 1, powers.len());
         let in_order: Vec<FocalPower> = order.iter().map(|&position| powers[position]).collect();
 
-        let taken = bench.take(pose, &in_order)?;
+        let taken = source.take(pose, &in_order)?;
         recording.store(&shot(pose, &in_order, taken))?;
         progress();
     }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Bench, RecordError, Taken};
+use super::{PoseSource, RecordError, Taken};
 use crate::camera::CameraError;
 use crate::imaging::{Calibration, GrayImage, MosaicFrame, Reconstructor, RgbImage};
 use crate::lens::FocalPower;
@@ -10,20 +10,20 @@ use crate::scans::recorded::put_square;
 use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH, Trajectory};
 
 /// The poses of a [`Trajectory`].
-pub struct PhantomBench {
+pub struct PhantomPoses {
     trajectory: Trajectory,
     reconstructor: Reconstructor,
 }
 
-impl PhantomBench {
-    /// A bench at which `trajectory` is replayed.
+impl PhantomPoses {
+    /// The poses of `trajectory`, one after another.
     #[must_use]
     pub fn new(trajectory: Trajectory) -> Self {
         Self { trajectory, reconstructor: Reconstructor::new(&Calibration::default()) }
     }
 }
 
-impl Bench for PhantomBench {
+impl PoseSource for PhantomPoses {
     fn take(&mut self, pose: usize, powers: &[FocalPower]) -> Result<Taken, RecordError> {
         let beyond = || CameraError::BadSource(format!("the trajectory has no pose {pose}"));
         let still = pose.checked_sub(1).and_then(|index| self.trajectory.still(index)).ok_or_else(beyond)?;

@@ -26,8 +26,8 @@ use uuid::Uuid;
 
 pub const PARTICIPANT: &str = "S-01";
 
-/// A bench.
-pub struct Bench {
+/// A server on a folder of its own, without HTTP.
+pub struct Trial {
     pub store: Store,
     pub conductor: Conductor,
     pub clock: Arc<ManualClock>,
@@ -57,7 +57,7 @@ pub fn known() -> Vec<PolicyName> {
     Registry::standard().entries().into_iter().map(|entry| entry.name).collect()
 }
 
-impl Bench {
+impl Trial {
     /// A server on `folder`, just started.
     pub async fn start(folder: &Path) -> Self {
         Self::start_with(folder, None, 7).await
