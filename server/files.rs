@@ -105,6 +105,7 @@ mod tests {
             replace(&file, text.as_bytes()).unwrap();
             assert_eq!(fs::read_to_string(&file).unwrap(), text);
         }
+
         // A folder of that name: it cannot be written, and stays.
         let occupied = folder.path().join("figure.svg");
         fs::create_dir(&occupied).unwrap();
@@ -122,6 +123,7 @@ mod tests {
             writer.flush()?;
             Err(io::ErrorKind::StorageFull.into())
         };
+
         assert_eq!(replace_with(&path, full).unwrap_err().kind(), io::ErrorKind::StorageFull);
         assert_eq!(fs::read(&path).unwrap(), b"before");
         assert_eq!(folder.path().read_dir().unwrap().count(), 1);
@@ -156,6 +158,7 @@ mod tests {
             assert_eq!(make_private(&path).is_ok(), before != 0o1777);
             assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o7777, after);
         }
+
         assert_eq!(make_private(&folder.path().join("missing")).unwrap_err().kind(), io::ErrorKind::NotFound);
     }
 

@@ -65,6 +65,7 @@ impl Plot {
             self.body,
             "<rect x=\"{LEFT}\" y=\"{top}\" width=\"{width}\" height=\"{PANEL}\" fill=\"none\" stroke=\"#cccccc\"/>"
         );
+
         self.text(LEFT, top - 5.0, "start", up.label);
         self.text(LEFT - 5.0, top + 10.0, "end", &up.to.to_string());
         self.text(LEFT - 5.0, bottom, "end", &up.from.to_string());
@@ -85,6 +86,7 @@ impl Plot {
                 x = LEFT;
                 y += ROW;
             }
+
             let swatch = y - 6.0;
             let _ =
                 writeln!(self.body, "<rect x=\"{x:.1}\" y=\"{swatch}\" width=\"12\" height=\"4\" fill=\"{colour}\"/>");
@@ -127,6 +129,7 @@ impl Panel<'_> {
             "<polyline points=\"{places}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\">\
              <title>{title}</title></polyline>"
         );
+
         self.plot.key(name, colour);
     }
 
@@ -146,6 +149,7 @@ impl Panel<'_> {
                 let _ = writeln!(self.plot.body, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\"/>");
             }
         }
+
         self.plot.body.push_str("</g>\n");
         self.plot.key(name, colour);
     }
@@ -188,6 +192,7 @@ mod tests {
             let rest = line.split_once(&format!(" {name}=\"")).unwrap().1;
             rest.split_once('"').unwrap().0.parse().unwrap()
         };
+
         swatches
             .map(|pair| {
                 let name = pair[1].split_once('>').unwrap().1.strip_suffix("</text>").unwrap();

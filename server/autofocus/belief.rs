@@ -274,6 +274,7 @@ fn target(focal_power: f64, belief: &[f32]) -> f64 {
             } else {
                 &mut above
             };
+
             *side += f64::from(*share);
         }
 
@@ -360,6 +361,7 @@ mod tests {
             }
             best(&belief)
         };
+
         assert!((belief(&[(20, 1.0)]) - 0.5).abs() < 1e-9);
         // Two neighbours alike: anywhere between them is in focus of both, and as far from both together.
         assert!((0.5..=0.525).contains(&belief(&[(20, 0.5), (21, 0.5)])));
@@ -403,8 +405,10 @@ mod tests {
                 trace.input(&stripes(contrast).into(), 0.5);
                 trace.aim(0.5, &certain(0.5))
             };
+
             (0..frames).map(aim).collect()
         };
+
         // As sharp as ever: it stands, for ever so long.
         assert!(aims(40.0, 200).iter().all(|aim| (aim - 0.5).abs() < 1e-9));
         // A third less sharp: once that shows, it looks aside.
@@ -421,6 +425,7 @@ mod tests {
             trace.input(&View { patch: flat, wider }, 0.5);
             (trace.aim(0.5, &certain(0.9)) - 0.5).abs() < 1e-9
         };
+
         assert!(stands([None; 2]) && stands([Some(flat); 2]));
         assert!(!stands([Some(flat), Some(stripes)]));
     }
@@ -479,6 +484,7 @@ mod tests {
             belief[bin] += 0.02;
             belief
         };
+
         // The middle is best under both, and yet nothing would be learned there.
         assert!((target(0.5, &likelier(33)) - 0.56).abs() < 1e-9);
         assert!((target(0.5, &likelier(7)) - 0.44).abs() < 1e-9);

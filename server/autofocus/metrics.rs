@@ -106,6 +106,7 @@ fn product(left: &Square, right: &Square) -> Square {
             }
         }
     }
+
     out
 }
 
@@ -252,6 +253,7 @@ mod tests {
             let noise = ((i * i * 37 + i * 11) % 256) as f64 * 0.5;
             (noise + 60.0 * (i as f64 / 90.0).sin() + 80.0) as f32
         }));
+
         assert_close(mgm(&textured), 210.861_969, 1e-3);
         assert_close(mlr(&textured), 1.391_609_47, 1e-5);
     }

@@ -250,6 +250,7 @@ mod tests {
                 missed += usize::from(displacement(&before, &now) != (dx, dy));
             }
         }
+
         assert!(missed <= 4, "{missed} of 80 missed");
     }
 

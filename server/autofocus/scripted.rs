@@ -39,6 +39,7 @@ pub fn with_file(registry: Registry, name: &PolicyName) -> Registry {
                     |module| Box::new(Scripted::new(module)),
                 )
             };
+
             registry.with(name.as_str(), SUMMARY, make).weighing(name.as_str(), &bytes)
         }
         Err(reason) => registry.without(name.as_str(), SUMMARY, &reason),
@@ -166,6 +167,7 @@ mod tests {
             let target = step(height);
             assert!((target - expected).abs() < 1e-9, "{height}: {target}");
         }
+
         for height in 0..20u8 {
             let target = step(f32::from(50 - height));
             assert!(height == 0 || (target - 0.45).abs() < 1e-9);
@@ -191,6 +193,7 @@ mod tests {
             error("wrong-shape.pt")
                 .contains("it returned Float of shape [8]; it must have forward(patches [8, 32, 32]")
         );
+
         assert!(error("flat-only.pt").contains("it returned no numbers"), "with texture in view");
         assert!(error("pytorch.json").contains("is not TorchScript"));
         assert!(error("nothing.pt").contains("cannot read"));

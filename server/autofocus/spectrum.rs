@@ -1,7 +1,8 @@
 //! Measures how blurred a patch is: the energy in bands of spatial frequency, as logarithms.
 //!
-//! A Gaussian of standard deviation s multiplies the energy at angular frequency w by exp(-(s w)²), so a change of blur
-//! shifts each band's logarithm by an amount that depends on neither contrast nor texture.
+//! A Gaussian of standard deviation s multiplies the energy at angular frequency w by exp(-(s w)²), so
+//! a change of blur shifts each band's logarithm by an amount that depends on neither contrast nor
+//! texture.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -236,6 +237,7 @@ mod tests {
             let seen = (0..200).filter(|_| spectrum(&noise(sd)).shows_detail()).count();
             assert!(seen <= 2, "noise of {sd}: {seen} of 200");
         }
+
         let mut texture = noise(2.0);
         for (value, wave) in texture.0.iter_mut().zip(wave(2.0).0) {
             *value += 0.1 * (wave - 128.0);
@@ -245,9 +247,9 @@ mod tests {
 
     #[test]
     fn the_transform_is_the_textbook_one() {
-        // A wave of amplitude A at frequency (5, 0) under a Hann window (weights 1/4, 1/2, 1/4 on neighbouring
-        // frequencies along each axis) has |X|² = (A/2 · 512² · ...)²: summed over the half plane, with both signs of
-        // the row frequency, (A/2 · 32 · 32)² · (3/8)² by Parseval.
+        // A wave of amplitude A at frequency (5, 0) under a Hann window (weights 1/4, 1/2, 1/4 on
+        // neighbouring frequencies along each axis) has |X|² = (A/2 · 512² · ...)²: summed over the half
+        // plane, with both signs of the row frequency, (A/2 · 32 · 32)² · (3/8)² by Parseval.
         let energy = band_energies(&transform(&wave(5.0).0, 128.0, &TABLES));
         let expected = (25.0f32 * 1024.0 * 0.375).powi(2);
         let found = energy.iter().sum::<f32>();

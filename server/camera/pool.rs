@@ -71,6 +71,7 @@ mod tests {
             samples.fill(9);
             drop(pool.frame(samples).unwrap());
         }
+
         assert_eq!(held.samples(), [7; 16]);
     }
 }

@@ -204,6 +204,7 @@ fn evaluated(arguments: &Arguments) -> Result<Shard, Failure> {
         weights_folder: arguments.weights.as_ref().map(|folder| folder.display().to_string()),
         weights,
     };
+
     Ok(Shard::new(part, subject, blank, outcomes?))
 }
 
@@ -373,6 +374,7 @@ fn simulated(arguments: &Arguments, part: Part) -> Result<Scans, Failure> {
             frames: FRAMES,
         }
     };
+
     Ok(Scans { set: Box::new(PartOf::new(set, part)), seed, count, between: None })
 }
 

@@ -227,6 +227,7 @@ fn bound_real_time() -> std::io::Result<()> {
             tracing::error!("a thread kept a processor for seconds; real-time priority is off until the next start");
         }
     });
+
     Ok(())
 }
 
@@ -259,6 +260,7 @@ async fn open_store(
         weights: registry.weights(),
         seed: arguments.seed,
     };
+
     Ok(Store::open(&arguments.data_dir, &run).await?)
 }
 

@@ -57,11 +57,13 @@ impl Shared {
             let name: String = name.chars().take(40).collect();
             ConductError::NotFound(format!("there is no protocol '{name}'; there are: {}", self.library.names()))
         })?;
+
         for policy in &protocol.policies {
             self.registry
                 .build(policy)
                 .map_err(|error| ConductError::Conflict(format!("protocol '{name}' cannot run: {error}")))?;
         }
+
         Ok(protocol.clone())
     }
 

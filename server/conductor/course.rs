@@ -209,6 +209,7 @@ impl Course {
             Some(action) => decide(&self.state, stop.by, action, stop.at)?,
             None => decide_time(&self.state, stop.at),
         };
+
         // An action that changes nothing now may change something once the events being written are
         // there.
         if kinds.is_empty() && !(self.writing && stop.action.is_some()) {
@@ -270,6 +271,7 @@ impl Course {
             EventKind::Resumed | EventKind::Unblinded { .. } => self.begin_at,
             _ => None,
         };
+
         self.state.apply(&event);
         self.grace.apply(&event.kind, at);
         self.times.push(at);
@@ -303,6 +305,7 @@ impl Course {
             (Phase::Notice | Phase::Closing, _) => (Drive::Hold { at: None }, None),
             (Phase::Ready | Phase::Completed | Phase::Aborted, _) => return None,
         };
+
         Some(Command::Drive { drive, segment })
     }
 

@@ -24,8 +24,8 @@ pub enum ConductError {
     Storage(String),
     /// The session's protocol is of another version, or damaged.
     #[error(
-        "session {session} was made with a protocol that this version cannot read ({reason}); go on with the version that made it, or \
-         with another folder by --data-dir"
+        "session {session} was made with a protocol that this version cannot read ({reason}); \
+         go on with the version that made it, or with another folder by --data-dir"
     )]
     Unreadable {
         /// The session.

@@ -126,6 +126,7 @@ impl Shared {
             let place = reader.last_commanded(segment).await?;
             course.was_interrupted_at(place.unwrap_or(course.protocol.start));
         }
+
         let kinds = decide_restart(&course.state, inspected);
         let events = course.number(Role::System, kinds, self.clock.now(), self.clock.wall());
         self.store.append_events(course.session(), &events).await?;
@@ -157,6 +158,7 @@ impl Shared {
             // A failure is shown on the screens, and recording is tried again.
             let _ = shared.record_stops(&mut pen).await;
         });
+
         let _ = timeout(PROMPTLY, recording).await;
     }
 
@@ -174,6 +176,7 @@ impl Shared {
                     live.forget_what_is_done_with();
                     return Ok(());
                 };
+
                 let (events, stops) = course.unrecorded();
                 (course.session(), events.to_vec(), stops)
             };

@@ -22,6 +22,7 @@ impl Conductor {
                 }
             }
         };
+
         // Apart, because it waits for the disk, and the time does not.
         let recording = async {
             loop {
@@ -32,6 +33,7 @@ impl Conductor {
                 }
             }
         };
+
         tokio::join!(keeping_time, recording);
     }
 
@@ -82,6 +84,7 @@ impl Conductor {
                 .and_then(|course| Some((course.session(), course.state.segment()?, course.state.inspected(now))));
             (clock, live.course.as_ref().is_some_and(Course::is_unrecorded))
         };
+
         if let Some((session, segment, inspected)) = clock
             && let Err(error) = self.shared.store.note_clock(session, segment, inspected).await
         {

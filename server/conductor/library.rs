@@ -73,6 +73,7 @@ impl Library {
             let protocol = Protocol::parse(source, file, known)?;
             protocols.insert(protocol.name.clone(), protocol);
         }
+
         if let Some(folder) = folder {
             protocols.extend(read_folder(folder, known)?);
         }
@@ -102,6 +103,7 @@ impl Library {
             settings: protocol.settings(),
             segment_seconds: protocol.segment_limit.as_secs(),
         };
+
         self.protocols.values().map(summary).collect()
     }
 }
@@ -111,6 +113,7 @@ fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, P
         let path = path.to_owned();
         move |error| LibraryError::Unreadable { path, error }
     };
+
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable(folder))? {
         let path = entry.map_err(unreadable(folder))?.path();
@@ -118,6 +121,7 @@ fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, P
             files.push(path);
         }
     }
+
     files.sort();
     let mut protocols = BTreeMap::new();
     for path in files {
@@ -128,6 +132,7 @@ fn read_folder(folder: &Path, known: &[PolicyName]) -> Result<BTreeMap<String, P
         }
         protocols.insert(protocol.name.clone(), protocol);
     }
+
     Ok(protocols)
 }
 

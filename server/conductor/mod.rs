@@ -144,6 +144,7 @@ impl Conductor {
             Some(session) => Course::load(store.reader(), &run_clock, session).await?,
             None => None,
         };
+
         let shared = Shared {
             store,
             control,
@@ -158,6 +159,7 @@ impl Conductor {
             changed: Notify::new(),
             to_record: Notify::new(),
         };
+
         if let Some(course) = course {
             shared.take_up(course).await?;
         }

@@ -77,6 +77,7 @@ impl Shared {
             course.state.keep_answer(answer.segment, &answer.question, given);
             self.publish(&live);
         }
+
         unless_taken(kept)
     }
 

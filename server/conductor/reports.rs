@@ -171,6 +171,7 @@ impl Conductor {
             let text = event.kind.in_words(|segment| course.setting(segment));
             lines.push((clocks.wall(run, event.at), LogLine { at: event.wall, by: event.by, text }));
         }
+
         let made = lines.first().map(|(at, _)| *at);
         for (_, run, DeviceEvent { wall, at, device, message, .. }) in devices {
             let at = clocks.wall(run, at);
@@ -179,6 +180,7 @@ impl Conductor {
                 lines.push((at, LogLine { at: wall, by: Role::System, text }));
             }
         }
+
         lines.sort_by_key(|(at, _)| *at);
         Ok(lines.into_iter().map(|(_, line)| line).collect())
     }
@@ -204,8 +206,10 @@ impl Conductor {
                 changed: standing.revision > 1,
                 devices_disagree: standing.disagrees,
             };
+
             lines.push((clocks.said(run, answer.stamp.at, &answer.origin), line));
         }
+
         lines.sort_by_key(|(given, _)| *given);
         Ok(lines.into_iter().map(|(_, line)| line).collect())
     }
@@ -228,6 +232,7 @@ fn settings(course: &Course) -> Vec<SettingDetail> {
             }),
         }
     };
+
     course.state.plan().segments.iter().zip(1..).map(detail).collect()
 }
 

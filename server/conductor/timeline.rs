@@ -132,6 +132,7 @@ impl Conductor {
             measured: point.measured,
             optimal: point.optimal,
         };
+
         let comments = reader.comments(session).await?;
         let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
             at: comment.stamp.wall,
@@ -141,6 +142,7 @@ impl Conductor {
             late: comment.late,
             said: comment.said,
         });
+
         let answers = reader.answers(session).await?;
         let events: Vec<(f64, &EventKind)> =
             events.iter().map(|(at, event)| (seconds(start, *at), &event.kind)).collect();
@@ -172,6 +174,7 @@ fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start
             late: answer.late,
         }
     });
+
     told.collect()
 }
 
@@ -190,6 +193,7 @@ fn settings(course: &Course, events: &[(f64, &EventKind)]) -> Vec<SettingSpan> {
             _ => {}
         }
     }
+
     spans
 }
 
@@ -219,6 +223,7 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
                     let from = if restarted && inspecting { ended } else { at };
                     spans.push(PauseSpan { from, to: None, reason: kind.in_words(|_| 0) });
                 }
+
                 before = *inspected_ms;
             }
             EventKind::Resumed | EventKind::Completed | EventKind::Aborted { .. } => {
@@ -230,6 +235,7 @@ fn pauses(events: &[(f64, &EventKind)], points: &[TimelinePoint]) -> Vec<PauseSp
             _ => {}
         }
     }
+
     spans
 }
 
@@ -264,6 +270,7 @@ mod tests {
             // During the questions no clock runs.
             (80.0, restarted(20_000)),
         ];
+
         let events: Vec<(f64, &EventKind)> = events.iter().map(|(at, kind)| (*at, kind)).collect();
         let at = |seconds| TimelinePoint { setting: 1, seconds, frame: 1, asked: 0.5, measured: None, optimal: None };
         let spans = |points: &[TimelinePoint]| -> Vec<(f64, Option<f64>)> {

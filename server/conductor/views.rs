@@ -22,6 +22,7 @@ pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (Surg
         latest_comments: course.latest_comments.iter().rev().cloned().collect(),
         log: log(course),
     };
+
     (surgeon, operator)
 }
 

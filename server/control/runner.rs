@@ -104,6 +104,7 @@ impl Runner {
             }
             Err(RecvTimeoutError::Disconnected) => Err(Failure::Panicked("its thread ended".into())),
         };
+
         self.asked_at = None;
         self.proven = true;
         Some(answer)

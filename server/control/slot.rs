@@ -33,6 +33,7 @@ impl<T> LatestSlot<T> {
             state.overwritten += u64::from(old.is_some());
             old
         };
+
         self.fresh.notify_one();
     }
 

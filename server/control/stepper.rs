@@ -131,6 +131,7 @@ impl Stepper {
             held: self.hold_reason().map(|reason| reason.hold),
             optimal: frame.truth.map(|truth| truth.optimal),
         };
+
         let belief = advice.and_then(|advice| advice.belief);
         Ok(ControlledFrame { frame, patch, content_area: self.content_area, record, belief })
     }
@@ -151,6 +152,7 @@ impl Stepper {
             Drive::Hold { .. } => return Err(HoldReason::new(Hold::Paused, "paused on request")),
             Drive::Policy { .. } => {}
         }
+
         if let Some(fault) = &self.lens_fault {
             // Frames from a lens that does not move would mislead the policy.
             return Err(fault.clone());

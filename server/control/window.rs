@@ -35,6 +35,7 @@ impl LatencyFigures {
             let rank = (latencies.len() * percent).div_ceil(100).saturating_sub(1);
             latencies.get(rank).copied().unwrap_or(0)
         };
+
         Self { steps: latencies.len(), p50: percentile(50), p99: percentile(99) }
     }
 }

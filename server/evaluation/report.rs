@@ -97,16 +97,18 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(
-            "| policy | MAE ± sd | 95 % CI | in focus | travel / frame | reversals / s | paper: MAE ± sd | in focus |\n\
+            "| policy | MAE ± sd | 95 % CI | in focus | travel / frame | reversals / s \
+             | paper: MAE ± sd | in focus |\n\
              |---|---|---|---|---|---|---|---|\n",
         );
 
         let paper = if self.subject.between.is_some() { ROBOTIC } else { SIMULATED };
         for row in &self.rows {
-            let paper = paper
-                .iter()
-                .find(|paper| paper.0 == row.policy)
-                .map_or_else(|| "– | –".to_owned(), |(_, mae, sd, share)| format!("{mae:.3} ± {sd:.3} | {share:.1} %"));
+            let paper = paper.iter().find(|paper| paper.0 == row.policy);
+            let paper = match paper {
+                Some((_, mae, sd, share)) => format!("{mae:.3} ± {sd:.3} | {share:.1} %"),
+                None => "– | –".to_owned(),
+            };
             let _ = writeln!(
                 text,
                 "| {} | {:.3} ± {:.3} | {:.3}–{:.3} | {:.1} % | {:.4} | {:.2} | {paper} |",

@@ -174,6 +174,7 @@ mod tests {
                 found += 1;
             }
         }
+
         assert_eq!(found, ASSETS.len(), "a file stands in the table twice");
     }
 }

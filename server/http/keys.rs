@@ -92,6 +92,7 @@ impl Keys {
             getrandom::fill(&mut bytes).map_err(KeyError::Random)?;
             Ok(hex::encode(bytes))
         };
+
         Ok(Self { surgeon: key()?, operator: key()?, researcher: key()? })
     }
 

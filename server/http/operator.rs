@@ -44,7 +44,9 @@ struct Page {
 }
 
 /// The operator's page.
-#[utoipa::path(get, path = "/operator", tag = "operator", responses((status = 200, description = "The page", content_type = "text/html")))]
+#[utoipa::path(get, path = "/operator", tag = "operator", responses(
+    (status = 200, description = "The page", content_type = "text/html"),
+))]
 async fn page(
     _: Operator,
     roles: Roles,
@@ -64,6 +66,7 @@ async fn page(
         code_pattern: CODE_PATTERN,
         code_hint: CODE_HINT,
     };
+
     page.render().map(Html).map_err(|_| Error::Internal)
 }
 
@@ -137,7 +140,9 @@ struct NewSession {
 type View = Json<Option<Arc<OperatorView>>>;
 
 /// The session under way; null when there is none.
-#[utoipa::path(get, path = "/api/operator/session", tag = "operator", responses((status = 200, body = Option<OperatorView>)))]
+#[utoipa::path(get, path = "/api/operator/session", tag = "operator", responses(
+    (status = 200, body = Option<OperatorView>),
+))]
 async fn session(_: Operator, State(app): State<AppState>) -> View {
     Json(app.operator_view.borrow().clone())
 }

@@ -191,6 +191,7 @@ mod tests {
             taken.0.make_members().unwrap();
             taken
         };
+
         let _members: Vec<_> = (0..MEMBERS.host).map(member).collect();
         let (one_more, _stay) = places.take(HOST);
         assert_eq!(one_more.make_members(), Err(Full));

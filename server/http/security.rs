@@ -133,6 +133,7 @@ mod tests {
             }
             is_same_origin(&headers, "localhost:8080")
         };
+
         assert!(verdict(&[]));
         assert!(verdict(&[("origin", "http://localhost:8080"), ("sec-fetch-site", "same-origin")]));
         assert!(!verdict(&[("origin", "http://localhost:8081")]));

@@ -71,6 +71,7 @@ mod tests {
             settling_ms: 15.5,
             hysteresis: 0.008,
         };
+
         let text = measured.to_toml().unwrap();
         assert_eq!(MeasuredDynamics::from_toml(&text).unwrap(), measured);
         assert_eq!(measured.dynamics().delay, Duration::from_micros(3250));

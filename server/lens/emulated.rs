@@ -32,6 +32,7 @@ impl EmulatedLens {
             delay: millis(options.take("delay")?, usual.glass.delay),
             settling: millis(options.take("settling")?, usual.glass.settling),
         };
+
         let play = options.take("hysteresis")?.map_or(Ok(usual.play), play)?;
         let temperature: Option<f64> = options.take("temperature")?;
         let fault: Option<Fault> = options.take("fault")?;

@@ -156,6 +156,7 @@ impl Lens for SimulatedLens {
             self.glass.command(now, target);
             self.known.command(now, target);
         }
+
         Ok(())
     }
 

@@ -99,6 +99,7 @@ mod tests {
             let share = if at < 0.007 { 0.0 } else { 1.0 - 20_f64.powf(-(at - 0.007) / 0.025) };
             Sample { at, share: share + if step.is_multiple_of(2) { 0.02 } else { -0.02 } }
         };
+
         let fit = Fit::of(&(0..100).map(seen).collect::<Vec<_>>(), 0.3);
         assert!((fit.delay - 0.007).abs() < 0.001 && (fit.settling - 0.025).abs() < 0.002, "{fit:?}");
         assert!((fit.rms - 0.02).abs() < 0.005, "{fit:?}");

@@ -59,10 +59,12 @@ mod tests {
                 cover.advance();
                 cover.detail()
             });
+
             let details: Vec<f64> = details.collect();
             assert!(details.iter().all(|detail| !(0.04..1.0).contains(detail)));
             covered += details.iter().map(|&detail| u32::from(detail < 1.0)).sum::<u32>();
         }
+
         // Covered for (e^5 - e) / 4 = 36 frames at a time on average, free for 85.
         let share = f64::from(covered) / 100_000.0;
         assert!((0.25..0.35).contains(&share), "{share}");

@@ -72,6 +72,7 @@ impl Defocus {
                 fill_block_means::<COARSE>(&fine, fine_side, coarse_side, source);
             });
         }
+
         let reach = if sigma < LEAST_SIGMA { 0 } else { (4.0 * sigma).ceil() as usize };
         let mut levels = vec![0.0; side * side];
         let look = |reach: usize, side: usize, source: &mut [f32]| {
@@ -104,6 +105,7 @@ impl Defocus {
             let kernel = || single(gaussian::kernel(sigma, reach));
             self.blur(side, reach, Blur { sigma, spot, kernel }, look, &mut levels);
         }
+
         repeated(&levels, side)
     }
 
@@ -180,6 +182,7 @@ fn blur_rows(source: &[f32], side: usize, kernel: &[f32], width: usize, rows: &m
                     *sum += weight * value;
                 }
             }
+
             *out = sums;
         }
     }
@@ -195,6 +198,7 @@ fn blur_columns(rows: &[f32], kernel: &[f32], width: usize, out: &mut [f32]) {
                     *sum += weight * value;
                 }
             }
+
             *out = sums;
         }
     }
@@ -212,6 +216,7 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, width: usize, su
             *after = sum;
         }
     }
+
     let mut area = 0.0;
     out.fill(0.0);
     for offset in 0..=2 * reach {
@@ -230,6 +235,7 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, width: usize, su
             }
         }
     }
+
     for value in out.iter_mut() {
         *value /= area;
     }

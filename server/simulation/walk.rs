@@ -77,10 +77,12 @@ mod tests {
             walk.advance(&mut rng);
             velocities.push(walk.position() - before);
         }
+
         let correlation = |lag: usize| {
             let pairs = velocities.iter().zip(&velocities[lag..]);
             pairs.map(|(a, b)| a * b).sum::<f64>() / 200_000.0
         };
+
         assert!((correlation(0).sqrt() - 0.5).abs() < 0.02);
         assert!((correlation(20) / correlation(0) - (-1.0f64).exp()).abs() < 0.04);
     }

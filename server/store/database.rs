@@ -73,8 +73,10 @@ impl Store {
     pub async fn open(folder: &Path, run: &Run) -> Result<Self, StoreError> {
         let made = DirBuilder::new().recursive(true).mode(0o700).create(folder);
         made.map_err(|error| StoreError::folder(folder, &error))?;
+
         let lock = lock(folder)?;
         keep_private(folder);
+
         let file = folder.join(DATABASE);
         let options = SqliteConnectOptions::new()
             .filename(&file)
@@ -85,13 +87,18 @@ impl Store {
             // Checkpoints are made between batches of telemetry and by a connection of their own,
             // so that none falls on a comment's commit and nobody waits for one.
             .pragma("wal_autocheckpoint", "0");
+
+        // What people say is flushed to the disk at each commit; telemetry may lose its last seconds to a power cut.
         let trial = connect(options.clone().synchronous(SqliteSynchronous::Full)).await?;
         MIGRATOR.run(&trial).await?;
+
         let relaxed = options.synchronous(SqliteSynchronous::Normal);
         let telemetry = connect(relaxed.clone()).await?;
         let checkpoints = connect(relaxed).await?;
+
         let reader = Reader::open_file(&file).await?;
         let run = begin_run(&trial, run).await?;
+
         let inner = Inner {
             trial,
             telemetry,
@@ -102,6 +109,7 @@ impl Store {
             telemetry_counts: Counts::default(),
             _lock: lock,
         };
+
         Ok(Self { inner: Arc::new(inner) })
     }
 
@@ -152,6 +160,7 @@ impl Store {
         .bind(&event.message)
         .execute(&self.inner.telemetry)
         .await?;
+
         Ok(())
     }
 
@@ -166,6 +175,7 @@ impl Store {
             .bind(wall.to_string())
             .execute(&self.inner.trial)
             .await?;
+
         Ok(())
     }
 
@@ -187,6 +197,7 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
         .idle_timeout(None)
         .max_lifetime(None)
         .test_before_acquire(false);
+
     Ok(pool.connect_with(options).await?)
 }
 
@@ -206,6 +217,7 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     .bind(run.seed.map(u64::cast_signed))
     .execute(trial)
     .await?;
+
     Ok(done.last_insert_rowid())
 }
 
@@ -217,8 +229,8 @@ fn keep_private(folder: &Path) {
     for path in [folder.to_owned(), folder.join(LOCK)].into_iter().chain(files) {
         match make_private(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => tracing::warn!(
-                "other accounts of this machine may be able to read {}, which holds trial data ({error}); have its owner take their \
-                 rights away, or choose a folder of your own with --data-dir",
+                "other accounts of this machine may be able to read {}, which holds trial data ({error}); \
+                 have its owner take their rights away, or choose a folder of your own with --data-dir",
                 path.display()
             ),
             _ => {}
@@ -231,6 +243,7 @@ fn lock(folder: &Path) -> Result<File, StoreError> {
     let failed = |error: std::io::Error| StoreError::folder(folder, &error);
     let mut file =
         OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
@@ -240,6 +253,7 @@ fn lock(folder: &Path) -> Result<File, StoreError> {
         }
         Err(TryLockError::Error(error)) => return Err(failed(error)),
     }
+
     // Only for the message above; the lock is the kernel's.
     file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())).map_err(failed)?;
     Ok(file)

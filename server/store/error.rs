@@ -9,7 +9,8 @@ use sqlx::migrate::MigrateError;
 pub enum StoreError {
     /// Another server runs on the folder.
     #[error(
-        "the data folder {} is in use by another parfocal server (process {process}); stop that one, or choose another folder with --data-dir",
+        "the data folder {} is in use by another parfocal server (process {process}); \
+         stop that one, or choose another folder with --data-dir",
         .folder.display()
     )]
     InUse {
@@ -20,7 +21,8 @@ pub enum StoreError {
     },
     /// The database was made by a newer version.
     #[error(
-        "the database was made by a newer version of parfocal (migration {version} is unknown here); install that version or choose another folder with --data-dir; nothing was changed"
+        "the database was made by a newer version of parfocal (migration {version} is unknown here); \
+         install that version or choose another folder with --data-dir; nothing was changed"
     )]
     Newer {
         /// The migration that this version does not have.
@@ -54,8 +56,8 @@ pub enum StoreError {
     Damaged(String),
     /// The file cannot be opened.
     #[error(
-        "the database cannot be opened; you must be able to write to it and to its folder: change their permissions, or copy the data \
-         folder to a place where you can write and name it with --data-dir"
+        "the database cannot be opened; you must be able to write to it and to its folder: \
+         change their permissions, or copy the data folder to a place where you can write and name it with --data-dir"
     )]
     Shut,
     /// Another program holds it.
@@ -80,6 +82,7 @@ impl StoreError {
             }
             _ => format!("{error}; choose another folder with --data-dir"),
         };
+
         Self::Folder { folder: folder.to_owned(), reason }
     }
 }
@@ -94,6 +97,7 @@ impl From<sqlx::Error> for StoreError {
             .as_database_error()
             .and_then(sqlx::error::DatabaseError::code)
             .and_then(|code| code.parse::<u32>().ok());
+
         if code == Some(NO_ROOM_TO_SHARE) {
             return Self::Full;
         }

@@ -23,6 +23,7 @@ impl Reader {
         .bind(session.to_string())
         .fetch_all(self.pool())
         .await?;
+
         rows.iter().map(run_row).collect()
     }
 

@@ -61,6 +61,7 @@ impl Reader {
                     sqlx::query("SELECT count(*) FROM runs").execute(&mut *connection).await.map(|_| ())
                 })
             });
+
         Ok(Self { pool: pool.connect_with(options).await? })
     }
 
@@ -70,6 +71,7 @@ impl Reader {
         if let Some(newer) = applied.iter().find(|migration| !MIGRATOR.version_exists(migration.version)) {
             return Err(StoreError::Newer { version: newer.version });
         }
+
         let missing = MIGRATOR.iter().any(|ours| !applied.iter().any(|migration| migration.version == ours.version));
         if missing { Err(StoreError::Outdated) } else { Ok(()) }
     }
@@ -94,10 +96,12 @@ impl Reader {
         )
         .fetch_all(&self.pool)
         .await?;
+
         let participant = |row: &SqliteRow| {
             let (code, sessions) = (row.try_get("code")?, row.try_get("sessions")?);
             Ok(Participant { code, added: parsed(row, "wall")?, sessions })
         };
+
         rows.iter().map(participant).collect()
     }
 
@@ -108,8 +112,10 @@ impl Reader {
     pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, StoreError> {
         let rows = sqlx::query(
             "SELECT session, wall, participant, protocol, practice,
-                 (SELECT kind FROM events AS e WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
-                 (SELECT count(*) FROM events AS e WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
+                 (SELECT kind FROM events AS e
+                     WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
+                 (SELECT count(*) FROM events AS e
+                     WHERE e.session = s.session AND kind = 'segment-finished') AS finished,
                  (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
                  (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments,
                  (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
@@ -119,6 +125,7 @@ impl Reader {
         .bind(practice)
         .fetch_all(&self.pool)
         .await?;
+
         rows.iter().map(line).collect()
     }
 
@@ -149,6 +156,7 @@ impl Reader {
             known_until = start.wall.saturating_add(last.since(start.at)).unwrap_or(start.wall);
             clocks.insert(row.try_get("run")?, start);
         }
+
         Ok(RunClocks(clocks))
     }
 
@@ -169,11 +177,13 @@ impl Reader {
         .bind(session.to_string())
         .fetch_all(&self.pool)
         .await?;
+
         let event = |row: &SqliteRow| {
             let Stamp { wall, at } = stamp(row)?;
             let (device, working, message) = (row.try_get("device")?, row.try_get("working")?, row.try_get("message")?);
             Ok((row.try_get("number")?, row.try_get("run")?, DeviceEvent { wall, at, device, working, message }))
         };
+
         rows.iter().map(event).collect()
     }
 
@@ -191,6 +201,7 @@ impl Reader {
         .bind(segment.to_string())
         .fetch_optional(&self.pool)
         .await?;
+
         Ok(asked.and_then(|asked| FocalPower::new(asked).ok()))
     }
 
@@ -210,6 +221,7 @@ impl Reader {
         .bind(points.max(1))
         .fetch_all(&self.pool)
         .await?;
+
         rows.iter().map(path_point).collect()
     }
 }

@@ -29,9 +29,10 @@ impl Store {
     pub async fn keep_comment(&self, comment: &Comment) -> Result<Kept, StoreError> {
         let _turn = self.turn().await;
         let (kind, text) = said_columns(&comment.said);
+
         let done = sqlx::query(
-            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, device, sequence, client_millis, waited_ms,
-                 waited_by, late, frame, frame_run, kind, text)
+            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, device, sequence,
+                 client_millis, waited_ms, waited_by, late, frame, frame_run, kind, text)
              VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
         )
         .bind(comment.key.to_string())
@@ -52,13 +53,17 @@ impl Store {
         .bind(text)
         .execute(&self.inner.trial)
         .await?;
+
         if done.rows_affected() == 1 {
             return Ok(Kept::New);
         }
+
+        // Sent again, or another comment under the same key?
         let row = sqlx::query("SELECT session, kind, text FROM comments WHERE key = ?")
             .bind(comment.key.to_string())
             .fetch_one(&self.inner.trial)
             .await?;
+
         let same = parsed::<SessionId>(&row, "session")? == comment.session && said(&row)? == comment.said;
         Ok(if same { Kept::Before } else { Kept::KeyTaken })
     }
@@ -70,6 +75,7 @@ impl Store {
     pub async fn keep_answer(&self, answer: &Answer) -> Result<Kept, StoreError> {
         let _turn = self.turn().await;
         let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
+
         let done = sqlx::query(
             "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns, device, sequence,
                  client_millis, waited_ms, waited_by, late)
@@ -91,14 +97,18 @@ impl Store {
         .bind(answer.late)
         .execute(&self.inner.trial)
         .await?;
+
         if done.rows_affected() == 1 {
             return Ok(Kept::New);
         }
+
+        // Sent again, or another answer under the same key?
         let kept: (String, Option<String>, String, String) =
             sqlx::query_as("SELECT session, segment, question, value FROM answers WHERE key = ?")
                 .bind(answer.key.to_string())
                 .fetch_one(&self.inner.trial)
                 .await?;
+
         let segment = answer.segment.map(|segment| segment.to_string());
         let same = kept == (answer.session.to_string(), segment, answer.question.clone(), value);
         Ok(if same { Kept::Before } else { Kept::KeyTaken })
@@ -122,6 +132,7 @@ impl Store {
         .bind(nanoseconds(stamp.at))
         .execute(&self.inner.telemetry)
         .await?;
+
         Ok(())
     }
 }
@@ -136,6 +147,7 @@ impl Reader {
             .bind(session.to_string())
             .fetch_all(self.pool())
             .await?;
+
         rows.iter().map(|row| Ok((row.try_get("run")?, comment(row)?))).collect()
     }
 
@@ -146,7 +158,8 @@ impl Reader {
     pub async fn surgeon_devices(&self, session: SessionId) -> Result<Vec<DeviceReport>, StoreError> {
         let rows = sqlx::query(
             "SELECT d.device, t.holding, t.run, t.monotonic_ns
-             FROM (SELECT device FROM surgeon_devices WHERE session = ?1 UNION SELECT device FROM comments WHERE session = ?1
+             FROM (SELECT device FROM surgeon_devices WHERE session = ?1
+                 UNION SELECT device FROM comments WHERE session = ?1
                  UNION SELECT device FROM answers WHERE session = ?1) AS d
              LEFT JOIN surgeon_devices AS t ON t.session = ?1 AND t.device = d.device
              WHERE d.device IS NOT NULL ORDER BY d.device",
@@ -154,14 +167,17 @@ impl Reader {
         .bind(session.to_string())
         .fetch_all(self.pool())
         .await?;
+
         let report = |row: &SqliteRow| {
             let holding: Option<u32> = row.try_get("holding")?;
             let told = match holding {
                 Some(holding) => Some((holding, row.try_get("run")?, moment(row.try_get("monotonic_ns")?))),
                 None => None,
             };
+
             Ok(DeviceReport { device: parsed(row, "device")?, told })
         };
+
         rows.iter().map(report).collect()
     }
 
@@ -175,6 +191,7 @@ impl Reader {
             .bind(session.to_string())
             .fetch_all(self.pool())
             .await?;
+
         rows.iter().map(|row| Ok((row.try_get("run")?, answer(row)?))).collect()
     }
 }
@@ -220,6 +237,7 @@ fn origin(row: &SqliteRow) -> Result<Origin, StoreError> {
         waited_millis: row.try_get("waited_ms")?,
         waited_by: waited_by.as_deref().and_then(WaitClock::named),
     };
+
     // What older versions kept names no clock: it was the wall clock.
     Ok(origin.plausible())
 }

@@ -176,8 +176,8 @@ pub struct DeviceEvent {
 pub struct RunClocks(pub(super) BTreeMap<i64, Stamp>);
 
 impl RunClocks {
-    /// The time of day of `at` in run `run`, by the wall clock as it was when that run began; so times within a run keep
-    /// their distances when the wall clock is set.
+    /// The time of day of `at` in run `run`, by the wall clock as it was when that run began; so times
+    /// within a run keep their distances when the wall clock is set.
     #[must_use]
     pub fn wall(&self, run: i64, at: Moment) -> Timestamp {
         let Some(start) = self.0.get(&run) else { return Timestamp::UNIX_EPOCH };

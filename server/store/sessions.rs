@@ -121,6 +121,7 @@ impl Store {
         .bind(i64::try_from(inspected.as_millis()).unwrap_or(i64::MAX))
         .execute(&self.inner.telemetry)
         .await?;
+
         Ok(())
     }
 }
@@ -152,6 +153,7 @@ async fn insert_session(
     .bind(&new.commitment)
     .execute(&mut *transaction)
     .await?;
+
     for ((segment, policy), setting) in new.segments.iter().zip(1_i64..) {
         sqlx::query("INSERT INTO segments (segment, session, setting, policy) VALUES (?, ?, ?, ?)")
             .bind(segment.to_string())
@@ -161,6 +163,7 @@ async fn insert_session(
             .execute(&mut *transaction)
             .await?;
     }
+
     insert_event(&mut transaction, run, new.session, created).await?;
     Ok(transaction.commit().await?)
 }
@@ -204,6 +207,7 @@ async fn insert_event(
     .bind(payload)
     .execute(connection)
     .await?;
+
     Ok(())
 }
 
@@ -217,6 +221,7 @@ impl Reader {
             .bind(session.to_string())
             .fetch_optional(self.pool())
             .await?;
+
         let Some(row) = row else { return Ok(None) };
         let made = NewSession {
             session,
@@ -232,6 +237,7 @@ impl Reader {
             commitment: row.try_get("commitment")?,
             segments: self.segments(session).await?,
         };
+
         Ok(Some(StoredSession { made, run: row.try_get("run")?, events: self.events(session).await? }))
     }
 
@@ -254,6 +260,7 @@ impl Reader {
         .bind(session.to_string())
         .fetch_all(self.pool())
         .await?;
+
         rows.iter().map(|row| Ok((row.try_get("run")?, event(row)?))).collect()
     }
 
@@ -269,6 +276,7 @@ impl Reader {
         )
         .fetch_optional(self.pool())
         .await?;
+
         row.map(|row| parsed(&row, "session")).transpose()
     }
 
@@ -281,6 +289,7 @@ impl Reader {
             .bind(segment.to_string())
             .fetch_optional(self.pool())
             .await?;
+
         Ok(Duration::from_millis(noted.and_then(|noted| u64::try_from(noted).ok()).unwrap_or(0)))
     }
 }
@@ -288,6 +297,7 @@ impl Reader {
 fn event(row: &SqliteRow) -> Result<Event, StoreError> {
     let role: String = row.try_get("role")?;
     let by = Role::named(&role).ok_or_else(|| StoreError::Damaged(format!("unknown role '{role}'")))?;
+
     let payload: String = row.try_get("payload")?;
     let kind: EventKind =
         serde_json::from_str(&payload).map_err(|error| StoreError::Damaged(format!("event {payload}: {error}")))?;

@@ -61,6 +61,7 @@ fn member(row: &SqliteRow) -> Result<Member, StoreError> {
         (true, false) => SessionStatus::Completed,
         (false, false) => SessionStatus::UnderWay,
     };
+
     Ok(Member {
         session: parsed(row, "session")?,
         participant: row.try_get("participant")?,

@@ -38,15 +38,18 @@ pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
     let mut batches = 0_u32;
     let mut looked_at = 0;
     let mut open = true;
+
     while open {
         open = writer.collect(&mut receiver).await;
         writer.flush(&store).await;
+
         batches = batches.wrapping_add(1);
         if batches.is_multiple_of(CHECKPOINT_BATCHES) {
             match store.forget_steps_outside(looked_at, LOOKED_AT, KEPT_OUTSIDE).await {
                 Ok(up_to) => looked_at = up_to,
                 Err(error) => tracing::warn!("old telemetry could not be forgotten: {error}; it is tried again"),
             }
+
             checkpoint(&store).await;
         }
     }
@@ -64,6 +67,7 @@ impl Writer {
     async fn collect(&mut self, receiver: &mut Receiver<StepRecord>) -> bool {
         let Some(first) = receiver.recv().await else { return false };
         self.waiting.push(first);
+
         let end = Instant::now() + BATCH_TIME;
         let enough = self.waiting.len() + BATCH_RECORDS;
         while self.waiting.len() < enough {
@@ -74,6 +78,7 @@ impl Writer {
                 Err(_) => break,
             }
         }
+
         true
     }
 
@@ -94,6 +99,7 @@ impl Writer {
                 if !std::mem::replace(&mut self.failing, true) {
                     tracing::error!("telemetry cannot be written: {error}; it is kept in memory for a while");
                 }
+
                 let too_many = self.waiting.len().saturating_sub(MOST_WAITING);
                 self.waiting.drain(..too_many);
                 counts.lost.fetch_add(too_many as u64, Ordering::Relaxed);
@@ -105,6 +111,7 @@ impl Writer {
         if self.waiting.is_empty() {
             return Ok(());
         }
+
         let _turn = store.turn().await;
         let mut connection = store.inner.telemetry.acquire().await?;
         let written = self.write_on(&mut connection, store.run()).await;
@@ -131,20 +138,24 @@ impl Store {
     /// When the disk or database failed.
     pub async fn forget_steps_outside(&self, from: i64, count: i64, kept: i64) -> Result<i64, StoreError> {
         let _turn = self.turn().await;
+
         let bounds = sqlx::query_as(
             "SELECT (SELECT min(number) FROM telemetry WHERE number > ?), (SELECT max(number) FROM telemetry)",
         );
         let bounds = bounds.bind(from).fetch_one(&self.inner.telemetry).await?;
         let (Some(first), Some(last)): (Option<i64>, Option<i64>) = bounds else { return Ok(from) };
+
         let up_to = (first + count - 1).min(last - kept);
         if up_to < first {
             return Ok(from);
         }
+
         sqlx::query("DELETE FROM telemetry WHERE number BETWEEN ? AND ? AND segment IS NULL")
             .bind(first)
             .bind(up_to)
             .execute(&self.inner.telemetry)
             .await?;
+
         Ok(up_to)
     }
 }
@@ -195,10 +206,12 @@ impl Names {
         if let Some(&number) = self.segments.get(&segment) {
             return Ok(number);
         }
+
         let number = sqlx::query_scalar("SELECT number FROM segments WHERE segment = ?")
             .bind(segment.to_string())
             .fetch_optional(connection)
             .await?;
+
         self.segments.insert(segment, number);
         Ok(number)
     }
@@ -212,6 +225,7 @@ impl Names {
         if let Some(&number) = self.policies.get(policy) {
             return Ok(Some(number));
         }
+
         // The update changes nothing; it makes the row come back when it was there before.
         let number = sqlx::query_scalar(
             "INSERT INTO policies (name) VALUES (?) ON CONFLICT (name) DO UPDATE SET name = name RETURNING number",
@@ -219,6 +233,7 @@ impl Names {
         .bind(policy.as_str())
         .fetch_one(connection)
         .await?;
+
         self.policies.insert(policy.clone(), number);
         Ok(Some(number))
     }

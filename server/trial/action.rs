@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use crate::ids::SegmentId;
 
-/// Something that moves a session on. `segment` names the one that the page was showing, so that a stale tab or a double
-/// click moves nothing twice.
+/// Something that moves a session on. `segment` names the one that the page was showing, so that a
+/// stale tab or a double click moves nothing twice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "action", rename_all = "kebab-case")]
 pub enum Action {

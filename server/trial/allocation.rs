@@ -250,6 +250,7 @@ mod tests {
                     assert_eq!(set.iter().filter(|order| order[position] == policy).count(), 2);
                 }
             }
+
             let mut follows: BTreeMap<(usize, usize), usize> = BTreeMap::new();
             for pair in set.iter().flat_map(|order| order.windows(2)) {
                 *follows.entry((pair[0], pair[1])).or_default() += 1;

@@ -45,6 +45,7 @@ pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Resul
         (QuestionKind::Ranking, _) => format!("each of the settings 1 to {settings} once, best first"),
         (QuestionKind::Sus, _) => format!("{SUS_ITEMS} points from 1 to 5, 0 for an item that it leaves as it was"),
     };
+
     Err(Misfit::Kind { question: question.id.clone(), expected })
 }
 
@@ -129,6 +130,7 @@ mod tests {
             items[place] = point;
             AnswerValue::Points(items)
         };
+
         let mut kept = None;
         for (place, point) in [(9, 2), (0, 4), (1, 2), (2, 3), (3, 1), (4, 1), (5, 3), (6, 2), (7, 2), (8, 4), (4, 4)] {
             assert!(!kept.as_ref().is_some_and(is_whole) || place == 4);
@@ -136,6 +138,7 @@ mod tests {
             assert_eq!(check(&sus, &given, 6), Ok(()));
             kept = Some(on_top_of(kept.as_ref(), given));
         }
+
         let whole = AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]);
         assert_eq!(kept.as_ref(), Some(&whole));
         assert!(is_whole(&whole));

@@ -77,6 +77,7 @@ impl BalancedSet {
                  unblind that one first"
             )));
         }
+
         Ok(())
     }
 

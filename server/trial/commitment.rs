@@ -73,6 +73,7 @@ mod tests {
             protocol_sha256: [0xab; 32],
             schedule: ["fixed", "mgm-hill-climber"].map(PolicyName::new).to_vec(),
         };
+
         // printf 'parfocal-commitment-1\nsession …\n…' | sha256sum
         assert_eq!(allocation.commitment(), "c9ef7743934603d3dca9fc252a945a2e078f679169d9d81fb4b2ba4294f7be45");
     }

@@ -183,6 +183,7 @@ mod tests {
             EventKind::Aborted { reason: String::new(), inspected_ms: 0 },
             EventKind::Unblinded { reason: String::new(), emergency: true },
         ];
+
         for kind in kinds {
             let json = serde_json::to_value(&kind).unwrap();
             assert_eq!(json["kind"], kind.name());

@@ -1,4 +1,5 @@
-//! The time after a session's end in which what a surgeon's device still holds counts. After it nothing changes any more.
+//! The time after a session's end in which what a surgeon's device still holds counts. After it
+//! nothing changes any more.
 
 use std::fmt;
 use std::time::Duration;
@@ -51,8 +52,9 @@ impl Grace {
         self.until().is_some_and(|until| self.unblinded.is_some() || at > until)
     }
 
-    /// What unblinding at `now` would keep from counting, if anything: `None` also while the session is under way, where
-    /// unblinding ends nothing. `devices` are the surgeons' devices: how much each held when it last told, and when.
+    /// What unblinding at `now` would keep from counting, if anything: `None` also while the session is
+    /// under way, where unblinding ends nothing. `devices` are the surgeons' devices: how much each held
+    /// when it last told, and when.
     pub fn outstanding(
         &self,
         now: Timestamp,
@@ -90,6 +92,7 @@ impl fmt::Display for Outstanding {
             let count = self.devices;
             write!(f, "{and}{count} surgeon's {devices} not said since the end that nothing is left on it")?;
         }
+
         f.write_str("; what arrives after unblinding is kept, but marked late, and never counts")
     }
 }

@@ -52,6 +52,7 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
         Request::MakeSession | Request::CloseSession | Request::MoveLens => by == Role::Operator,
         Request::AddParticipant => matches!(by, Role::Operator | Role::Researcher),
     };
+
     if !is_theirs {
         return Err(Refusal::only("the operator"));
     }

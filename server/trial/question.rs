@@ -58,7 +58,8 @@ impl QuestionKind {
 pub enum AnswerValue {
     /// A Likert point.
     Point(u8),
-    /// A ranking of settings (from 1), best first; or the ten SUS items, 0 for those that this answer leaves as they were.
+    /// A ranking of settings (from 1), best first; or the ten SUS items, 0 for those that this answer
+    /// leaves as they were.
     Points(Vec<u8>),
     /// Text.
     Text(String),

@@ -46,6 +46,7 @@ pub fn standings(answers: &[Given]) -> Vec<Standing> {
         .iter()
         .map(|given| Standing { revision: 0, value: given.value.clone(), counts: false, disagrees: false })
         .collect();
+
     let mut latest: Option<usize> = None;
     for (&place, revision) in order.iter().zip(1..) {
         standings[place].revision = revision;
@@ -195,6 +196,7 @@ mod tests {
             value: AnswerValue::Points(items.to_vec()),
             ..given(device, i64::try_from(second).unwrap(), second, 0)
         };
+
         let apart = [items(2, 20, [0, 0, 2]), items(1, 10, [4, 0, 0]), items(1, 11, [0, 3, 0])];
         assert_eq!(counts(&apart), Some(AnswerValue::Points(vec![4, 3, 2])));
         assert!(standings(&apart).iter().all(|standing| !standing.disagrees), "each gave other items");
@@ -213,6 +215,7 @@ mod tests {
                 .zip(0..)
                 .map(|((device, second, point), sequence)| given(*device, sequence, *second, *point))
                 .collect();
+
             let mut arrived = all.clone();
             let length = arrived.len();
             arrived.rotate_left(turn % length);

@@ -88,6 +88,7 @@ mod tests {
             after_segment: Vec::new(),
             closing: Vec::new(),
         };
+
         let mut state = SessionState::new(plan);
         for (kind, number) in kinds.into_iter().zip(1..) {
             state.apply(&Event { number, by: Role::System, at: now(), wall: Timestamp::UNIX_EPOCH, kind });

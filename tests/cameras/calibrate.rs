@@ -49,6 +49,7 @@ fn dark_and_white_make_a_calibration_that_names_itself_and_flattens_the_picture(
         let line = done(&[&["inspect", "--json", white.to_str().unwrap()][..], extra].concat());
         serde_json::from_str(&line).unwrap()
     };
+
     let (plain, flat) = (inspect(&[]), inspect(&["--calibration", calibration]));
     assert!(flat["mgm"].as_f64().unwrap() < 0.01, "{flat}");
     assert!(plain["mgm"].as_f64().unwrap() > 0.5, "{plain}");
@@ -112,6 +113,7 @@ fn a_makers_tables_are_imported() {
         let of = |band: u32| (1.0 - (f64::from(nm) - f64::from(460 + 8 * band)).abs() / 10.0).max(0.0).to_string();
         format!("{nm},{}\n", (0..16).map(of).collect::<Vec<_>>().join(","))
     };
+
     let heading = format!("nm,{}\n", ["band"; 16].join(","));
     fs::write(path("responses.csv"), heading + &(440..=600).map(line).collect::<String>()).unwrap();
     let row = |row: usize| (0..16).map(|at| if at == row { "0.5" } else { "0" }).collect::<Vec<_>>().join(", ") + "\n";
@@ -129,6 +131,7 @@ fn a_makers_tables_are_imported() {
         "--out",
         &out,
     ]);
+
     let toml: toml::Table = toml::from_str(&fs::read_to_string(path("unit/calibration.toml")).unwrap()).unwrap();
     assert_eq!(toml["unit"].as_str(), Some("9"));
     let number = |key: &str, at: usize| toml[key][at].as_float().unwrap();

@@ -82,6 +82,7 @@ fn the_phantom_is_the_same_for_the_same_seed_and_times() {
         assert!(samples(one) == samples(same));
         assert_eq!((one.number, one.truth), (same.number, same.truth));
     }
+
     assert!(samples(&one[3]) != samples(&other[3]));
     let exposed: Vec<f64> = one.iter().map(|frame| frame.truth.unwrap().exposed.get()).collect();
     assert_eq!(exposed, [0.0, 0.04, 0.09, 0.4], "each frame sees the lens as it stood");
@@ -113,6 +114,7 @@ fn the_phantom_knows_where_its_patch_is_sharpest() {
                 let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples.clone()).unwrap();
                 mgm(&reconstructor.gray_patch(&mosaic, area))
             };
+
             let stack =
                 (0..=20).map(|step| f64::from(step) / 20.0).map(|focal_power| (sharpness(focal_power), focal_power));
             let (_, best) = stack.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
@@ -132,6 +134,7 @@ fn the_phantoms_picture_is_exposed_well_and_its_content_area_can_be_found() {
         phantom.expose(&pose, phantom.optimal(&pose), &mut samples);
         phantom.adjust_exposure(&samples);
     }
+
     let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
     let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
     Reconstructor::new(&Calibration::default()).reconstruct(&mosaic, &mut rgb, &mut gray);
@@ -142,6 +145,7 @@ fn the_phantoms_picture_is_exposed_well_and_its_content_area_can_be_found() {
         let inside = rgb.data.chunks_exact(3 * 512).skip(80).take(112).flat_map(|row| &row[3 * 180..3 * 332]);
         inside.skip(channel).step_by(3).map(|value| f64::from(*value)).sum::<f64>() / (112.0 * 152.0)
     });
+
     assert!((110.0..230.0).contains(&red), "exposure: {red}");
     assert!(red > 1.05 * green && red > 1.05 * blue, "brain is pink: {red} {green} {blue}");
 }
@@ -185,6 +189,7 @@ fn a_video_is_played() {
         println!("skipped: PARFOCAL_CLIP names no clip");
         return;
     };
+
     let shown = frames(&format!("footage:{}", file.display()), 5, &[0, 500]);
     for frame in &shown {
         // 1280x720 scaled to 384 lines is 683x384; three quarters of that.

@@ -171,6 +171,7 @@ impl Lens for FakeLens {
             let state = self.0.lock().unwrap();
             (state.panics, state.failure.clone())
         };
+
         assert!(!panics, "as the test asked");
         failure.map_or(Ok(()), Err)?;
         self.0.lock().unwrap().at = target;

@@ -59,6 +59,7 @@ fn run(policy: &str, seed: u64) -> Vec<f64> {
         let FrameImage::Mosaic(mosaic) = controlled.frame.image else { unreachable!() };
         samples = Arc::into_inner(mosaic).unwrap().into_samples();
     }
+
     errors
 }
 

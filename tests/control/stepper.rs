@@ -138,6 +138,7 @@ fn a_panic_holds_and_a_fresh_instance_takes_over() {
         let record = fixture.step();
         assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyPanicked)));
     }
+
     assert!(fixture.message().contains("being restarted"), "{}", fixture.message());
     assert!(fixture.script.instances() < 8, "a policy that always panics is tried a few times a second");
     fixture.script.set(Deed::GoTo(0.7));
@@ -157,6 +158,7 @@ fn nonsense_holds_and_a_fresh_instance_takes_over() {
             let record = fixture.step();
             assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicyNonsense)));
         }
+
         assert!(fixture.message().contains("invalid focal power"), "{}", fixture.message());
         fixture.script.set(Deed::GoTo(0.6));
         fixture.recover();
@@ -173,6 +175,7 @@ fn a_hanging_policy_is_given_up_and_replaced() {
         let record = fixture.step();
         assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::PolicySlow)));
     }
+
     assert!(fixture.message().contains("hangs again and again"), "{}", fixture.message());
     assert!(fixture.script.instances() <= 5, "no more threads are left hanging than a few");
     fixture.stepper.obey(drive("fixed", None));
@@ -203,6 +206,7 @@ fn a_lens_that_fails_holds_and_comes_back() {
             lens.panic(on && panics);
             lens.fail((on && !panics).then(|| LensError::Refused("over temperature".into())));
         };
+
         let mut fixture = Fixture::new(PATIENT);
         fixture.stepper.obey(drive("scripted", None));
         fixture.step();
@@ -212,6 +216,7 @@ fn a_lens_that_fails_holds_and_comes_back() {
             let record = fixture.step();
             assert_eq!((record.asked, record.held), (power(0.6), Some(Hold::LensFailed)));
         }
+
         assert!(fixture.message().contains(words), "{}", fixture.message());
         assert_eq!(fixture.script.seen().len(), 2, "the policy learns nothing from a lens that does not move");
         fail(&fixture.lens, false);
@@ -272,6 +277,7 @@ fn no_message_tells_which_policy_runs() {
             fixture.step();
             assert!(!fixture.message().is_empty() && !fixture.message().contains("scripted"));
         }
+
         fixture.script.set(Deed::GoTo(0.5));
     }
 }
@@ -287,6 +293,7 @@ fn drive_and_segment_change_together_between_two_frames() {
             assert_eq!((record.policy, record.segment), (Some(PolicyName::new(name)), Some(segment)));
         }
     }
+
     fixture.stepper.obey(Command::Drive { drive: Drive::Manual(power(0.2)), segment: None });
     let record = fixture.step();
     assert_eq!((record.policy, record.segment, record.asked), (None, None, power(0.2)));
@@ -306,6 +313,7 @@ fn a_policy_begins_once_the_lens_is_at_its_start() {
         let early = fixture.step_after(pace);
         assert_eq!((early.policy, early.asked, early.held), (None, power(0.5), None));
     }
+
     assert_eq!(fixture.step().asked, power(0.6));
     assert_eq!(fixture.script.seen(), [0.5]);
 }
@@ -352,6 +360,7 @@ fn the_patch_follows_the_content_area() {
         let seen = stepper.step(sized_frame(fixture.number, fixture.clock.now(), 100)).unwrap();
         (seen.patch.x, seen.patch.y)
     };
+
     assert_eq!(patch_of(&mut fixture.stepper), (34, 34));
     let area = ContentArea { x: 40.0, y: 60.0, radius: 30.0, confidence: 1.0 };
     fixture.stepper.obey(Command::ContentArea(Some(area)));

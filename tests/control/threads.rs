@@ -38,6 +38,7 @@ impl Stage {
             registry: script.registry(),
             clock,
         };
+
         let settings = Settings { frame_period: Duration::from_millis(20), telemetry_capacity, dynamics: None };
         let (control, handle, telemetry) = ControlLoop::spawn(settings, rig).unwrap();
         Self { control, handle, telemetry, camera, lens, script }

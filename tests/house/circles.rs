@@ -17,6 +17,7 @@ pub fn circles<'a>(graph: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> Vec<BTreeSet
             found.push(circle);
         }
     }
+
     found
 }
 
@@ -30,6 +31,7 @@ fn reachable<'a>(graph: &BTreeMap<&'a str, BTreeSet<&'a str>>, start: &str) -> B
             }
         }
     }
+
     reached
 }
 

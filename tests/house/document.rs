@@ -19,6 +19,7 @@ pub fn floors(root: &Path) -> BTreeMap<String, u32> {
             assert!(floors.insert(name.to_owned(), floor).is_none(), "{name} stands on two floors");
         }
     }
+
     assert!(!floors.is_empty(), "ARCHITECTURE.md has no table with the header `| floor | room | ...`");
     floors
 }

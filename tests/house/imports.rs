@@ -86,6 +86,7 @@ impl SourceTree {
                 }
             }
         }
+
         Self { imports }
     }
 }
@@ -103,6 +104,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
             found.push(path);
         }
     }
+
     found
 }
 
@@ -135,6 +137,7 @@ impl Paths {
             let depth = self.module.len().checked_sub(supers)?;
             return Some([&self.module[..depth], &parts[supers..]].concat());
         }
+
         match parts.first().map(String::as_str) {
             Some("crate") => Some(parts[1..].to_vec()),
             Some("self") => Some([&self.module[..], &parts[1..]].concat()),

@@ -57,6 +57,7 @@ fn no_files_of_a_room_use_one_another_in_a_circle() {
         });
         ties.map(ToString::to_string).collect::<Vec<_>>().join("\n")
     };
+
     let new: Vec<String> = found.difference(&allowed).map(explain).collect();
     assert!(new.is_empty(), "circles that ALLOWED_CIRCLES does not name:\n{}", new.join("\n\n"));
     let gone: Vec<_> = allowed.difference(&found).collect();

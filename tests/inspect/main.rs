@@ -109,6 +109,7 @@ fn a_calibration_sets_the_scale_of_a_mosaic() {
         assert!(output.status.success(), "{}", complaint(&output));
         objects(&output)[0]["mgm"].as_f64().unwrap()
     };
+
     // A step of s gray levels has an MGM of 8 s / 32.
     assert!((mgm(&[]) - 255.0 * 256.0 / 1023.0 / 4.0).abs() < 1e-3);
     assert!((mgm(&["--calibration", calibration.to_str().unwrap()]) - 255.0 / 2.0 / 4.0).abs() < 1e-3);
@@ -149,6 +150,7 @@ fn bad_files_are_named_and_the_others_still_inspected() {
         (folder.path().join("absent.png"), "cannot be read"),
         (folder.path().to_owned(), "cannot be read"),
     ];
+
     let tiny = folder.path().join("tiny.png");
     image::GrayImage::new(20, 40).save(&tiny).unwrap();
     let mut paths: Vec<&Path> = bad.iter().map(|(path, _)| path.as_path()).collect();
@@ -184,6 +186,7 @@ fn the_content_area_of_real_footage_is_where_others_find_it() {
         println!("skipped: PARFOCAL_CLIP names no clip");
         return;
     };
+
     let folder = TempDir::new().unwrap();
     let select = r"select=eq(n\,0)+eq(n\,80)+eq(n\,160)+eq(n\,240)";
     let status = Command::new("ffmpeg")
@@ -192,10 +195,12 @@ fn the_content_area_of_real_footage_is_where_others_find_it() {
         .args(["-vf", select, "-fps_mode", "passthrough"])
         .arg(folder.path().join("%d.png"))
         .status();
+
     if !status.is_ok_and(|status| status.success()) {
         println!("skipped: ffmpeg is absent or cannot read the footage");
         return;
     }
+
     let paths: Vec<_> = (1..=4).map(|number| folder.path().join(format!("{number}.png"))).collect();
     let output = inspect(&["--json"], &paths.iter().map(PathBuf::as_path).collect::<Vec<_>>());
     assert!(output.status.success(), "{}", complaint(&output));

@@ -177,6 +177,7 @@ fn after_a_kill_the_next_start_begins_without_current() {
         [Order::CurrentMode, Order::Current(0), Order::FocalPowerMode],
         "then it is under control again"
     );
+
     drop(lens);
     assert_eq!(emulator.mode_and_current(), AT_REST);
 }

@@ -24,17 +24,20 @@ fn the_command_line_speaks_the_promised_json() {
         assert!(success, "{errors}");
         serde_json::from_str(&output).unwrap()
     };
+
     let info = json(&["info", "--lens", &spec, "--json"]);
     let expected = serde_json::json!({
         "driver": "Optotune Lens Driver 4", "firmware": "type A, version 1.8.3.1", "serial": "EMUL0001",
         "min_dioptre": 5.0, "max_dioptre": 10.0, "temperature_celsius": 25.5, "mode": "focal power", "status": [],
         "line_errors": 0,
     });
+
     assert_eq!(info, expected);
     assert_eq!(
         json(&["set", "0.3", "--lens", &spec, "--json"]),
         serde_json::json!({"focal_power": 0.3, "dioptre": 6.5})
     );
+
     assert_eq!((last_command(&emulator), emulator.mode_and_current().0), (Some(2300), 5), "it stays where it was set");
     let sweep = json(&["sweep", "--steps", "3", "--lens", &spec, "--json"]);
     let asked: Vec<_> = sweep.as_array().unwrap().iter().map(|stop| stop["asked"].as_f64().unwrap()).collect();
@@ -66,6 +69,7 @@ impl Emulated {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
+
         let mut port = String::new();
         BufReader::new(process.stdout.take().unwrap()).read_line(&mut port).unwrap();
         let mut answers = BufReader::new(process.stderr.take().unwrap()).lines();
@@ -130,6 +134,7 @@ fn its_glass_waits_out_the_delay_settles_and_has_hysteresis() {
         quick.set(focal_power);
         assert!((quick.glass() - glass).abs() < 1e-3, "sent to {focal_power} it stands at {}", quick.glass());
     }
+
     // Ten seconds of dead time: the command has arrived, and nothing has moved.
     let mut late = Emulated::start(&["--delay", "10000", "--settling", "0"]);
     late.set("1");

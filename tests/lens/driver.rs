@@ -23,6 +23,7 @@ fn says_what_it_is_and_goes_where_it_is_sent() {
         status: Vec::new(),
         line_errors: 0,
     };
+
     assert_eq!(lens.info(), Ok(expected));
 
     lens.set(power(0.8)).unwrap();
@@ -92,6 +93,7 @@ fn the_modelled_glass_follows_the_true_one() {
         lens.set(power(target)).unwrap();
         std::thread::sleep(Duration::from_millis(20));
     }
+
     until("the last command arrives", || last_command(&emulator) == Some(2200));
     let (model, glass) = (lens.optics(), emulator.glass());
     let moments = || (0..200).map(|millis| begun + Duration::from_millis(millis));
@@ -129,6 +131,7 @@ fn measure_set_to_wire() {
             emulator.commands().last().unwrap().0.since(asked)
         })
         .collect();
+
     latencies.sort_unstable();
     println!("set to wire: p50 {:?}, p99 {:?}, worst {:?}", latencies[250], latencies[495], latencies[499]);
 }

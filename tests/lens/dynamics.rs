@@ -135,6 +135,7 @@ fn the_command_line_measures_and_the_server_takes_what_it_found() {
         .arg(&out)
         .output()
         .unwrap();
+
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let millis = |key: &str| report[key].as_f64().unwrap();
@@ -154,6 +155,7 @@ fn the_command_line_measures_and_the_server_takes_what_it_found() {
         .arg(&other)
         .output()
         .unwrap();
+
     assert_eq!(refused.status.code(), Some(1));
     let said = String::from_utf8(refused.stderr).unwrap();
     assert!(said.contains("belong to the lens AREA0042, but this one is none"), "{said}");

@@ -59,6 +59,7 @@ fn every_fault_of_the_line_is_noticed_in_words_and_heals() {
             seen = lens.health().message.to_string();
             !lens.health().working
         });
+
         assert!(seen.contains(words), "{fault:?}: {seen}");
         let sent = emulator.commands().len();
         emulator.set_fault(Fault::None);
@@ -186,6 +187,7 @@ fn who_may_not_open_the_port_is_told_the_group() {
     } else {
         set(0);
     }
+
     match another_process(port.to_str().unwrap(), root.then_some(NOBODY)) {
         Ok(said) if said.contains("permission denied") => {
             assert!(said.contains(if root { "usermod -aG dialout $USER" } else { "usermod -aG" }), "{said}");

@@ -60,6 +60,7 @@ fn a_noisy_line_neither_loses_the_lens_nor_a_command() {
         assert_eq!(lens.read_back().unwrap(), target, "at step {step}");
         assert!(lens.health().working, "{}", lens.health().message);
     }
+
     until("errors are counted", || lens.health().line_errors > 0);
     assert_eq!(last_command(&emulator), Some(3000));
 }
@@ -75,6 +76,7 @@ fn the_command_line_survives_a_noisy_line_and_tells_its_errors() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8(output.stdout).unwrap()
     };
+
     let json: serde_json::Value = serde_json::from_str(&parfocal(&["lens", "info", "--json"])).unwrap();
     assert!(json["line_errors"].as_u64().unwrap() > 0, "{json}");
     let told = parfocal(&["lens", "info"]);

@@ -40,6 +40,7 @@ fn a_bench_is_recorded_by_a_stepper_whose_failure_loses_nothing() {
             text(&out),
         ])
     };
+
     let told = complaint(&record());
     assert!(told.contains("failed at pose 3 (exit status: 5)") && told.contains("2 of 4 poses are saved"), "{told}");
     fs::remove_file(&broken).unwrap();
@@ -55,6 +56,7 @@ fn a_bench_is_recorded_by_a_stepper_whose_failure_loses_nothing() {
         let ends = [(FocalPower::MIN, 2000), (FocalPower::MIDDLE, 2500), (FocalPower::MAX, 3000)];
         ends.into_iter().find(|end| end.0 == power).unwrap().1
     };
+
     for pose in scan.poses().values() {
         let asked: Vec<i16> = pose.images.iter().map(|image| raw(image.focal_power)).collect();
         assert!(sent.windows(3).any(|three| three == asked), "{asked:?} in {sent:?}");
@@ -88,9 +90,11 @@ fn a_person_at_the_bench_is_asked_for_each_pose() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+
         child.stdin.take().unwrap().write_all(typed).unwrap();
         child.wait_with_output().unwrap()
     };
+
     let left = record(b"\n\n");
     assert!(complaint(&left).contains("nobody confirmed pose 3"), "{}", complaint(&left));
     assert!(String::from_utf8_lossy(&left.stderr).contains("pose 1 of 3: move the camera there, then press Enter"));

@@ -34,11 +34,13 @@ fn a_full_disk_leaves_no_half_of_a_result() {
         disk.display(),
         env!("CARGO_BIN_EXE_parfocal"),
     );
+
     let output = Command::new("unshare").args(["-rm", "sh", "-c", &script]).stdin(Stdio::null()).output();
     let output = match output {
         Ok(output) if output.status.code() != Some(77) && !said(&output).is_empty() => output,
         other => return println!("skipped: a small disk cannot be mounted here: {other:?}"),
     };
+
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(said(&output), "code 1\nresults.csv\nresults.json\nresults.md\n", "{error}");
     assert!(error.contains("cannot write the results to"), "{error}");
@@ -116,6 +118,7 @@ fn gravel(path: &Path, side: u32) {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (state >> 8) % below
     };
+
     for _ in 0..side * 8 {
         let (left, top, length, level) = (draw(side), draw(side), 4 + draw(20), draw(256));
         for (x, y) in (top..top + length).flat_map(|y| (left..left + length).map(move |x| (x, y))) {
@@ -124,6 +127,7 @@ fn gravel(path: &Path, side: u32) {
             }
         }
     }
+
     picture.save(path).unwrap();
 }
 
@@ -139,6 +143,7 @@ fn a_large_still_picture_is_focused_on_as_well_as_a_small_one() {
         let report: Value = serde_json::from_str(&said(&output)).unwrap();
         report["rows"][1]["in_focus"].as_f64().unwrap()
     };
+
     let (small, large) = (in_focus(480), in_focus(512));
     assert!(small > 0.9 && large > 0.9, "{small} {large}");
 }
@@ -175,6 +180,7 @@ fn shards_put_together_are_one_run_to_the_last_digit() {
         assert!(output.status.success(), "{}", complaint(&output));
         said(&output)
     };
+
     let told = run(&["--out", text(&whole)]);
     assert!(run(&["--shard", "2/3", "--out", text(&parts)]).contains("shard-2-of-3.json; when all shards are there: "));
     run(&["--shard", "3/3", "--out", text(&parts)]);

@@ -97,6 +97,7 @@ fn what_is_no_focal_stack_is_refused_before_anything_is_written() {
         assert!(!out.exists(), "{}", said(&output));
         complaint(&output)
     };
+
     assert!(told(&["--planes", "13"]).contains("give --planes at most 12"));
     assert!(told(&["--size", "256"]).contains("does not fit into pictures of 200x200"));
     assert!(told(&["--scale", "2"]).contains("does not fit into pictures of 100x100"));

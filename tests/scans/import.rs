@@ -53,6 +53,7 @@ fn focal_powers_that_agree_to_three_decimals_are_kept_apart() {
         let image = pose.images.iter().find(|image| image.focal_power == FocalPower::nearest(power)).unwrap();
         scan.picture(pose, image).unwrap().data.into_iter().reduce(f32::max).unwrap()
     };
+
     assert_eq!([0.1231, 0.1234, 1.0].map(brightest), [120.0, 180.0, 109.0]);
 }
 
@@ -75,11 +76,13 @@ fn a_folder_of_pictures_is_imported() {
         let stripes = image::GrayImage::from_fn(size, size, |x, _| image::Luma([100 + u8::from(x % 4 < 2) * contrast]));
         stripes.save(pictures.join(format!("pose{pose:04}_f{power:.3}.png"))).unwrap();
     };
+
     for (pose, contrasts) in [(8, [20, 80, 30]), (9, [70, 40, 10])] {
         for (power, contrast) in [0.0, 0.5, 1.0].into_iter().zip(contrasts) {
             save(pose, power, contrast, 80);
         }
     }
+
     fs::write(pictures.join("notes.txt"), "not a picture").unwrap();
     let import = || parfocal(&["scan", "import", text(&pictures), "--out", text(&out), "--camera", "arm 3"]);
 

@@ -76,6 +76,7 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
             }
         }
     }
+
     files.sort();
     files
 }
@@ -107,6 +108,7 @@ fn what_is_recorded_is_what_is_evaluated_on() {
             parfocal(&["evaluate", "--scans", text(&out), "--policies", "fixed", "--between", between, "--json"]);
         serde_json::from_slice::<Value>(&output.stdout).unwrap()
     };
+
     let report = evaluate("interpolated");
     assert_eq!((&report["between"], &report["seed"]), (&"interpolated".into(), &7.into()));
     let optimum: f64 = stored.poses().iter().map(|pose| (pose.optimum.get() - 0.5).abs()).sum::<f64>() / 4.0;
@@ -175,6 +177,7 @@ fn what_is_missing_or_damaged_is_named() {
             assert!(complaint.contains(told), "{arguments:?}: {complaint}");
         }
     };
+
     fs::write(out.join(POSES), format!("{}\n{}\n", lines[0], lines[2])).unwrap();
     refusals("pose 2 of 3 is missing");
     fs::write(out.join(POSES), format!("{}\n", lines[0])).unwrap();
@@ -241,6 +244,7 @@ fn a_scan_plays_as_a_camera_and_the_lens_picks_the_picture() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
+
     let lines = BufReader::new(server.stdout.take().unwrap()).lines().map(Result::unwrap);
     let said: Vec<String> = lines.take_while(|line| !line.starts_with("Ctrl-C")).collect();
     server.kill().unwrap();
@@ -264,11 +268,13 @@ fn a_full_disk_keeps_what_is_whole() {
         disk.display(),
         program
     );
+
     let output = Command::new("unshare").args(["-rm", "sh", "-c", &script]).stdin(Stdio::null()).output();
     let output = match output {
         Ok(output) if output.status.code() != Some(77) && !said(&output).is_empty() => output,
         other => return println!("skipped: a small disk cannot be mounted here: {other:?}"),
     };
+
     let (out, error) = (said(&output), String::from_utf8_lossy(&output.stderr).into_owned());
     assert!(out.starts_with("code 1\n") && error.contains("no space is left on the disk of"), "{out}{error}");
     let kept: usize = error.split(" poses are saved").next().unwrap().rsplit(' ').next().unwrap().parse().unwrap();

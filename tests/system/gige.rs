@@ -41,6 +41,7 @@ fn watch(camera: &mut GigeCamera, time: Duration) -> (Vec<Frame>, usize) {
             Err(_) => failures += 1,
         }
     }
+
     (frames, failures)
 }
 
@@ -94,16 +95,19 @@ fn killed_in_mid_stream_it_is_found_again() {
         let offered = controls.offered().settings.into_iter().find(|one| one.setting == Setting::Exposure);
         offered.is_some_and(|exposure| (exposure.value - to).abs() < 0.5)
     };
+
     controls.ask(Setting::Exposure, 12_000.0).unwrap();
     until("the exposure is changed", || {
         let _ = camera.next_frame(Duration::from_millis(200));
         exposed(12_000.0)
     });
+
     fake.kill();
     until("the loss is noticed", || {
         let _ = camera.next_frame(Duration::from_millis(50));
         !camera.health().working
     });
+
     assert!(camera.health().message.ends_with("looking for it again"), "{}", camera.health().message);
     assert!(matches!(camera.next_frame(Duration::from_millis(50)), Err(CameraError::Failed(_))));
     fake.restart();
@@ -112,6 +116,7 @@ fn killed_in_mid_stream_it_is_found_again() {
         after = camera.next_frame(Duration::from_millis(50)).ok();
         after.is_some()
     });
+
     println!("found again after {found:?}");
     assert!(after.unwrap().number > before.number);
     assert!(camera.health().working);
@@ -155,6 +160,7 @@ fn exposure_gain_and_rate_can_be_changed_within_the_cameras_bounds() {
             value(&controls, setting).is_some_and(|value| (value - to).abs() < 0.5)
         });
     };
+
     change(Setting::Exposure, 12_000.0);
     change(Setting::FrameRate, 20.0);
     change(Setting::Gain, 6.0);
@@ -169,6 +175,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         "{}",
         refused("?format=Mono12")
     );
+
     assert!(refused("?format=RGB8").contains("choose from Mono10p"));
     assert!(refused("?width=30").contains("multiples of 4"), "{}", refused("?width=30"));
     let missing = GigeCamera::open("No-Such", settings(10.0)).err().unwrap().to_string();
@@ -193,6 +200,7 @@ async fn the_operator_changes_them_through_the_server() {
         let response = request.send().await.unwrap();
         (response.status(), response.text().await.unwrap())
     };
+
     assert!(offered(&server, "exposure").await["max"].as_f64().unwrap() > 1000.0);
     assert_eq!(change("exposure", 12_000.0).await.0, StatusCode::NO_CONTENT);
     let begun = SystemClock.now();

@@ -32,6 +32,7 @@ fn small(policy: &str, updates: u64) -> Recipe {
         (dqn.windows, dqn.window, dqn.updates) = (8, 16, updates);
         (dqn.epsilon_frames, dqn.variety) = (5000, 0.0);
     }
+
     if let Some(belief) = &mut recipe.belief {
         (belief.scans, belief.window, belief.updates, belief.variety) = (8, 16, updates, 0.0);
     }
@@ -76,15 +77,19 @@ fn what_begins_with_weights_begins_with_what_they_know() {
         let from = Some(Path::new(file));
         Run::begin(recipe.clone(), 7, &Sources::default(), folder.path(), from, tch::Device::Cpu)
     };
+
     // Another policy's weights are refused, and leave nothing behind.
     assert!(start("policies/parfocal.safetensors").err().unwrap().to_string().contains("cannot use the weights"));
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+
     let mut run = start("policies/mgm-learned.safetensors").unwrap();
     assert!(run.go(&SystemClock, &|| false, &mut |_| ()).unwrap());
     run.report().unwrap();
     run.report().unwrap();
+
     // After a single update: the shipped weights' error, where random ones stand at 0.25.
     assert!(run.best() < 0.15, "{}", run.best());
+
     let card = std::fs::read_to_string(folder.path().join("MODEL_CARD.md")).unwrap();
     assert!(card.contains("the weights policies/mgm"));
     assert_eq!(
@@ -99,15 +104,19 @@ fn training_resumed_is_training_never_stopped() {
         let recipe = small(recipe, 2 * LEG);
         let policy = &recipe.policy;
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+
         assert!(train(begin(&recipe, whole.path()), u64::MAX));
         assert!(!train(begin(&recipe, parts.path()), 1));
         assert_eq!(resume(policy, parts.path()).other_version(), None);
+
         let file = parts.path().join("checkpoint.safetensors");
         let mut checkpoint = Checkpoint::read(&file).unwrap();
         checkpoint.notes.insert("version".to_owned(), "0.0.9".to_owned());
         checkpoint.write(&file).unwrap();
         assert_eq!(resume(policy, parts.path()).other_version(), Some("0.0.9"));
+
         assert!(train(resume(policy, parts.path()), u64::MAX));
+
         for file in ["curves.csv", &format!("{policy}.safetensors")] {
             let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();
             assert!(read(&whole) == read(&parts), "{policy}: {file} differs");
@@ -144,7 +153,8 @@ fn trainings_are_compared_by_what_their_folders_hold() {
         output.status.success() && table.starts_with("| run | policy | dqn.updates | validate_every | seed |"),
         "{table}"
     );
-    assert!(table.contains(&format!("| {second} | mgm-learned | 200 | 200 | 7 | 100 of 200 | – | – | – |")), "{table}");
+    let line = format!("| {second} | mgm-learned | 200 | 200 | 7 | 100 of 200 | – | – | – |");
+    assert!(table.contains(&line), "{table}");
 
     let output = parfocal(&["train", "--compare", first, second, "--json"]);
     let runs: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -164,28 +174,35 @@ fn trainings_are_compared_by_what_their_folders_hold() {
 fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
     let folder = tempfile::tempdir().unwrap();
     let (first, other) = (picture(folder.path(), "first.png", 80), picture(folder.path(), "other.png", 90));
+
     let run = folder.path().join("run");
     let mut recipe = small("mgm-learned", 2 * LEG);
     recipe.pictures = 1;
     let sources = Sources { footage: vec![first.clone()], ..Sources::default() };
     let begun = Run::begin(recipe, 7, &sources, &run, None, tch::Device::Cpu).unwrap();
+
     assert!(!train(begun, 1));
+
     let again = |footage: &[&PathBuf], seed: Option<u64>| {
         let footage = footage.iter().copied().cloned().collect();
         let sources = Sources { footage, ..Sources::default() };
         let asked = ResumeRequest { name: "mgm-learned".to_owned(), sources, seed, ..ResumeRequest::default() };
         Run::resume(&run, &asked, tch::Device::Cpu).map(|run| run.updates()).map_err(|error| error.to_string())
     };
+
     assert_eq!(again(&[], Some(7)), Ok(LEG));
     assert_eq!(again(&[&first], None), Ok(LEG));
     assert!(again(&[], Some(8)).unwrap_err().contains("begun with seed 7, not 8"));
     assert!(again(&[&other], None).unwrap_err().contains("begun on other footage: "));
+
     let moved = folder.path().join("moved.png");
     std::fs::rename(&first, &moved).unwrap();
     assert!(again(&[], None).unwrap_err().contains("is gone: cannot read"));
     assert_eq!(again(&[&moved], None), Ok(LEG));
+
     std::fs::rename(&other, &first).unwrap();
     assert!(again(&[], None).unwrap_err().contains("has changed;"));
+
     // The model card that follows says so too.
     std::fs::rename(&moved, &first).unwrap();
     assert!(train(resume("mgm-learned", &run), u64::MAX));
@@ -196,32 +213,41 @@ fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
 fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_process() {
     let folder = tempfile::tempdir().unwrap();
     let (config, out) = (folder.path().join("recipe.toml"), folder.path().join("run"));
+
     let mut recipe = small("mgm-learned", 1_000_000);
     (recipe.pictures, recipe.validate_every) = (1, LEG);
     if let Some(dqn) = &mut recipe.dqn {
         dqn.windows = 64;
     }
+
     std::fs::write(&config, toml::to_string(&recipe).unwrap()).unwrap();
     let out = out.to_str().unwrap();
+
     let start = |arguments: &[&str]| {
         let command = ["train", "mgm-learned", "--out", out];
         let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
         process.args(command).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     };
+
     let interrupt = |process: &std::process::Child| {
         let process = rustix::process::Pid::from_child(process);
         rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
     };
+
     let mut process = start(&["--config", config.to_str().unwrap()]);
+
     // Without a terminal it says how it does at each validation.
     let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(lines.any(|line| line.starts_with("100 of 1000000 updates: loss ") && line.contains("validation MAE 0.")));
+
     // Meanwhile nobody else trains there.
     let second = start(&["--resume"]).wait_with_output().unwrap();
     assert!(String::from_utf8_lossy(&second.stderr).contains("another training is running in"));
+
     interrupt(&process);
     let output = process.wait_with_output().unwrap();
     assert!(output.status.success());
+
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(told.contains(&format!("continue with: parfocal train mgm-learned --out {out} --resume")), "{told}");
 
@@ -238,12 +264,15 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
 fn a_training_outlives_its_log() {
     let folder = tempfile::tempdir().unwrap();
     let (config, out) = (folder.path().join("recipe.toml"), folder.path().join("run"));
+
     let mut recipe = small("mgm-learned", 200);
     (recipe.pictures, recipe.validate_every) = (1, LEG);
     std::fs::write(&config, toml::to_string(&recipe).unwrap()).unwrap();
+
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let mut process = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     process.args(["train", "mgm-learned", "--config"]).arg(&config).arg("--out").arg(&out);
+
     let output = process.stderr(full).output().unwrap();
     assert!(output.status.success(), "{:?}", output.status);
     assert!(out.join("mgm-learned.safetensors").exists());
@@ -257,6 +286,7 @@ fn footage_is_read_as_what_it_is() {
         process.current_dir(folder.path()).args(["evaluate", "--policies", "fixed", "--count", "1", "--footage", name]);
         process.output().unwrap()
     };
+
     let whole = std::fs::read(picture(folder.path(), "cut.jpg", 200)).unwrap();
     std::fs::write(folder.path().join("cut.jpg"), &whole[..whole.len() / 2]).unwrap();
     let output = evaluate("cut.jpg");
@@ -268,10 +298,12 @@ fn footage_is_read_as_what_it_is() {
         .args(["-v", "error", "-f", "lavfi", "-i", "testsrc=s=128x128:r=10", "-frames:v", "10", "-c:v", "ffv1"])
         .arg(folder.path().join("10:30.mkv"))
         .status();
+
     if !made.is_ok_and(|status| status.success()) {
         println!("skipped: no ffmpeg to make a video with");
         return;
     }
+
     let output = evaluate("10:30.mkv");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -39,6 +39,7 @@ async fn six_sessions_are_a_balanced_set_and_the_seventh_begins_another() {
         let session = trial.whole_session("balanced").await;
         sessions.push(made(&trial, session).await);
     }
+
     let (set, next) = sessions.split_at(6);
     assert!(set.iter().all(|session| session.seed == set[0].seed));
     assert_eq!(set.iter().map(|session| session.set_index).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5]);
@@ -49,6 +50,7 @@ async fn six_sessions_are_a_balanced_set_and_the_seventh_begins_another() {
             assert_eq!(policies.iter().filter(|name| **name == policy).count(), 2, "position {position}");
         }
     }
+
     let segments: BTreeSet<_> = sessions.iter().flat_map(|session| &session.segments).map(|(id, _)| *id).collect();
     assert_eq!(segments.len(), 7 * 6);
 }
@@ -95,6 +97,7 @@ async fn a_session_under_way_is_not_unblinded_by_another_of_its_set() {
             Action::Unblind { reason: "to see".to_owned(), despite_outstanding: true },
         )
     };
+
     let refused = unblind().await.unwrap_err();
     assert!(refused.to_string().contains("same balanced set"), "{refused}");
     trial.conductor.act(Role::Operator, second, Action::Abort { reason: "over".to_owned() }).await.unwrap();
@@ -115,6 +118,7 @@ async fn an_aborted_session_does_not_unblind_the_one_in_its_place() {
         .act(Role::Researcher, left, Action::Unblind { reason: "to see".to_owned(), despite_outstanding: true })
         .await
         .unwrap_err();
+
     assert!(refused.to_string().contains("unblind that one first"), "{refused}");
     trial.unblind(second).await;
     trial.unblind(left).await;

@@ -32,6 +32,7 @@ pub async fn with_session(folder: &Path) -> (Trial, SessionId) {
             sender.send(step(setting * 10 + frame, Some(segment))).await.unwrap();
         }
     }
+
     drop(sender);
     writer.await.unwrap();
     trial.answer_all().await;
@@ -108,6 +109,7 @@ async fn a_blinded_export_tells_no_hold_for_the_policys_sake() {
         Some(Hold::LensFailed),
         Some(Hold::CameraFailed),
     ];
+
     for (held, frame) in holds.into_iter().zip(1..) {
         sender.send(StepRecord { held, ..step(frame, Some(segment)) }).await.unwrap();
     }
@@ -147,6 +149,7 @@ async fn every_file_has_its_checksum_and_every_column_its_description() {
         assert!(fields.iter().all(|field| field["description"].as_str().is_some_and(|text| text.len() > 3)), "{path}");
         described.insert(path.to_owned());
     }
+
     let csvs: BTreeSet<String> = files(&out).into_iter().filter(|file| file.contains(".csv")).collect();
     assert_eq!(described, csvs);
 }
@@ -171,6 +174,7 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
         // The reason for unblinding names a policy, and is the unblinded export's alone.
         assert!(!String::from_utf8(read(&blinded)).unwrap().contains("CNN"), "{file}");
     }
+
     let steps = rows(&unblinded, "policy_steps");
     assert_eq!((steps.len(), steps[0]["metric"].as_str(), steps[0]["policy_micros"].as_str()), (60, "12.5", "17"));
     assert_eq!(json(&unblinded, "allocation.json")["unblinding_reason"], "the study is over; CNN won");
@@ -293,6 +297,7 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
         let event = DeviceEvent { wall, at, device, working, message: message.to_owned() };
         trial.store.device_event(&event).await.unwrap();
     };
+
     befalls(true, "follows commands").await;
     trial.wait(Duration::from_secs(1)).await;
     let session = trial.begin("paper").await;
@@ -323,6 +328,7 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
         ("false", "the lens does not answer; trying again"),
         ("true", "follows commands again"),
     ];
+
     assert_eq!(devices, expected, "with the state in which the session began, and nothing after its end");
     assert_eq!(failed(&verify(&out)), [""; 0]);
 }

@@ -79,6 +79,7 @@ impl Trial {
         })
         .await
         .unwrap();
+
         conductor.add_participant(Role::Operator, PARTICIPANT).await.unwrap();
         let keys = ChaCha12Rng::seed_from_u64(seed + u64::try_from(store.run()).unwrap() * 1000);
         Self { store, conductor, clock, commands, keys }
@@ -142,6 +143,7 @@ impl Trial {
                 QuestionKind::Ranking => AnswerValue::Points((1..=settings).rev().collect()),
                 QuestionKind::Sus => AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]),
             };
+
             self.answer(&question.id, value).await.unwrap();
         }
     }
@@ -178,6 +180,7 @@ impl Trial {
             self.answer_all().await;
             self.surgeon(Action::FinishQuestions { segment: None }).await;
         }
+
         assert_eq!(self.view().phase, Phase::Completed);
         session
     }
@@ -226,6 +229,7 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
         latency_p99_micros: 0,
         priority: parfocal::priority::Standing::Ordinary,
     };
+
     let (commands, received) = mpsc::unbounded_channel();
     let status = watch::channel(Arc::new(status)).1;
     (ControlHandle { commands, status, frames: Arc::new(LatestSlot::default()), camera: None }, received)

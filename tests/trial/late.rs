@@ -87,6 +87,7 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
         (&aside.value, &aside.counted, aside.late),
         (&AnswerValue::Point(3), &Some(AnswerValue::Point(5)), false)
     );
+
     assert!((aside.seconds - 20.0).abs() < 1e-9, "it stands where it was given: {aside:?}");
 
     let out = folder.path().join("export");
@@ -96,6 +97,7 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
         .iter()
         .map(|row| ["value", "revision", "counts", "disagrees", "sequence", "late"].map(|column| row[column].as_str()))
         .collect();
+
     assert_eq!(told, [["5", "2", "true", "true", "1", "false"], ["3", "1", "false", "true", "7", "false"]]);
     assert_eq!(answers[1]["device"], TABLET_A.to_string());
     assert_eq!((answers[1]["waited_ms"].as_str(), answers[1]["waited_by"].as_str()), ("80000", "page-clock"));
@@ -269,7 +271,8 @@ async fn a_database_of_the_version_before_keeps_everything_and_its_last_answers_
     MIGRATOR.undo(&pool, 4).await.unwrap();
     // As the version before kept a change of mind, long after the end.
     let changed = "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns)
-        SELECT '00000000-0000-4000-8000-000000000001', session, segment, question, '2', run, '2026-03-02T09:00:00Z', monotonic_ns
+        SELECT '00000000-0000-4000-8000-000000000001', session, segment, question, '2', run,
+            '2026-03-02T09:00:00Z', monotonic_ns
         FROM answers WHERE question = 'sharpness' ORDER BY number LIMIT 1";
     sqlx::query(changed).execute(&pool).await.unwrap();
     sqlx::query("UPDATE runs SET version = 'before'").execute(&pool).await.unwrap();

@@ -19,6 +19,7 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
     let segment = trial.view().segment.unwrap();
     trial.surgeon(Action::Acknowledge { segment }).await;
     trial.wait(Duration::from_secs(10)).await;
+
     let mut comment = trial.comment("now");
     let before = trial.store.run();
     drop(trial);
@@ -30,17 +31,22 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
     // Sent once more, it has waited longer, and is still the same comment.
     comment.origin.waited_millis = Some(31_000);
     trial.conductor.comment(comment.clone()).await.unwrap();
+
+    // Another comment, which names a run that never was.
     comment.key.0 = uuid::Uuid::from_u128(1);
     comment.run = Some(99);
     trial.conductor.comment(comment).await.unwrap();
+
     let timeline = trial.conductor.timeline(session, 100).await.unwrap();
     assert_eq!(timeline.comments.len(), 2);
     assert!((timeline.comments[0].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments[0]);
+
     let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(
         (kept[0].0, kept[0].1.frame_run, kept[0].1.origin.waited_millis),
         (before + 1, Some(before), Some(30_000))
     );
+
     assert_eq!(kept[1].1.frame_run, None, "a run that never was is not kept, the comment is");
 }
 
@@ -52,12 +58,15 @@ async fn answers_come_back_after_a_restart_and_a_changed_answer_keeps_the_old_on
     let segment = trial.view().segment.unwrap();
     trial.surgeon(Action::Acknowledge { segment }).await;
     trial.surgeon(Action::FinishSegment { segment }).await;
+
     trial.answer("sharpness", AnswerValue::Point(2)).await.unwrap();
     trial.answer("sharpness", AnswerValue::Point(6)).await.unwrap();
     drop(trial);
+
     let trial = Trial::start(folder.path()).await;
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(6));
     assert_eq!(trial.store.reader().answers(session).await.unwrap().len(), 2);
+
     let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.len(), 1);
     assert!(detail.answers[0].changed);
@@ -68,13 +77,16 @@ async fn a_comment_sent_twice_is_one_and_a_key_used_for_another_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.begin("paper").await;
+
     let comment = trial.comment("once");
     trial.conductor.comment(comment.clone()).await.unwrap();
     trial.conductor.comment(comment.clone()).await.unwrap();
     assert_eq!(trial.view().comments, 1);
+
     let mut other = comment;
     other.said = Said::Text("another".to_owned());
     assert!(matches!(trial.conductor.comment(other).await, Err(ConductError::Conflict(_))));
+
     assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 1);
 }
 
@@ -83,19 +95,24 @@ async fn what_is_said_is_kept_whatever_the_state() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let first = trial.begin("paper").await;
+
     let early = trial.comment("on the notice");
     let segment = trial.whole_setting().await;
     trial.conductor.comment(early).await.unwrap();
+
     trial.conductor.act(Role::Operator, first, Action::Pause { reason: String::new() }).await.unwrap();
     trial.say("while paused").await;
+
     trial.conductor.act(Role::Operator, first, Action::Abort { reason: "fire alarm".to_owned() }).await.unwrap();
     let mut late = trial.comment("after the end");
     late.segment = Some(segment);
     trial.conductor.comment(late.clone()).await.unwrap();
+
     // Even when another session has begun.
     trial.begin("paper").await;
     late.key = trial.key();
     trial.conductor.comment(late).await.unwrap();
+
     let kept = trial.store.reader().comments(first).await.unwrap();
     assert_eq!(kept.len(), 5);
     assert_eq!(kept[1].1.segment, Some(segment), "a late comment stays with the segment that its page was showing");
@@ -109,14 +126,19 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
     let first = trial.begin("paper").await;
     let late = trial.comment("after the upgrade");
     trial.conductor.act(Role::Operator, first, Action::Abort { reason: "upgrade".to_owned() }).await.unwrap();
+
     trial.begin("paper").await;
+
+    // The first session is now by a protocol that this version cannot read.
     let pool = crate::storage::raw(folder.path()).await;
     let change = "DROP TRIGGER sessions_no_update; UPDATE sessions SET protocol_toml = 'of another version'";
     sqlx::raw_sql(change).execute(&pool).await.unwrap();
+
     let segment = late.segment;
     trial.conductor.comment(late).await.unwrap();
     let kept = trial.store.reader().comments(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, comment)| comment.segment).collect::<Vec<_>>(), [segment]);
+
     let answer = |key, segment| NewAnswer {
         key,
         session: first,
@@ -125,12 +147,15 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
         value: AnswerValue::Point(4),
         origin: Origin::default(),
     };
+
     let (key, other) = (trial.key(), trial.key());
     trial.conductor.answer(answer(key, segment)).await.unwrap();
     let elsewhere = trial.view().segment;
     assert!(matches!(trial.conductor.answer(answer(other, elsewhere)).await, Err(ConductError::NotFound(_))));
+
     let kept = trial.store.reader().answers(first).await.unwrap();
     assert_eq!(kept.iter().map(|(_, answer)| answer.value.clone()).collect::<Vec<_>>(), [AnswerValue::Point(4)]);
+
     let told = trial.conductor.session_detail(first).await.unwrap_err().to_string();
     assert!(told.contains(&first.to_string()) && told.contains("go on with the version that made it"), "{told}");
 }
@@ -140,13 +165,16 @@ async fn emoji_are_kept_whole_and_a_megabyte_is_refused_with_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.begin("paper").await;
+
     let emoji = "👩🏽‍⚕️🔬 ≠ 🧠\u{202e}\0 Ünïcödé";
     trial.say(emoji).await;
     let kept = trial.store.reader().comments(session).await.unwrap();
     assert_eq!(kept[0].1.said, Said::Text(emoji.to_owned()));
+
     let megabyte = trial.comment(&"x".repeat(1_000_000));
     let refused = trial.conductor.comment(megabyte).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Invalid(text) if text.contains("16384")), "{refused}");
+
     let blank = trial.comment(" \n");
     assert!(matches!(trial.conductor.comment(blank).await, Err(ConductError::Invalid(_))));
 }
@@ -156,9 +184,11 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     let session = trial.begin("paper").await;
+
     while trial.view().phase == Phase::Notice {
         trial.whole_setting().await;
     }
+
     let view = trial.view();
     let sus = view.questions.iter().find(|question| question.kind == QuestionKind::Sus).unwrap().id.clone();
     let item = |place: usize, point: u8| {
@@ -166,35 +196,45 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
         items[place] = point;
         AnswerValue::Points(items)
     };
+
     let origin = Origin::default();
     let answer =
         NewAnswer { key: trial.key(), session, segment: None, question: sus.clone(), value: item(0, 4), origin };
     trial.conductor.answer(answer.clone()).await.unwrap();
+
     drop(trial);
     let mut trial = Trial::start(folder.path()).await;
     trial.conductor.act(Role::Surgeon, session, Action::Resume).await.unwrap();
     assert_eq!(trial.view().answers[&sus], item(0, 4), "kept over a restart");
+
     for (place, point) in [(1, 2), (2, 3), (3, 1), (4, 4), (5, 3), (6, 2), (7, 2), (8, 4)] {
         trial.answer(&sus, item(place, point)).await.unwrap();
     }
+
     // A tablet that never got the answer sends it again, after all that.
     trial.conductor.answer(answer).await.unwrap();
+
     for question in view.questions.iter().filter(|question| question.id != sus) {
         let value = match &question.kind {
             QuestionKind::Ranking => AnswerValue::Points(vec![2, 1, 3, 4, 5, 6]),
             _ => AnswerValue::Text("fine".to_owned()),
         };
+
         trial.answer(&question.id, value).await.unwrap();
     }
+
     let done = Action::FinishQuestions { segment: None };
     let refused = trial.conductor.act(Role::Surgeon, session, done.clone()).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("still to be answered")), "{refused}");
+
     trial.answer(&sus, item(9, 2)).await.unwrap();
     trial.surgeon(done).await;
+
     let detail = trial.conductor.session_detail(session).await.unwrap();
     let kept = detail.answers.iter().find(|answer| answer.question == sus).unwrap();
     assert_eq!(kept.value, AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]));
     assert_eq!(kept.sus_score, Some(67.5));
+
     let answers = trial.store.reader().answers(session).await.unwrap();
     assert_eq!(answers.iter().filter(|(_, answer)| answer.question == sus).count(), 10, "one for each item");
 }

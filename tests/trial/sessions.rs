@@ -51,6 +51,7 @@ async fn nothing_that_surgeon_or_operator_get_tells_a_policy() {
         seen += &serde_json::to_string(surgeon.borrow_and_update().as_deref().unwrap()).unwrap();
         seen += &serde_json::to_string(operator.borrow_and_update().as_deref().unwrap()).unwrap();
     }
+
     // An emergency unblinding by the researcher changes nothing of that.
     trial.unblind(session).await;
     seen += &serde_json::to_string(&trial.operator_view()).unwrap();
@@ -97,6 +98,7 @@ async fn the_control_loop_is_told_each_policy_from_the_same_start_and_to_hold_in
         expected.push(Command::Drive { drive, segment: Some(setting.segment) });
         expected.push(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     }
+
     // After the last setting the lens holds through the closing questions, and is told so again at the end.
     expected.push(Command::Drive { drive: Drive::Hold { at: None }, segment: None });
     assert_eq!(trial.commanded(), expected);
@@ -157,6 +159,7 @@ async fn a_restarted_server_goes_on_at_the_same_place_and_forgets_at_most_a_seco
             trial.surgeon(Action::FinishQuestions { segment: trial.view().segment }).await;
         }
     }
+
     let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(detail.settings_detail[1].inspected_seconds, Some(120.0));
     drop(trial);
@@ -208,6 +211,7 @@ async fn a_handler_that_is_dropped_midway_leaves_memory_and_disk_the_same() {
         // Polled once, as by a browser that went away at once, then dropped.
         let _ = tap.as_mut().poll(&mut Context::from_waker(Waker::noop()));
     }
+
     let mut views = trial.conductor.surgeon_view();
     views.wait_for(|view| view.as_ref().is_some_and(|view| view.phase == Phase::Inspecting)).await.unwrap();
     assert_eq!(trial.store.reader().events(session).await.unwrap().len(), 3);

@@ -120,6 +120,7 @@ async fn what_was_recorded_cannot_be_changed_or_removed() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     trial.whole_session("practice").await;
+
     let pool = raw(folder.path()).await;
     for table in ["sessions", "segments", "events", "comments", "answers"] {
         for sql in [format!("DELETE FROM {table}"), format!("UPDATE {table} SET session = session")] {
@@ -127,6 +128,7 @@ async fn what_was_recorded_cannot_be_changed_or_removed() {
             assert!(refused.is_err_and(|error| error.to_string().contains("append-only")), "{sql}");
         }
     }
+
     // REPLACE removes what it puts itself in the place of, by any of the columns that must be unique.
     let mut connection = pool.acquire().await.unwrap();
     for (table, forged) in [
@@ -142,8 +144,10 @@ async fn what_was_recorded_cannot_be_changed_or_removed() {
             "CREATE TEMP TABLE forged AS SELECT * FROM {table}; UPDATE forged SET {forged} = 'forged'; \
              INSERT OR REPLACE INTO {table} SELECT * FROM forged LIMIT 1"
         );
+
         let _refused = sqlx::raw_sql(sqlx::AssertSqlSafe(script)).execute(&mut *connection).await;
         sqlx::raw_sql("DROP TABLE temp.forged").execute(&mut *connection).await.unwrap();
+
         let count = format!("SELECT count(*), total(coalesce({forged}, '') = 'forged') FROM {table}");
         let (rows, changed): (i64, f64) =
             sqlx::query_as(sqlx::AssertSqlSafe(count)).fetch_one(&mut *connection).await.unwrap();
@@ -158,28 +162,36 @@ async fn telemetry_is_written_with_its_segment_and_nothing_else_waits_for_it() {
     let session = trial.begin("paper").await;
     let segment = trial.view().segment.unwrap();
     trial.surgeon(Action::Acknowledge { segment }).await;
+
     let (sender, receiver) = tokio::sync::mpsc::channel(4096);
     let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
+
     for frame in 1..=1000 {
         let mut record = step(frame, Some(segment).filter(|_| frame > 500));
         record.metric = if frame == 501 { Some(f64::NAN) } else { record.metric };
         record.held = (frame == 502).then_some(Hold::Paused);
         sender.send(record).await.unwrap();
     }
+
     trial.say("meanwhile").await;
+
     drop(sender);
     writer.await.unwrap();
     assert_eq!(trial.store.telemetry_counts().written.load(Ordering::Relaxed), 1000);
+
     let pool = raw(folder.path()).await;
     let rows: i64 = sqlx::query_scalar("SELECT count(*) FROM telemetry").fetch_one(&pool).await.unwrap();
     assert_eq!(rows, 1000);
+
     let odd: (Option<f64>, String) = sqlx::query_as(
         "SELECT (SELECT metric FROM telemetry WHERE frame = 501), (SELECT held FROM telemetry WHERE frame = 502)",
     )
     .fetch_one(&pool)
     .await
     .unwrap();
+
     assert_eq!(odd, (None, "paused".to_owned()));
+
     let path = trial.store.reader().focal_path(session, 100).await.unwrap();
     assert_eq!(path.len(), 100, "of the 500 steps in the segment every fifth");
     assert_eq!((path[0].frame, path[1].frame, path[0].setting), (501, 506, 1));
@@ -191,24 +203,30 @@ async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
     let trial = Trial::start(folder.path()).await;
     trial.begin("paper").await;
     let segment = trial.view().segment.unwrap();
+
     let (sender, receiver) = tokio::sync::mpsc::channel(4096);
     let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
     for frame in 1..=1000 {
         sender.send(step(frame, Some(segment).filter(|_| (201..=300).contains(&frame)))).await.unwrap();
     }
+
     drop(sender);
     writer.await.unwrap();
+
     let pool = raw(folder.path()).await;
     let left = async || {
         let sql = "SELECT frame, segment IS NOT NULL FROM telemetry ORDER BY frame";
         sqlx::query_as::<_, (i64, bool)>(sql).fetch_all(&pool).await.unwrap()
     };
+
     let up_to = trial.store.forget_steps_outside(0, 150, 400).await.unwrap();
     assert_eq!((up_to, left().await.len()), (150, 850), "a few at a time");
+
     let mut looked_at = up_to;
     for _ in 0..10 {
         looked_at = trial.store.forget_steps_outside(looked_at, 150, 400).await.unwrap();
     }
+
     let left = left().await;
     assert_eq!(left.iter().filter(|(_, inside)| *inside).count(), 100, "all of the setting's");
     let outside: Vec<i64> = left.iter().filter(|(_, inside)| !inside).map(|(frame, _)| *frame).collect();
@@ -219,18 +237,23 @@ async fn old_telemetry_is_forgotten_but_never_that_of_a_setting() {
 async fn telemetry_that_a_failing_disk_refused_is_tried_again() {
     let folder = tempfile::tempdir().unwrap();
     let trial = Trial::start(folder.path()).await;
+
     let pool = raw(folder.path()).await;
     let trigger = "CREATE TRIGGER broken BEFORE INSERT ON telemetry BEGIN SELECT RAISE(ABORT, 'broken'); END";
     sqlx::query(trigger).execute(&pool).await.unwrap();
+
     let (sender, receiver) = tokio::sync::mpsc::channel(64);
     let writer = tokio::spawn(telemetry::run_writer(trial.store.clone(), receiver));
     sender.send(step(1, None)).await.unwrap();
+
     let counts = trial.store.telemetry_counts();
     while counts.failed_batches.load(Ordering::Relaxed) == 0 {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
+
     sqlx::query("DROP TRIGGER broken").execute(&pool).await.unwrap();
     sender.send(step(2, None)).await.unwrap();
+
     drop(sender);
     writer.await.unwrap();
     let frames: Vec<i64> = sqlx::query_scalar("SELECT frame FROM telemetry").fetch_all(&pool).await.unwrap();

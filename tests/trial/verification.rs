@@ -13,8 +13,10 @@ async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     trial.unblind(session).await;
+
     let out = data.path().join("export");
     export(trial.store.reader(), session, &out, true).await.unwrap();
+
     let checks = verify(&out);
     assert!(checks.iter().all(|check| matches!(check.verdict, Verdict::Passed(_))), "{checks:#?}");
 
@@ -27,17 +29,22 @@ async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
         std::fs::write(&path, before).unwrap();
         failures
     };
+
     assert_eq!(change("comments.csv", "🔬", "!"), ["checksums", "copies"]);
     assert_eq!(change("telemetry.csv", "0.35", "abc"), ["checksums", "columns"]);
     assert_eq!(change("protocol.toml", "120", "121"), ["checksums", "protocol", "commitment"]);
+
     let schedule = json(&out, "allocation.json")["schedule"].clone();
     let (first, other) = (schedule[0].as_str().unwrap(), schedule.as_array().unwrap());
     let other = other.iter().map(|name| name.as_str().unwrap()).find(|name| *name != first).unwrap();
     assert_eq!(change("allocation.csv", first, other), ["checksums", "commitment", "schedule"]);
+
     let seed = json(&out, "allocation.json")["seed"].as_str().unwrap().to_owned();
     assert_eq!(change("allocation.json", &seed, &"0".repeat(64)), ["checksums", "commitment", "schedule"]);
+
     let third = std::fs::read_to_string(out.join("events.csv")).unwrap().lines().nth(3).unwrap().to_owned() + "\n";
     assert_eq!(change("events.csv", &third, ""), ["checksums", "events", "copies"]);
+
     std::fs::write(out.join("more.txt"), "").unwrap();
     assert_eq!(failed(&verify(&out)), ["checksums"]);
 }
@@ -66,13 +73,16 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     trial.unblind(session).await;
+
     let out = data.path().join("export");
     export(trial.store.reader(), session, &out, true).await.unwrap();
+
     let kept: Vec<_> = std::fs::read_dir(&out)
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .map(|path| (path.clone(), std::fs::read(path).unwrap()))
         .collect();
+
     let found = |forge: &dyn Fn()| {
         forge();
         sum_again(&out);
@@ -82,6 +92,7 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
         }
         found
     };
+
     let read = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
     let write = |file: &str, text: String| std::fs::write(out.join(file), text).unwrap();
     let remove = |file: &str| std::fs::remove_file(out.join(file)).unwrap();
@@ -89,11 +100,13 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
 
     // Policies given to other segments.
     assert_eq!(found(&|| write("allocation.csv", reversed(&read("allocation.csv"), 3))), ["commitment", "schedule"]);
+
     // The draw taken away, in part and whole.
     let withheld = read("allocation.json").replace(json(&out, "allocation.json")["seed"].as_str().unwrap(), "");
     let withheld = withheld.replace("\"seed\": \"\"", "\"seed\": null");
     assert_eq!(found(&|| write("allocation.json", withheld.clone())), ["commitment", "schedule"]);
     assert_eq!(found(&|| remove("allocation.json")), ["copies"]);
+
     // Another way of drawing.
     let drawn = |file: &str| write(file, read(file).replace("parfocal-shuffle-1", "parfocal-balanced-1"));
     assert_eq!(found(&|| drawn("allocation.json")), ["commitment", "schedule"]);
@@ -101,25 +114,31 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
         found(&|| ["allocation.json", "sessions.csv", "session.json"].into_iter().for_each(drawn)),
         ["commitment", "schedule"]
     );
+
     // What was said.
     let answers: String =
         read("answers.csv").lines().filter(|line| !line.starts_with("3,")).map(|l| l.to_owned() + "\n").collect();
     assert_eq!(found(&|| write("answers.csv", answers.clone())), ["said", "copies"]);
+
     let comments = read("comments.csv");
     let all_but_the_last = comments[..=comments.rfind("\n6,").unwrap()].to_owned();
     assert_eq!(found(&|| write("comments.csv", all_but_the_last.clone())), ["said", "copies"]);
+
     assert_eq!(found(&|| write("comments.csv", read("comments.csv").replace('🔬', "!"))), ["copies"]);
     assert_eq!(found(&|| remove("session.json")), ["copies"]);
     assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "copies"]);
+
     // An answer that counts though it came too late.
     let late = read("answers.csv").replacen(",false,false\n", ",true,false\n", 1);
     assert_eq!(found(&|| write("answers.csv", late.clone())), ["said", "copies"]);
+
     // An event without a number.
     let event = read("events.csv").lines().last().unwrap().to_owned();
     let (number, rest) =
         event.split_once(',').map(|(session, rest)| (session, rest.split_once(',').unwrap().1)).unwrap();
     let unnumbered = read("events.csv") + &format!("{number},,{rest}\n");
     assert_eq!(found(&|| write("events.csv", unnumbered.clone())), ["events", "copies"]);
+
     // A setting that never was.
     let steps =
         read("policy_steps.csv") + &read("policy_steps.csv").lines().nth(1).unwrap().replacen('1', "9", 1) + "\n";

@@ -94,6 +94,7 @@ pub fn check_scale(calibration: &Calibration) -> Result<(), CalibrationFault> {
         )
         .into());
     }
+
     Ok(())
 }
 

@@ -176,8 +176,10 @@ impl Device {
                 Setting::Gain => (self.camera.gain().ok()?, self.camera.gain_bounds().ok()?),
                 Setting::FrameRate => (self.camera.frame_rate().ok()?, self.camera.frame_rate_bounds().ok()?),
             };
+
             Some(Adjustable { setting, value, min, max })
         };
+
         Setting::ALL.into_iter().filter_map(offer).collect()
     }
 

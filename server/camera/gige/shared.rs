@@ -44,6 +44,7 @@ impl Shared {
             lost: 0,
             stop: false,
         };
+
         Self { clock, controls: Controls::default(), state: Mutex::new(state), changed: Condvar::new() }
     }
 

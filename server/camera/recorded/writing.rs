@@ -192,6 +192,7 @@ fn same(stored: &Header, asked: &Header) -> Result<(), &'static str> {
         (stored.focal_powers != asked.focal_powers, "of other focal powers"),
         (stored.simulated != asked.simulated || stored.order != asked.order, "of another kind"),
     ];
+
     differs.iter().find(|(differs, _)| *differs).map_or(Ok(()), |(_, how)| Err(how))
 }
 

@@ -77,6 +77,7 @@ fn table(stops: &[Stop]) -> String {
             "{asked:7.3}    {read_back:7.3}  {asked_dioptre:6.3} dpt  {read_back_dioptre:6.3} dpt  {off:+.3} dpt"
         );
     }
+
     let _ = writeln!(text, "largest difference {:.3} dpt", worst(stops));
     text
 }

@@ -72,6 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         poses: arguments.poses,
         seed: arguments.seed,
     };
+
     let progress = bar(cut.poses, 0);
     from_stack(&even, &cut, &arguments.out, &|| progress.inc(1))?;
     progress.finish_and_clear();

@@ -241,6 +241,7 @@ fn optics_of(scan: &ScanFolder) -> Option<Optics> {
             let picture = scan.picture(pose, image).ok()?;
             Some(Plane { name: image.file.clone(), position: image.focal_power.get(), picture })
         };
+
         FocalStack::new(pose.images.iter().map(plane).collect::<Option<_>>()?).ok()
     });
 

@@ -165,6 +165,7 @@ impl<A: Audience> Desk<A> {
                 frame = next_frame(&mut self.watcher), if self.in_flight.is_none() => self.frame(frame.as_deref()),
                 _ = self.heartbeat.tick() => self.beat()?,
             };
+
             if message.is_some() {
                 return Ok(message);
             }
@@ -190,6 +191,7 @@ impl<A: Audience> Desk<A> {
             }
             Err(_) => return Ok(Some(close(close_code::POLICY, "this is no message of a page"))),
         }
+
         Ok(None)
     }
 

@@ -167,6 +167,7 @@ mod tests {
             assert_eq!(told(hold, 10), told(policys[0], 10));
             assert!(told(hold, 10).1.is_some_and(|told| !told.contains("policy")));
         }
+
         for hold in [Hold::LensFailed, Hold::CameraFailed, Hold::Paused] {
             assert_eq!(told(hold, 0), (Some(hold), Some(Arc::clone(&message))));
         }

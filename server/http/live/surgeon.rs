@@ -83,6 +83,7 @@ impl SurgeonStatus {
             Some(Hold::LensFailed) => Some("The focus is being held for the moment."),
             _ => None,
         };
+
         Self { camera_simulated: status.camera.simulated, lens_simulated: status.lens.simulated, notice }
     }
 }

@@ -346,6 +346,7 @@ impl Firmware {
             Fault::WrongReadBack if answer.starts_with(b"PD") => spoil_checksum(&mut answer),
             _ => {}
         }
+
         answer
     }
 }

@@ -35,5 +35,6 @@ pub fn checksum_of(payload: &[u8]) -> [u8; 2] {
             crc = if crc & 1 == 1 { (crc >> 1) ^ 0xA001 } else { crc >> 1 };
         }
     }
+
     crc.to_le_bytes()
 }

@@ -354,6 +354,7 @@ impl<'a> Link<'a> {
                 Err(error) => return Err(error),
             }
         }
+
         Ok(())
     }
 

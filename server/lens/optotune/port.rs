@@ -123,6 +123,7 @@ fn open_error(path: &Path, error: Errno) -> LensError {
         Errno::NOTTY | Errno::INVAL | Errno::ISDIR => "this is not a serial port".into(),
         other => std::io::Error::from(other).to_string(),
     };
+
     gone(path, &why)
 }
 

@@ -206,6 +206,7 @@ impl Shared {
             .changed
             .wait_timeout_while(self.state(), timeout, |state| !state.tried)
             .unwrap_or_else(PoisonError::into_inner);
+
         state.device.clone()
     }
 

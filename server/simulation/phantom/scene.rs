@@ -136,6 +136,7 @@ fn paint(cortex: &Cortex, vessels: &Vessels, character: &Character, rng: &mut im
             veins: vessels.veins.row(y),
             noises: [&lines[0], &lines[1], &lines[2], &lines[3]],
         };
+
         paint_row(out, &rows, character);
     }
 

@@ -201,6 +201,7 @@ mod tests {
                 let counts = [0.5, 0.1].map(|part| (part * exposure.gain() * FULL_SCALE).min(FULL_SCALE) as u16);
                 exposure.adjust((0..1000).map(|index| counts[usize::from(index % 20 != 0)]));
             }
+
             assert!((exposure.gain() - 1.6).abs() < 0.05, "{}", exposure.gain());
         }
     }

@@ -168,6 +168,7 @@ mod tests {
             } else {
                 still.expose_view(3, power, &mut samples);
             }
+
             let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
             reconstructor.gray_view(&mosaic, still.patch())
         };

@@ -50,8 +50,12 @@ impl Blinded {
         let lines = reader.sessions(true).await?;
         let line = lines.into_iter().find(|line| line.session == session);
         let line = line.ok_or_else(|| StoreError::Damaged(format!("session {session} is not in the list")))?;
+
         let clocks = reader.run_clocks().await?;
+
+        // What tells the policies goes no further than this.
         let blind = |(run, event): (i64, Event)| (run, Event { kind: event.kind.for_the_blinded(), ..event });
+
         Ok(Self {
             line,
             run: stored.run,
@@ -154,6 +158,7 @@ impl Blinded {
             let of_it = || events.clone().filter(move |event| event.kind.segment() == Some(segment));
             let started = of_it().find(|event| matches!(event.kind, EventKind::SegmentStarted { .. }));
             let finished = of_it().find(|event| matches!(event.kind, EventKind::SegmentFinished { .. }));
+
             SegmentRow {
                 session: self.session(),
                 setting,
@@ -164,12 +169,14 @@ impl Blinded {
                 inspected_seconds: finished.and_then(|event| event.kind.inspected_ms()).map(seconds),
             }
         };
+
         self.segments.iter().zip(1..).map(row).collect()
     }
 
     fn comment_rows(&self) -> Vec<CommentRow> {
         let row = |((run, comment), number): (&(i64, Comment), usize)| {
             let (kind, text) = said_columns(&comment.said);
+
             CommentRow {
                 number,
                 key: comment.key,
@@ -191,6 +198,7 @@ impl Blinded {
                 late: comment.late,
             }
         };
+
         self.comments.iter().zip(1..).map(row).collect()
     }
 
@@ -203,6 +211,7 @@ impl Blinded {
                 (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
                 _ => None,
             };
+
             AnswerRow {
                 number,
                 key: answer.key,
@@ -229,6 +238,7 @@ impl Blinded {
                 disagrees: standing.disagrees,
             }
         };
+
         self.answers.iter().zip(standings).zip(1..).map(row).collect()
     }
 
@@ -239,6 +249,7 @@ impl Blinded {
                 EventKind::Unblinded { emergency, .. } => (None, Some(*emergency)),
                 _ => (None, None),
             };
+
             EventRow {
                 session: self.session(),
                 number: event.number,
@@ -254,6 +265,7 @@ impl Blinded {
                 emergency,
             }
         };
+
         self.events.iter().map(row).collect()
     }
 }
@@ -274,6 +286,7 @@ fn device_rows(events: Vec<(i64, i64, DeviceEvent)>) -> Vec<DeviceRow> {
         working: event.working,
         message: event.message,
     };
+
     events.into_iter().map(row).collect()
 }
 

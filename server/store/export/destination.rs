@@ -124,6 +124,7 @@ impl NewFolder {
             let _ = std::fs::remove_dir_all(&whole);
             ExportError::Unwritable { path: self.out.clone(), error }
         })?;
+
         sync_folder_of(&self.out);
         Ok(())
     }
@@ -161,6 +162,7 @@ impl ZipStream {
                 None => Some((Err(io::Error::other("the export was cut off")), None)),
             }
         });
+
         (Self { root, archive, made, pieces }, bytes)
     }
 
@@ -237,6 +239,7 @@ mod tests {
             } else {
                 drop(zip);
             }
+
             let mut pieces = Vec::new();
             while let Some(piece) = bytes.next().await {
                 pieces.push(piece.is_ok());

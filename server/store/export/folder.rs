@@ -62,6 +62,7 @@ impl Folder {
             gathered: 0,
             rows: PhantomData,
         };
+
         file.record(&header)?;
         Ok(file)
     }
@@ -119,6 +120,7 @@ impl Folder {
             "hash": format!("sha256:{}", file.sha256),
             "schema": table.schema(),
         }));
+
         self.files.push((table.file(), file.sha256));
     }
 }
@@ -172,6 +174,7 @@ impl<R: Row> CsvFile<'_, R> {
             let error = std::io::Error::other(error.to_string());
             ExportError::Unwritable { path: Path::new(&self.name).to_owned(), error }
         })?;
+
         self.gathered = 0;
         self.sha256.update(&block);
         self.bytes += block.len();

@@ -124,6 +124,7 @@ async fn read(
         Some(Some(telling)) => Some(telling),
         None => None,
     };
+
     Ok((Blinded::of(reader, stored).await?, telling))
 }
 

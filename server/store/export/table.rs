@@ -317,11 +317,13 @@ mod tests {
             .iter()
             .map(|column| (column.name, column.kind, column.unit, column.description, column.since))
             .collect();
+
         let expected = [
             ("number", Type::Integer, "", "Order", 1),
             ("at", Type::Datetime, "UTC", "When", 2),
             ("text", Type::String, "", "What", 1),
         ];
+
         assert_eq!(columns, expected);
         assert_eq!(MarkRow::TABLE.key, ["number", "at"]);
         let first: Vec<_> = MarkRow::TABLE.columns_of(1).map(|column| column.name).collect();

@@ -30,6 +30,7 @@ impl Unblinded {
             EventKind::Unblinded { reason, .. } => Some(reason.clone()),
             _ => None,
         });
+
         let Some(reason) = reason else { return Ok(None) };
         let seed_told = reader.balanced_set(stored.made.seed).await?.may_tell_seed();
         Ok(Some(Self { made: stored.made.clone(), reason, seed_told }))

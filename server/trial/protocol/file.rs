@@ -129,16 +129,20 @@ fn check_order(file: &File, settings: usize) -> Result<(), Fault> {
         let message = format!("{settings} segments are too many; the limit is {MOST_SETTINGS}");
         return Err(Fault::new(file.repeats.span(), "repeats", message));
     }
+
     if *file.order.get_ref() != Order::Balanced {
         return Ok(());
     }
     let policies = file.policies.get_ref().len();
     if !(2..=4).contains(&policies) || settings > MOST_BALANCED_SETTINGS {
         let message = format!(
-            "'balanced' takes 2 to 4 policies and at most {MOST_BALANCED_SETTINGS} segments, not {policies} and {settings}"
+            "'balanced' takes 2 to 4 policies and at most {MOST_BALANCED_SETTINGS} segments, \
+             not {policies} and {settings}"
         );
+
         return Err(Fault::new(file.order.span(), "order", message));
     }
+
     Ok(())
 }
 
@@ -186,11 +190,13 @@ impl Reader<'_> {
                 let message = format!("there is no policy '{name}'; there are: {}", known.join(", "));
                 return Err(Fault::new(policy.span(), "policies", message));
             }
+
             if names.contains(name) {
                 return Err(Fault::new(policy.span(), "policies", format!("'{name}' is listed twice; use 'repeats'")));
             }
             names.push(name.clone());
         }
+
         if names.is_empty() {
             return Err(Fault::new(policies.span(), "policies", "name at least one policy"));
         }
@@ -205,6 +211,7 @@ impl Reader<'_> {
             let message = format!("must be 1 to {LONGEST_TEXT} characters, not {length}");
             return Err(Fault::new(value.span(), key, message));
         }
+
         let lower = text.to_lowercase();
         // A name without a dash ("fixed") is a plain word too, and may be used as one.
         let named = self.known.iter().map(PolicyName::as_str).find(|name| name.contains('-') && lower.contains(name));
@@ -228,6 +235,7 @@ impl Reader<'_> {
                 Ok(Prompt { at: Duration::from_secs(at.into()), text: self.shown(&prompt.text, "text")? })
             })
             .collect::<Result<Vec<_>, Fault>>()?;
+
         read.sort_by_key(|prompt| prompt.at);
         Ok(read)
     }
@@ -261,6 +269,7 @@ impl Reader<'_> {
             }
             _ => {}
         }
+
         only_for_likert(question.points.as_ref().map(Spanned::span), "points")?;
         only_for_likert(question.low.as_ref().map(Spanned::span), "low")?;
         only_for_likert(question.high.as_ref().map(Spanned::span), "high")?;
@@ -278,6 +287,7 @@ impl Reader<'_> {
             let message = format!("must be 5 or 7, not {}", points.get_ref());
             return Err(Fault::new(points.span(), "points", message));
         }
+
         let low = self.shown(question.low.as_ref().ok_or_else(|| missing("low"))?, "low")?;
         let high = self.shown(question.high.as_ref().ok_or_else(|| missing("high"))?, "high")?;
         Ok(QuestionKind::Likert { points: *points.get_ref(), low, high })

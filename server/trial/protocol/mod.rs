@@ -130,6 +130,7 @@ mod tests {
             let source = PAPER.replace("repeats = 2", &format!("repeats = 2\n{line}"));
             Protocol::parse(&source, "trial.toml", &known()).map(|protocol| protocol.grace)
         };
+
         assert_eq!(grace(""), Ok(Duration::from_mins(30)));
         assert_eq!(grace("grace_minutes = 5"), Ok(Duration::from_mins(5)));
         assert_eq!(grace("grace_minutes = 0"), Ok(Duration::ZERO));
@@ -189,7 +190,8 @@ mod tests {
 
     #[test]
     fn a_likert_has_five_or_seven_points() {
-        let text = "\n[[after_segment]]\nid = \"x\"\ntext = \"x?\"\nkind = \"likert\"\npoints = 6\nlow = \"l\"\nhigh = \"h\"\n";
+        let text = "\n[[after_segment]]\nid = \"x\"\ntext = \"x?\"\n\
+                    kind = \"likert\"\npoints = 6\nlow = \"l\"\nhigh = \"h\"\n";
         let said = error(&format!("{PAPER}{text}"));
         assert!(said.contains("key 'points'") && said.contains("5 or 7"), "{said}");
     }

@@ -68,6 +68,7 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
         }
         Action::Unblind { .. } => ("the researcher", by == Role::Researcher),
     };
+
     if fits { Ok(()) } else { Err(Refusal::only(who)) }
 }
 
@@ -150,6 +151,7 @@ fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKin
         Phase::Completed | Phase::Aborted => return Err(Refusal::conflict("the session has ended")),
         _ => {}
     }
+
     if state.paused == Some(PauseCause::Operator) {
         return Ok(Vec::new());
     }

@@ -101,6 +101,7 @@ fn a_whole_session_goes_from_ready_to_completed() {
         run.state.keep_answer(Some(segment), "a", said("yes"));
         run.act(Role::Surgeon, &Action::FinishQuestions { segment: Some(segment) }).unwrap();
     }
+
     assert_eq!((run.state.phase(), run.state.segment()), (Phase::Closing, None));
     run.state.keep_answer(None, "z", said("yes"));
     run.act(Role::Surgeon, &Action::FinishQuestions { segment: None }).unwrap();
@@ -192,6 +193,7 @@ fn each_role_does_its_own() {
         (Action::Abort { reason: reason() }, vec![Role::Operator]),
         (Action::Unblind { reason: reason(), despite_outstanding: false }, vec![Role::Researcher]),
     ];
+
     let run = Run::inspecting(true);
     for (action, may) in table {
         for role in [Role::Surgeon, Role::Operator, Role::Researcher, Role::System] {
@@ -248,6 +250,7 @@ fn any_step() -> impl Strategy<Value = Step> {
         3 => Just(Action::Resume),
         1 => Just(Action::Unblind { reason: "u".to_owned(), despite_outstanding: false }),
     ];
+
     prop_oneof![
         20 => (role, action).prop_map(|(role, action)| Step::Act(role, action)),
         5 => (0_usize..3).prop_map(Step::Answer),
@@ -289,7 +292,8 @@ proptest! {
         for step in steps {
             take(&mut run, step);
             prop_assert!(run.state.inspected(run.now) <= run.state.plan().limit);
-            prop_assert!(!run.state.running() || run.state.phase() == Phase::Inspecting && run.state.paused().is_none());
+            let inspecting = run.state.phase() == Phase::Inspecting && run.state.paused().is_none();
+            prop_assert!(inspecting || !run.state.running());
         }
 
         let mut open = None;

@@ -38,6 +38,7 @@ pub async fn researcher(theatre: &Theatre) -> String {
         !consequence.contains("not confirmed since the end"),
         "the tablet has said that it is empty: {consequence}"
     );
+
     shoot(page, "researcher-3-unblinding").await;
     page.click("#reason-go").await;
     assert!(page.is("#reason-dialog", "open").await);
@@ -48,6 +49,7 @@ pub async fn researcher(theatre: &Theatre) -> String {
         page.attribute(".timeline .path", "d").await.is_some_and(|path| path.len() > 100)
     })
     .await;
+
     page.to_top().await;
     shoot(page, "researcher-4-unblinded").await;
     assert_eq!(page.start_of(&format!("{export}?unblinded=true")).await, "200 PK");
@@ -61,8 +63,10 @@ pub async fn researcher(theatre: &Theatre) -> String {
 pub async fn database(theatre: &Theatre, session: &str) {
     let pool = super::theatre::database(theatre.server.data.path()).await;
     let rows = sqlx::query(
-        "SELECT kind, text, setting, frame FROM comments LEFT JOIN segments USING (segment) WHERE comments.session = ? ORDER BY comments.number",
+        "SELECT kind, text, setting, frame FROM comments LEFT JOIN segments USING (segment)
+         WHERE comments.session = ? ORDER BY comments.number",
     );
+
     let rows = rows.bind(session).fetch_all(&pool).await.unwrap();
     let comments: Vec<(String, Option<String>, i64)> =
         rows.iter().map(|row| (row.get(0), row.get(1), row.get(2))).collect();
@@ -76,11 +80,13 @@ pub async fn database(theatre: &Theatre, session: &str) {
         ("text", Some("Saved before the crash"), 5),
         ("text", Some("Said while it was away"), 5),
     ];
+
     let expected = expected.map(|(kind, text, setting)| (kind.to_owned(), text.map(str::to_owned), setting));
     assert_eq!(comments, expected);
     assert!(rows.iter().all(|row| row.get::<Option<i64>, _>("frame").is_some()), "every comment names its frame");
 
-    let latest = "SELECT value FROM answers LEFT JOIN segments USING (segment) WHERE answers.session = ? AND question = ? ORDER BY setting, answers.number";
+    let latest = "SELECT value FROM answers LEFT JOIN segments USING (segment)
+                  WHERE answers.session = ? AND question = ? ORDER BY setting, answers.number";
     let values =
         |question: &'static str| sqlx::query_scalar::<_, String>(latest).bind(session).bind(question).fetch_all(&pool);
     // The first setting's answer was changed once; both stand.
@@ -93,15 +99,18 @@ pub async fn database(theatre: &Theatre, session: &str) {
         items[place] = *point;
         json!(items).to_string()
     });
+
     assert_eq!(values("usability").await.unwrap(), items.collect::<Vec<_>>());
     assert_eq!(values("closing-remarks").await.unwrap(), ["\"That it stays still\""]);
 
-    let events = "SELECT kind FROM events WHERE session = ? AND kind NOT LIKE 'segment-%' AND kind != 'questions-finished' ORDER BY number";
+    let events = "SELECT kind FROM events
+                  WHERE session = ? AND kind NOT LIKE 'segment-%' AND kind != 'questions-finished' ORDER BY number";
     let events: Vec<String> = sqlx::query_scalar(events).bind(session).fetch_all(&pool).await.unwrap();
     assert_eq!(
         events,
         ["created", "started", "server-restarted", "resumed", "paused", "resumed", "completed", "unblinded"]
     );
+
     let steps = "SELECT count(DISTINCT segment) FROM telemetry WHERE segment IS NOT NULL";
     assert_eq!(sqlx::query_scalar::<_, i64>(steps).fetch_one(&pool).await.unwrap(), 6, "every setting has telemetry");
     pool.close().await;
@@ -119,6 +128,7 @@ pub fn export(theatre: &Theatre, session: &str) {
         .arg(theatre.server.data.path())
         .output()
         .unwrap();
+
     assert!(exported.status.success(), "{}", String::from_utf8_lossy(&exported.stderr));
     let verified = parfocal().arg("verify").arg(&folder).output().unwrap();
     assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));

@@ -111,6 +111,7 @@ pub fn check(connections: &[Connection]) -> Seen {
             }
         }
     }
+
     let ids: Vec<_> = seen.segments.values().flatten().collect();
     assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), ids.len(), "two settings share an id: {:?}", seen.segments);
     assert!(seen.segments.values().all(|ids| ids.len() == 1), "a setting changed its id: {:?}", seen.segments);

@@ -82,6 +82,7 @@ async fn beside_another_operator(theatre: &Theatre) {
         let request = client().post(theatre.server.url(path)).bearer_auth(theatre.server.key("operator"));
         request.json(&body).send().await.unwrap().error_for_status().unwrap().text().await.unwrap()
     };
+
     other("/api/operator/participants", json!({ "code": "S-08" })).await;
     let view = client().get(theatre.server.url("/api/operator/session")).bearer_auth(theatre.server.key("operator"));
     let session = view.send().await.unwrap().json::<Value>().await.unwrap()["session"].clone();
@@ -186,6 +187,7 @@ async fn database(theatre: &Theatre) {
         [("practice", true, 1), ("practice", true, 0), ("practice", true, 0), ("limited", false, 2)]
             .map(|(protocol, practice, comments)| (protocol.to_owned(), practice, comments))
     );
+
     let sql =
         "SELECT kind, role, payload FROM events NATURAL JOIN (SELECT session FROM sessions WHERE protocol = 'limited')
                WHERE kind IN ('segment-finished', 'unblinded', 'aborted') ORDER BY number";
@@ -194,6 +196,7 @@ async fn database(theatre: &Theatre) {
         .iter()
         .map(|row| (row.get(0), row.get(1), serde_json::from_str(row.get::<&str, _>(2)).unwrap()))
         .collect();
+
     let kinds: Vec<_> = events.iter().map(|(kind, role, _)| (kind.as_str(), role.as_str())).collect();
     assert_eq!(kinds, [("segment-finished", "system"), ("unblinded", "researcher"), ("aborted", "operator")]);
     assert_eq!(events[0].2["inspected_ms"], 10_000);

@@ -76,6 +76,7 @@ impl Driver {
             .connect(&format!("http://127.0.0.1:{}", self.port))
             .await
             .unwrap_or_else(|error| panic!("cannot start Chromium ({error}): {NEEDED}"));
+
         let timeouts = TimeoutConfiguration::new(Some(Duration::from_mins(1)), Some(Duration::from_mins(1)), None);
         client.update_timeouts(timeouts).await.unwrap();
         Browser { client, _profile: profile }
@@ -91,6 +92,7 @@ impl Drop for Driver {
             write!(line, "{head}:{}\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{}}", self.port)?;
             line.read_to_end(&mut Vec::new())
         });
+
         if asked.is_err() {
             let _ = self.process.kill();
         }
@@ -229,6 +231,7 @@ impl Browser {
                     return button.click().await.is_ok();
                 }
             }
+
             false
         })
         .await;
@@ -299,6 +302,7 @@ impl Browser {
                     return false;
                 }
             }
+
             true
         })
         .await;
@@ -312,6 +316,7 @@ impl Browser {
                 Err(error) if error.is_no_such_element() => return String::new(),
                 Err(error) => Err(error),
             };
+
             match text {
                 Ok(text) => return text,
                 // The page has drawn it anew meanwhile.

@@ -35,6 +35,7 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
         }
     })
     .await;
+
     surgeon.sees("#comment-state", "1 comment is not saved yet").await;
     surgeon.sees("#comment-state", "the disk is full").await;
     shoot(surgeon, "surgeon-13-full-disk").await;

@@ -29,6 +29,7 @@ async fn a_killed_server_loses_nothing_that_it_acknowledged() {
         assert_eq!(view["answers"]["sharpness"], 4, "the answer is still there");
         trial.act(json!({ "action": "finish-questions" })).await;
     }
+
     for number in 3..=6 {
         assert_eq!(trial.view().await["setting"], number);
         trial.act(json!({ "action": "acknowledge" })).await;
@@ -36,6 +37,7 @@ async fn a_killed_server_loses_nothing_that_it_acknowledged() {
         trial.answer("sharpness", json!(4)).await;
         trial.act(json!({ "action": "finish-questions" })).await;
     }
+
     trial.say_and_kill("closing", 6).await;
     assert_eq!(trial.kept().await, trial.acknowledged);
 }
@@ -60,6 +62,7 @@ impl Trial {
             "key": Uuid::from_u128(0x4000_8000 << 64 | self.acknowledged.len() as u128),
             "session": self.session, "segment": before["segment"], "kind": "text", "text": text,
         });
+
         self.post("surgeon", "comments", comment.clone()).await;
         self.acknowledged.push(text);
         theatre::kill(&mut self.server);

@@ -33,6 +33,7 @@ async fn the_operator_reads_what_is_wrong_with_the_lens() {
         emulator.set_fault(Fault::None);
         operator.sees_no("#warnings .bad").await;
     }
+
     emulator.set_lens_present(false);
     operator.sees("#warnings .bad", "no lens is connected").await;
     emulator.set_lens_present(true);

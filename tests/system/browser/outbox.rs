@@ -21,7 +21,8 @@ const OUTBOX: &str = r#"
         arrivals.shift()?.();
         return answers.shift() ?? Promise.resolve(new Response(null, { status: 204 }));
     };
-    const ours = (status) => new Response('{"error": "so it is"}', { status, headers: { "content-type": "application/json" } });
+    const json = { "content-type": "application/json" };
+    const ours = (status) => new Response('{"error": "so it is"}', { status, headers: json });
     const saved = (outbox) => new Promise((done) => outbox.subscribe(() => outbox.waiting.length === 0 && done()));
     const kept = () => Object.keys(localStorage).filter((key) => key.startsWith("parfocal.outbox.")).length;
 "#;
@@ -50,7 +51,8 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
         fail();
         await done;
         const first = bodies[0].sequence;
-        return [posted, kept(), bodies.map(({ sequence }) => sequence - first), new Set(bodies.map(({ device }) => device)).size];
+        const devices = new Set(bodies.map(({ device }) => device));
+        return [posted, kept(), bodies.map(({ sequence }) => sequence - first), devices.size];
     "#;
     assert_eq!(
         run(&page, script).await,
@@ -80,7 +82,8 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
     // Only the server's own word that it is kept takes it off the device.
     let script = r#"
         const outbox = openOutbox();
-        answers.push(Promise.resolve(new Response("", { status: 200 })), Promise.resolve(new Response("{}", { status: 200 })));
+        answers.push(Promise.resolve(new Response("", { status: 200 })));
+        answers.push(Promise.resolve(new Response("{}", { status: 200 })));
         const done = saved(outbox);
         outbox.add("/comments", { value: "d" });
         await done;
@@ -139,7 +142,8 @@ async fn the_last_answer_counts_and_nothing_refused_is_thrown_away() {
 /// What a page tells of an entry's wait: whether that was about as many seconds as `expected`, and by which clock.
 const WAIT: &str = r#"
     const clock = Date.now;
-    const wait = ({ waited_millis: waited, waited_by: by }, expected) => [Math.abs(waited - expected * 1000) < 30000, by];
+    const wait = ({ waited_millis: waited, waited_by: by }, expected) =>
+        [Math.abs(waited - expected * 1000) < 30000, by];
     /** An entry that the server does not take at first; `meanwhile` happens before it is sent again. */
     const heldBack = async (meanwhile) => {
         const outbox = openOutbox();
@@ -193,7 +197,13 @@ async fn a_clock_that_is_set_moves_no_comment_and_a_tablet_that_sleeps_is_not_ta
     page.reload().await;
     let again = OUTBOX.replace("localStorage.clear();", "");
     let script = format!(
-        "return (async () => {{ {again} {WAIT} const outbox = openOutbox(); await saved(outbox); return wait(bodies[0], 600); }})()"
+        "return (async () => {{
+            {again} {WAIT}
+            const outbox = openOutbox();
+            await saved(outbox);
+            return wait(bodies[0], 600);
+        }})()"
     );
+
     assert_eq!(page.run(&script, &[]).await, json!([true, "wall-clock"]));
 }

@@ -51,6 +51,7 @@ impl Proxy {
                 });
             }
         });
+
         Self { address, recordings, broken }
     }
 

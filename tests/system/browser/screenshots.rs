@@ -17,6 +17,7 @@ pub async fn shoot(browser: &Browser, name: &str) {
         let png = browser.screenshot().await;
         std::fs::write(folder.join(format!("{name}-{width}x{height}.png")), png).unwrap();
     }
+
     let (width, height) = SIZES[0];
     resize(browser, width, height).await;
 }

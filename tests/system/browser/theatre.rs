@@ -103,6 +103,7 @@ impl Theatre {
             self.surgeon.text("#change-title").await != title
         })
         .await;
+
         self.surgeon.sees("#setting", &title).await;
         self.surgeon.sees("#remaining", "left").await;
     }

@@ -67,14 +67,20 @@ async fn first_setting_typed_comments(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     surgeon.type_into("#change-tap", "\u{e00c}").await; // Escape: the notice stays
     theatre.tap_notice(1).await;
+
     theatre.say("Follows me well 🧠", 1).await;
     theatre.say("Loses the fissure", 2).await;
     surgeon.sees("#prompt", "How does the focus feel now?").await;
+
     shoot(surgeon, "surgeon-4-inspecting").await;
+
+    // An upright tablet with its keyboard open.
     resize(surgeon, 820, 780).await;
     let width = surgeon.area("#comment").await.width;
     assert!(width > 700.0, "beside an upright tablet's keyboard there is as much room to write: {width}");
     resize(surgeon, 1180, 820).await;
+
+    // The operator reads along, and is told nothing of policy or timing.
     theatre.operator.sees("#comments", "Follows me well 🧠").await;
     theatre.operator.sees("#phase", "Setting 1 of 6: inspecting").await;
     theatre.operator.sees("#traces-hidden", "hidden while a session runs").await;
@@ -82,15 +88,19 @@ async fn first_setting_typed_comments(theatre: &Theatre) {
     let shown = theatre.operator.property("#policy option:checked", "text").await;
     assert_eq!(shown.as_deref(), Some("Hidden during a session"));
     shoot(&theatre.operator, "operator-3-inspecting").await;
+
+    // Not every question is answered at the first try.
     theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
     surgeon.click(".questions .done button").await;
     surgeon.sees("#missing", "One question is still open").await;
     surgeon.sees("[data-question=sharpness] > .state", "Not answered yet").await;
+
     theatre.choose("sharpness", 3).await;
     theatre.choose("sharpness", 5).await;
     surgeon.click("[data-question=remarks] textarea").await;
     surgeon.type_into("[data-question=remarks] textarea", "Good at rest").await;
+
     shoot(surgeon, "surgeon-5-questions").await;
     surgeon.click(".questions .done button").await;
 }
@@ -98,13 +108,16 @@ async fn first_setting_typed_comments(theatre: &Theatre) {
 async fn second_setting_quick_comments_and_double_taps(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(2).await;
+
     surgeon.double_click("#quick button:nth-child(3)").await;
     surgeon.double_click("#mark").await;
     theatre.sees_saved(4).await;
+
     surgeon.double_click("#finish").await;
     surgeon.sees("#finish", "Tap again to finish").await;
     surgeon.sees("#finish-heard", "Tap again to finish").await;
     shoot(surgeon, "surgeon-14-finish").await;
+
     surgeon.sees("#finish", "Done with this setting").await;
     surgeon.sees("#remaining", "left").await;
     theatre.finish_setting(2).await;
@@ -113,18 +126,22 @@ async fn second_setting_quick_comments_and_double_taps(theatre: &Theatre) {
 async fn third_setting_reload_and_second_tab(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(3).await;
+
     theatre.write("Half a thought").await;
     surgeon.reload().await;
     surgeon.sees("#setting", "Setting 3 of 6").await;
     until("the draft to be back", || async { theatre.comment_box().await == "Half a thought" }).await;
+
     let first = surgeon.new_tab(&format!("http://{}/surgeon", theatre.proxy.address)).await;
     surgeon.sees("#setting", "Setting 3 of 6").await;
     theatre.finish().await;
     surgeon.sees("#panel h2", "Setting 3: a few questions").await;
+
     surgeon.close_tab(&first).await;
     // The stale tab follows by itself, and its draft is still about setting 3.
     surgeon.sees("#panel h2", "Setting 3: a few questions").await;
     assert_eq!(theatre.comment_box().await, "Half a thought");
+
     theatre.say(", whole", 5).await;
     theatre.answer_questions(6).await;
 }
@@ -132,19 +149,23 @@ async fn third_setting_reload_and_second_tab(theatre: &Theatre) {
 async fn fourth_setting_too_long_a_comment(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(4).await;
+
     let picture = theatre.picture().await;
     surgeon.paste("#comment", &"x".repeat(1_000_000)).await;
     surgeon.click("#send").await;
     surgeon.sees("#comment-trouble", "is back in the box: This text is too long").await;
     assert_eq!(theatre.comment_box().await.len(), 1_000_000);
     assert_eq!(theatre.picture().await, picture, "neither a long comment nor a message moves the picture");
+
     let colours = surgeon.area(".viewer-colour").await;
     let message = surgeon.area(".dock .trouble").await;
     assert!(colours.bottom() <= message.top, "a message covers what is said about the colours");
+
     shoot(surgeon, "surgeon-15-long-comment").await;
     surgeon.reload().await;
     surgeon.sees("#setting", "Setting 4 of 6").await;
     until("the paste to be back", || async { theatre.comment_box().await.len() == 1_000_000 }).await;
+
     surgeon.paste("#comment", "Shortened").await;
     surgeon.click("#send").await;
     theatre.sees_saved(6).await;
@@ -154,30 +175,38 @@ async fn fourth_setting_too_long_a_comment(theatre: &Theatre) {
 async fn fifth_setting_killed_server(theatre: &mut Theatre) {
     theatre.tap_notice(5).await;
     theatre.say("Saved before the crash", 7).await;
+
     kill(&mut theatre.server);
     theatre.write("Said while it was away").await;
     theatre.surgeon.click("#send").await;
     theatre.surgeon.sees("#comment-state", "kept on this device").await;
+
     theatre.surgeon.click("#finish").await;
     until("the server not to answer", || async {
         theatre.surgeon.try_click("#finish").await;
         theatre.surgeon.text("#trouble").await.contains("does not answer")
     })
     .await;
+
     theatre.surgeon.sees("#view .viewer-stale", "Not live").await;
+
     let edge = theatre.surgeon.area("#quick").await;
     let cut = theatre.surgeon.areas("#quick button").await.into_iter();
     let cut = cut.filter(|each| each.right() > edge.right() + 1.0 || each.bottom() > edge.bottom() + 1.0);
     assert_eq!(cut.count(), 0, "every quick comment can be tapped without a connection");
+
     let prompt = theatre.surgeon.style("#prompt", "visibility").await;
     assert_eq!(prompt, "hidden", "the prompt gives way to the warning");
+
     shoot(&theatre.surgeon, "surgeon-6-no-connection").await;
+
     start_again(&mut theatre.server);
     theatre.surgeon.sees("#panel h2", "Paused").await;
     theatre.surgeon.sees_no("#trouble:not(:empty)").await;
     theatre.sees_saved(8).await;
     theatre.surgeon.sees("#panel", "Everything you said is saved.").await;
     shoot(&theatre.surgeon, "surgeon-7-restarted").await;
+
     theatre.surgeon.click("#panel button").await;
     theatre.surgeon.sees_no("#panel").await;
     theatre.surgeon.sees("#setting", "Setting 5 of 6").await;
@@ -188,20 +217,25 @@ async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre) {
     let (operator, surgeon) = (&theatre.operator, &theatre.surgeon);
     theatre.tap_notice(6).await;
     operator.sees("#phase", "Setting 6 of 6: inspecting").await;
+
     operator.click("#session-actions button:nth-child(2)").await;
     operator.type_into("#reason", "The lamp was moved").await;
     shoot(operator, "operator-4-reason").await;
     operator.click("#reason-go").await;
+
     surgeon.sees("#panel", "The operator has paused the session").await;
     shoot(surgeon, "surgeon-8-paused").await;
     operator.sees("#log", "Paused: The lamp was moved").await;
+
     operator.click("#session-actions .primary").await;
     surgeon.sees_no("#panel").await;
+
     operator.sees("#session-actions", "End setting 6 now").await;
     operator.click("#session-actions button:first-child").await;
     operator.sees("#reason-heading", "End setting 6 now").await;
     operator.sees_no("#reason").await;
     shoot(operator, "operator-11-end-setting").await;
+
     operator.click("#reason-go").await;
     theatre.answer_questions(1).await;
 }
@@ -210,16 +244,21 @@ async fn closing_questions(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     surgeon.sees("#panel h2", "Final questions").await;
     shoot(surgeon, "surgeon-9-closing").await;
+
+    // A ranking counts once it is confirmed; until then a reload keeps it on the device.
     surgeon.click("[aria-label='Move setting 5 up']").await;
     surgeon.sees("[data-question=preference] > .state", "Kept on this device until you tap").await;
     surgeon.reload().await;
     surgeon.sees(".ranking li:nth-child(4)", "Setting 5").await;
     surgeon.click("[data-question=preference] .confirm").await;
     surgeon.sees("[data-question=preference] > .state", "Saved").await;
+
     half_a_questionnaire_on_a_second_tablet(theatre).await;
+
     surgeon.click("[data-question=closing-remarks] textarea").await;
     surgeon.type_into("[data-question=closing-remarks] textarea", "That it stays still").await;
     surgeon.click(".questions .done button").await;
+
     surgeon.sees("#panel h2", "Thank you").await;
     shoot(surgeon, "surgeon-10-completed").await;
     theatre.operator.sees("#phase", "Completed").await;
@@ -234,28 +273,36 @@ async fn half_a_questionnaire_on_a_second_tablet(theatre: &Theatre) {
             theatre.choose(&format!("usability-{item}"), point).await;
         }
     };
+
     let state = "[data-question=usability] > .state";
+
     give(0..4).await;
     surgeon.sees(state, "4 of 10 answered · Saved").await;
     surgeon.reload().await;
     surgeon.sees(state, "4 of 10 answered · Saved").await;
+
+    // The page leads to the first item without an answer.
     surgeon.click(".questions .done button").await;
     surgeon.sees("#missing", "2 questions are still open").await;
     surgeon.sees(".sus fieldset:nth-child(5) .gap", "Not answered yet").await;
     assert_eq!(surgeon.text(".sus fieldset:nth-child(4) .gap").await, "");
+
     let item = surgeon.area(".sus fieldset:nth-child(5)").await;
     let panel = surgeon.area("#panel").await;
     let is_seen = item.top >= panel.top && item.bottom() <= panel.bottom();
     assert!(is_seen, "the first item without an answer is on screen");
     shoot(surgeon, "surgeon-16-missing").await;
+
     let first = surgeon.new_tab(&format!("http://{}/surgeon", theatre.proxy.address)).await;
     surgeon.sees(state, "4 of 10 answered").await;
     give(4..9).await;
     surgeon.sees(state, "9 of 10 answered · Saved").await;
+
     surgeon.close_tab(&first).await;
     surgeon.sees(state, "9 of 10 answered").await;
     give(9..10).await;
     surgeon.sees(state, "Saved").await;
+
     let chosen = surgeon.values(".sus input:checked").await;
     assert_eq!(chosen, ["4", "2", "3", "1", "4", "3", "2", "2", "4", "2"]);
 }

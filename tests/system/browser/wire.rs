@@ -35,10 +35,12 @@ pub fn take_apart(connection: &Connection) -> Vec<Received> {
             messages(rest, &mut received);
             return received;
         }
+
         let (body, length) = body(&head, rest);
         rest = &rest[length..];
         received.push(Received::Answer { path, head, body });
     }
+
     assert!(find(rest, b"\r\n\r\n").is_none(), "an answer without a request");
     received
 }
@@ -57,6 +59,7 @@ fn body(head: &str, rest: &[u8]) -> (Vec<u8>, usize) {
             key.eq_ignore_ascii_case(name).then(|| value.trim().to_owned())
         })
     };
+
     assert_eq!(header("content-encoding"), None, "a compressed answer cannot be searched");
     if header("transfer-encoding").is_some() {
         return chunks(rest);
@@ -79,6 +82,7 @@ fn chunks(rest: &[u8]) -> (Vec<u8>, usize) {
             break;
         }
     }
+
     (body, at)
 }
 
@@ -95,6 +99,7 @@ fn messages(mut rest: &[u8], received: &mut Vec<Received>) {
             short @ 0..126 => (usize::from(short), 2),
             _ => return,
         };
+
         let stop = usize::min(start + length, rest.len());
         let payload = rest[start..stop].to_vec();
         match opcode {
@@ -102,6 +107,7 @@ fn messages(mut rest: &[u8], received: &mut Vec<Received>) {
             2 => received.push(Received::Binary(payload)),
             _ => {}
         }
+
         rest = &rest[stop..];
     }
 }

@@ -76,10 +76,12 @@ impl Session<'_> {
                 "sus" => json!(vec![3; 10]),
                 _ => json!("nothing to add"),
             };
+
             let answer = json!({"key": self.key(), "session": view["session"], "segment": segment,
                 "question": question["id"], "value": value});
             self.surgeon("/api/surgeon/answers", answer).await;
         }
+
         let done = json!({"session": view["session"], "action": "finish-questions", "segment": segment});
         self.surgeon("/api/surgeon/actions", done).await;
     }
@@ -90,15 +92,18 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
     let server = Server::start();
     let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
     let mut page = Page::open(&server, "surgeon").await;
+
     session.operator("/api/operator/participants", json!({"code": "S01"})).await;
     session.operator("/api/operator/sessions", json!({"participant": "S01", "protocol": "paper"})).await;
     let id = session.view().await["session"].clone();
     session.operator("/api/operator/actions", json!({"session": id, "action": "start"})).await;
+
     let settings = session.view().await["settings"].as_u64().unwrap();
     for _ in 0..settings {
         session.inspect(&mut page).await;
         session.answer().await;
     }
+
     assert_eq!(session.view().await["phase"], "closing");
     session.answer().await;
     assert_eq!(session.view().await["phase"], "completed");
@@ -106,8 +111,10 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
 
     let distinct: HashSet<_> = session.segments.iter().collect();
     assert_eq!(distinct.len(), 6, "no two segments share an id");
+
     let (_, html) = session.ask("surgeon", Method::GET, "/surgeon", &Value::Null).await;
     session.heard.push(html);
+
     let mut forms = BTreeSet::new();
     for message in page.heard {
         match message {
@@ -118,9 +125,11 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
             }
         }
     }
+
     // With and without a content area: nothing else varies.
     assert!(forms.len() <= 2, "{forms:?}");
     assert!(session.heard.len() > 60);
+
     for heard in &session.heard {
         let heard = heard.to_lowercase();
         for telling in TELLING {
@@ -137,20 +146,27 @@ async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart
     let server = Server::start();
     let mut session = Session { server: &server, heard: Vec::new(), segments: Vec::new(), keys: 0 };
     let mut page = Page::open(&server, "operator").await;
+
+    // Before a session the operator is told all of it.
     session.operator("/api/operator/focus", json!({"policy": "parfocal"})).await;
     page.until_belief().await;
     session.operator("/api/operator/focus", json!({"policy": "mgm-hill-climber"})).await;
     page.until(|told| told["policy"] == "mgm-hill-climber" && told["latency_p50_micros"].is_number()).await;
     assert!(metrics(&session).await.contains("latency"));
+
+    // From here on, nothing.
     session.operator("/api/operator/participants", json!({"code": "S01"})).await;
     session.operator("/api/operator/sessions", json!({"participant": "S01", "protocol": "paper"})).await;
     page.until(|told| told["type"] == "session" && !told["view"].is_null()).await;
     page.until(|told| told["type"] == "status" && told["policy"].is_null()).await;
+
     page.heard.clear();
     page.watch(5).await;
+
     let id = session.view().await["session"].clone();
     let act = |action: &str| json!({"session": id, "action": action, "reason": "a question"});
     session.operator("/api/operator/actions", act("start")).await;
+
     for _ in 0..2 {
         let view = session.view().await;
         let tap = |action: &str| json!({"session": id, "action": action, "segment": view["segment"]});
@@ -163,24 +179,30 @@ async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart
         session.surgeon("/api/surgeon/actions", tap("finish-segment")).await;
         session.answer().await;
     }
+
     page.until(|told| told["type"] == "status").await;
     assert!(!metrics(&session).await.contains("latency"), "how long a step takes tells a network from a hill-climber");
+
     let told: Vec<_> = page.heard.iter().map(|message| format!("{message:?}")).collect();
     assert!(told.iter().all(|told| !told.contains("climber")), "{told:?}");
+
     let frames = page.heard.iter().filter_map(|heard| match heard {
         Heard::Frame(header) => Some(header),
         Heard::Text(_) => None,
     });
+
     for header in frames {
         for telling in ["asked", "measured", "metric", "belief"] {
             assert!(header[telling].is_null(), "{telling} in {header}");
         }
         assert!(header["age"].as_f64().unwrap() % 100.0 == 0.0, "{header}");
     }
+
     let states = page.heard.iter().filter_map(|heard| match heard {
         Heard::Text(text) => Some(serde_json::from_str::<Value>(text).unwrap()).filter(|told| told["type"] == "status"),
         Heard::Frame(_) => None,
     });
+
     for state in states {
         for telling in ["policy", "focal_power", "latency_p50_micros", "latency_p99_micros"] {
             assert!(state[telling].is_null(), "{telling} in {state}");

@@ -67,6 +67,7 @@ async fn an_idle_flood_from_one_host_shuts_nobody_with_a_key_out() {
         let request = tablet.get(server.url("/surgeon")).bearer_auth(server.key("surgeon"));
         assert_eq!(request.send().await.unwrap().status(), StatusCode::OK, "from {host}");
     }
+
     page.watch(3).await;
 
     let mut open = 0;
@@ -86,6 +87,7 @@ async fn an_idle_flood_from_many_hosts_shuts_nobody_with_a_key_out() {
         let host = IpAddr::from([127, 0, 1, u8::try_from(number / 20).unwrap()]);
         flood.push(connect(server.address, host).await);
     }
+
     let tablet = client_at("127.0.0.2".parse().unwrap());
     let request = tablet.get(server.url("/surgeon")).bearer_auth(server.key("surgeon"));
     assert_eq!(request.send().await.unwrap().status(), StatusCode::OK);

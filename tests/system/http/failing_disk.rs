@@ -55,8 +55,10 @@ async fn a_disk_that_fills_up_refuses_and_takes_again_when_there_is_room() {
             assert_eq!(status, StatusCode::INSUFFICIENT_STORAGE, "{told}");
             break told;
         }
+
         assert!(number < 1000, "the disk never fills");
     };
+
     assert!(told.contains("the disk is full; make room"), "{told}");
     assert_eq!(comments(&server).await, number - 1, "what was refused does not count");
     disk.empty();

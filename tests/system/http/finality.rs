@@ -40,6 +40,7 @@ async fn unblinding_asks_first_and_nothing_that_comes_after_it_counts() {
             "device": TABLET, "sequence": number, "waited_millis": 0, "waited_by": "page-clock",
         })
     };
+
     post(&server, "surgeon", "answers", &answer(1, 6)).await;
     post(&server, "operator", "actions", &json!({"session": session, "action": "abort", "reason": "over"})).await;
     // The tablet still held this one: it counts.

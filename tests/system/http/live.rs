@@ -253,6 +253,7 @@ async fn nonsense_closes_the_connection_with_a_reason() {
             _ => {}
         }
     };
+
     assert_eq!(code, CloseCode::Policy);
 }
 
@@ -269,6 +270,7 @@ async fn pages_are_told_when_the_server_ends() {
             Err(error) => panic!("cut off: {error}"),
         }
     };
+
     assert_eq!(code, CloseCode::Away);
 }
 
@@ -285,6 +287,7 @@ async fn motion_jpeg_sends_the_next_parts_headers_at_once() {
         // The headers of a part not yet begun are here: the part before is complete without a byte of the next.
         complete += usize::from(stream.ends_with(PART) && stream.len() > PART.len());
     }
+
     assert!(stream.starts_with(PART));
     let end = stream.windows(PART.len()).skip(1).position(|window| window == PART).unwrap() + 1;
     let first = &stream[PART.len()..end - 2];

@@ -90,6 +90,7 @@ async fn a_setting_goes_on_at_the_focal_power_that_was_last_commanded_in_it() {
                 stage.server.end(Signal::KILL);
             }
         }
+
         stage.act("surgeon", "resume").await;
         let steps = stage.until(setting, run, 10, |(_, policy, _)| policy.is_some()).await;
 
@@ -105,6 +106,7 @@ async fn a_setting_goes_on_at_the_focal_power_that_was_last_commanded_in_it() {
         } else {
             assert!((after[0] - last).abs() < 0.051, "one step of the climber from {last}, not {}", after[0]);
         }
+
         stage.act("surgeon", "finish-segment").await;
         stage.act("surgeon", "finish-questions").await;
     }

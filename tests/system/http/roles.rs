@@ -45,6 +45,7 @@ async fn endpoints(server: &Server) -> Vec<(String, Method, String)> {
             found.push((path.clone(), method, operation["tags"][0].as_str().unwrap_or_default().to_owned()));
         }
     }
+
     found
 }
 
@@ -67,6 +68,7 @@ async fn nothing_but_the_door_is_open_without_a_key() {
             let forged = "parfocal-surgeon=0; parfocal-operator=; parfocal-researcher=x";
             assert_eq!(ask(&server, path, method.clone(), forged).await, StatusCode::FORBIDDEN, "{method} {path}");
         }
+
         assert_eq!(ask(&server, "/healthz", Method::GET, "").await, StatusCode::OK);
     }
 }
@@ -100,6 +102,7 @@ async fn each_role_opens_its_own_endpoints_and_no_others() {
             let status = ask(&server, path, method.clone(), &cookie).await;
             assert_eq!(status != StatusCode::FORBIDDEN, tag == role, "{role}: {method} {path} gave {status}");
         }
+
         let metrics = ask(&server, "/metrics", Method::GET, &cookie).await;
         assert_eq!(metrics == StatusCode::OK, role != "surgeon");
     }
@@ -130,6 +133,7 @@ async fn a_link_becomes_a_strict_cookie_and_leaves_the_address() {
         let home = server.get("/").header(COOKIE, sent_back(&response)).send().await.unwrap();
         assert_eq!(home.headers()[LOCATION], format!("/{role}"));
     }
+
     let wrong = server.get("/enter?key=0123456789abcdef0123456789abcdef").header("accept", "text/html");
     let response = wrong.send().await.unwrap();
     assert_eq!(response.status(), StatusCode::FORBIDDEN);
@@ -153,6 +157,7 @@ async fn a_loopback_server_answers_to_its_own_names_alone() {
         let request = server.get_as("operator", "/operator").header(HOST, host);
         request.send().await.unwrap().status()
     };
+
     assert_eq!(status("localhost:1").await, StatusCode::OK);
     assert_eq!(status("127.0.0.1").await, StatusCode::OK);
     assert_eq!(status("evil.example").await, StatusCode::MISDIRECTED_REQUEST);
@@ -167,6 +172,7 @@ async fn other_sites_change_nothing_and_hear_nothing() {
         let request = client().post(server.url("/healthz")).header(name, value);
         async { request.send().await.unwrap().status() }
     };
+
     let ours = format!("http://{}", server.address);
     assert_eq!(post("origin", "http://evil.example".into()).await, StatusCode::FORBIDDEN);
     assert_eq!(post("origin", "null".into()).await, StatusCode::FORBIDDEN);
@@ -184,6 +190,7 @@ async fn other_sites_change_nothing_and_hear_nothing() {
             Err(error) => panic!("{error}"),
         }
     };
+
     assert_eq!(stream("http://evil.example").await, StatusCode::FORBIDDEN);
     assert_eq!(stream(&ours).await, StatusCode::SWITCHING_PROTOCOLS);
 }
@@ -205,6 +212,7 @@ async fn the_start_page_is_that_of_the_link_that_let_one_in() {
         let response = server.get("/").header(COOKIE, cookie).send().await.unwrap();
         response.headers()[LOCATION].to_str().unwrap().to_owned()
     };
+
     let (surgeon, researcher) = (cookie(&server, "surgeon").await, cookie(&server, "researcher").await);
     assert_eq!(start(&surgeon).await, "/surgeon");
     assert_eq!(start(&format!("{surgeon}; {researcher}")).await, "/researcher");

@@ -89,6 +89,7 @@ async fn every_page_has_a_nonce_of_its_own_and_strict_headers() {
         assert_eq!(page.matches(&format!("nonce=\"{nonce}\"")).count(), scripts);
         nonces.push(nonce);
     }
+
     assert_ne!(nonces[0], nonces[1]);
 }
 
@@ -202,6 +203,7 @@ async fn a_whole_number_may_be_written_with_a_point() {
         let request = server.post_as("surgeon", "/api/surgeon/comments").header(CONTENT_TYPE, "application/json");
         request.body(comment).send().await.unwrap().status()
     };
+
     // There is no such session: that far it is read.
     assert_eq!(send("7.0").await, StatusCode::NOT_FOUND);
     assert_eq!(send("7.5").await, StatusCode::UNPROCESSABLE_ENTITY);
@@ -223,6 +225,7 @@ async fn counters_are_told_to_prometheus_without_naming_a_policy() {
     ] {
         assert!(text.lines().any(|line| line.starts_with(name)), "{name} in {text}");
     }
+
     assert!(!text.contains("policy") && !text.contains("climber"));
 }
 

@@ -65,11 +65,13 @@ pub fn as_nobody(command: &Command) -> Option<Command> {
         nobody.args(["--reuid=65534", "--regid=65534", "--clear-groups"]).arg(program);
         nobody
     };
+
     let program = Path::new(command.get_program());
     if !nobody(program).arg("--version").output().is_ok_and(|output| output.status.success()) {
         eprintln!("skipped: to be another user takes root, setpriv, and a program that this user may run");
         return None;
     }
+
     let mut nobody = nobody(program);
     nobody.args(command.get_args()).env("RUST_LOG", "warn");
     Some(nobody)

@@ -28,6 +28,7 @@ impl Fake {
             println!("skipped: {PROGRAM} is not installed (Debian package aravis-tools)");
             return None;
         };
+
         let fake = Self { process, options, _turn: turn };
         Self::wait_until_it_answers();
         Some(fake)

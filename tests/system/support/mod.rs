@@ -54,6 +54,7 @@ impl Server {
                 break;
             }
         }
+
         let keys: Vec<_> = said.lines().filter_map(link).collect();
         assert_eq!(keys.len(), 3, "the server did not start:\n{said}");
         let port = said.split("/enter").next().unwrap().rsplit(':').next().unwrap().parse().unwrap();

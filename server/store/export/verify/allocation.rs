@@ -28,22 +28,27 @@ fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
     if !folder.join("allocation.json").exists() {
         return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
     }
+
     let told: Told = serde_json::from_value(json(folder, "allocation.json")?)
         .map_err(|error| format!("allocation.json: {error}"))?;
+
     for column in ["session", "setting", "segment"] {
         if cells(folder, "allocation.csv", column)? != cells(folder, "segments.csv", column)? {
             return Err(format!("allocation.csv and segments.csv have different {column}s"));
         }
     }
+
     let listed = cells(folder, "allocation.csv", "policy")?;
     if !listed.iter().map(String::as_str).eq(told.schedule.iter().map(PolicyName::as_str)) {
         return Err("allocation.csv and allocation.json have different orders".to_owned());
     }
+
     for (column, told) in [("session", told.session.to_string()), ("algorithm", told.algorithm.to_string())] {
         if session_cell(folder, column)? != told {
             return Err(format!("allocation.json and sessions.csv have different {column}s"));
         }
     }
+
     let Some(seed) = told.seed else {
         if told.algorithm.order() != Order::Balanced {
             return Err("allocation.json withholds the seed, which is right only within a balanced set".to_owned());
@@ -51,7 +56,9 @@ fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
         let why = "the seed is withheld while other sessions of its balanced set are blinded";
         return Ok(Err(Verdict::NotChecked(why.to_owned())));
     };
+
     let seed = Seed::from_hex(&seed).ok_or("allocation.json: the seed is not 64 hexadecimal digits")?;
+
     Ok(Ok(Allocation {
         session: told.session,
         algorithm: told.algorithm,
@@ -68,6 +75,7 @@ pub(super) fn commitment(folder: &Path) -> Outcome {
         Ok(allocation) => allocation,
         Err(verdict) => return Ok(verdict),
     };
+
     if allocation.commitment() == session_cell(folder, "commitment")? {
         Ok(Verdict::Passed("seed, order and protocol are those committed to when the session was made".to_owned()))
     } else {
@@ -81,12 +89,15 @@ pub(super) fn schedule(folder: &Path) -> Outcome {
         Ok(allocation) => allocation,
         Err(verdict) => return Ok(verdict),
     };
+
     let protocol = Protocol::parse(&text(folder, "protocol.toml")?, "protocol.toml", &allocation.schedule)
         .map_err(|error| error.to_string())?;
+
     // Also keeps a forged export from having all permutations of many policies drawn.
     if allocation.algorithm.order() != protocol.order {
         return Err(format!("{} does not draw the order that protocol.toml asks for", allocation.algorithm));
     }
+
     let order = allocation.algorithm.draw(allocation.seed, protocol.policies.len(), protocol.repeats, allocation.index);
     if order.iter().map(|&policy| &protocol.policies[policy]).eq(&allocation.schedule) {
         Ok(Verdict::Passed(format!("{} draws this order from the seed", allocation.algorithm)))

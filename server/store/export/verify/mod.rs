@@ -58,18 +58,21 @@ fn checksums(folder: &Path) -> Outcome {
         if file.contains('/') {
             return Err(format!("{SUMS}: '{file}' is not a file of the folder"));
         }
+
         let content = std::fs::read(folder.join(file)).map_err(|error| format!("{file}: {error}"))?;
         if hex::encode(Sha256::digest(&content)) != sum {
             return Err(format!("{file} was changed since it was exported"));
         }
         listed.insert(file.to_owned());
     }
+
     for entry in std::fs::read_dir(folder).map_err(|error| error.to_string())? {
         let name = entry.map_err(|error| error.to_string())?.file_name().to_string_lossy().into_owned();
         if !listed.contains(&name) {
             return Err(format!("{name} was added since it was exported"));
         }
     }
+
     Ok(Verdict::Passed(format!("{} files are as they were exported", listed.len() - 1)))
 }
 
@@ -81,11 +84,13 @@ fn columns(folder: &Path) -> Outcome {
         if !folder.join(&file).exists() && UNBLINDED.contains(&file.as_str()) {
             continue;
         }
+
         let mut reader = csv(folder, &file)?;
         let described = table.columns_of(format).map(|column| column.name);
         if !reader.headers().map_err(|error| format!("{file}: {error}"))?.iter().eq(described) {
             return Err(format!("{file}: its columns are not those described"));
         }
+
         for (row, line) in reader.records().zip(2..) {
             let row = row.map_err(|error| format!("{file}: {error}"))?;
             let mut cells = table.columns_of(format).zip(&row);
@@ -95,6 +100,7 @@ fn columns(folder: &Path) -> Outcome {
             rows += 1;
         }
     }
+
     Ok(Verdict::Passed(format!("{rows} rows are as described")))
 }
 
@@ -147,6 +153,7 @@ fn counting(folder: &Path) -> Result<(), String> {
             return Err(format!("answers.csv: answer {number} is the second to its question that counts"));
         }
     }
+
     Ok(())
 }
 
@@ -196,6 +203,7 @@ fn copies(folder: &Path) -> Outcome {
             row.len() == columns.len()
                 && columns.iter().zip(row).all(|(column, cell)| column.tells(cell, &object[column.name]))
         };
+
         if rows.len() != objects.len() || !objects.iter().zip(&rows).all(|(object, row)| same(object, row)) {
             return Err(differs());
         }
@@ -212,12 +220,14 @@ fn references(folder: &Path) -> Outcome {
             return Err(format!("{file}: segment {segment} is not in segments.csv"));
         }
     }
+
     for file in ["telemetry.csv", "policy_steps.csv"].into_iter().filter(|file| folder.join(file).exists()) {
         let unknown = cells(folder, file, "setting")?.into_iter().find(|setting| !settings.contains(setting));
         if let Some(setting) = unknown {
             return Err(format!("{file}: setting {setting} is not in segments.csv"));
         }
     }
+
     Ok(Verdict::Passed(format!("everything belongs to one of {} settings", settings.len())))
 }
 
