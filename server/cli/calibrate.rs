@@ -50,8 +50,8 @@ struct Capture {
 
 #[derive(Debug, clap::Args)]
 struct Import {
-    /// A calibration as TOML: any of name, unit, `bit_depth`, `centre_nm`, `fwhm_nm`, dark, white,
-    /// `spectral_correction`.
+    /// A calibration as TOML: any of `name`, `unit`, `bit_depth`, `centre_nm`, `fwhm_nm`, `dark`,
+    /// `white`, `spectral_correction`.
     #[arg(value_name = "FILE")]
     from: Option<PathBuf>,
     /// The responses of the bands as CSV: a line per wavelength with nm and 16 responses.

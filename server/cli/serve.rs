@@ -80,8 +80,8 @@ const TELEMETRY_CAPACITY: usize = 750;
 pub const REAL_TIME: &str = "\
 Real-time priority:
   Where the system allows it, the threads from camera to lens run before all other programs and their memory is locked,
-  so that a busy machine does not delay the focus. The operator's page says whether they do. Root is allowed to. To
-  allow it to another USER, write into /etc/security/limits.d/parfocal.conf, and log in again:
+  so that a busy machine does not delay the focus. The operator's page says whether they do. Root has the right. To
+  give it to another USER, write this into /etc/security/limits.d/parfocal.conf, and log in again:
     USER  -  rtprio   40
     USER  -  memlock  unlimited
   A systemd service needs LimitRTPRIO=40 and LimitMEMLOCK=infinity, a container the capabilities SYS_NICE and

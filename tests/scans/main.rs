@@ -180,13 +180,17 @@ fn what_is_missing_or_damaged_is_named() {
 
     fs::write(out.join(POSES), format!("{}\n{}\n", lines[0], lines[2])).unwrap();
     refusals("pose 2 of 3 is missing");
+
     fs::write(out.join(POSES), format!("{}\n", lines[0])).unwrap();
     let info = said(&parfocal(&["scan", "info", text(&out)]));
     assert!(info.contains("changes by 0.0000 per pose") && info.contains("missing       poses 2, 3\n"), "{info}");
+
     fs::write(out.join(POSES), format!("{0}\n{0}\n", lines[0])).unwrap();
     refusals("pose 1 is listed twice");
+
     fs::write(out.join(POSES), journal.replace("pose0002/pose0002", "../scan/pose0002")).unwrap();
     refusals("is not a file in the scan's folder");
+
     fs::write(out.join(POSES), &journal).unwrap();
     let header = fs::read_to_string(out.join("scan.json")).unwrap();
     fs::write(out.join("scan.json"), header.replace("\"version\": 1", "\"version\": 2")).unwrap();
@@ -200,11 +204,14 @@ fn what_is_missing_or_damaged_is_named() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(&picture, bytes).unwrap();
+
     let info = parfocal(&["scan", "info", text(&out), "--json"]);
     assert!(complaint(&info).contains("pose0002/pose0002_f0.250.png is damaged: its SHA-256"), "{}", complaint(&info));
     assert_eq!(serde_json::from_slice::<Value>(&info.stdout).unwrap()["damaged"][0], "pose0002/pose0002_f0.250.png");
+
     let evaluated = complaint(&parfocal(&["evaluate", "--scans", text(&out), "--policies", "fixed"]));
     assert!(evaluated.contains("pose0002_f0.250.png is damaged"), "{evaluated}");
+
     let nothing = complaint(&parfocal(&["scan", "info", text(folder.path())]));
     assert!(nothing.contains("is not a recorded scan"), "{nothing}");
 }
@@ -228,12 +235,15 @@ fn a_scan_plays_as_a_camera_and_the_lens_picks_the_picture() {
         let clock: Arc<dyn Clock> = Arc::new(SystemClock);
         let settings = CameraSettings { fps: 500.0, seed: 1, optics: Arc::new(At(power)), clock };
         let mut camera = camera::open(&format!("scan:{}", out.display()), settings).unwrap();
+
         let frame = camera.next_frame(Duration::from_secs(5)).unwrap();
         let FrameImage::Rgb(rgb) = &frame.image else { panic!("a gray picture in colour") };
+
         let image = pose.images.iter().find(|image| image.focal_power == FocalPower::nearest(nearest)).unwrap();
         let stored = image::open(out.join(&image.file)).unwrap().into_rgb8();
         assert!(rgb.data == stored.into_raw(), "at {power}");
         assert_eq!(frame.truth.unwrap().optimal, pose.optimum);
+
         let health = camera.health();
         assert!(health.simulated && health.name.contains("recording"), "{}", health.name);
     }
@@ -249,6 +259,7 @@ fn a_scan_plays_as_a_camera_and_the_lens_picks_the_picture() {
     let said: Vec<String> = lines.take_while(|line| !line.starts_with("Ctrl-C")).collect();
     server.kill().unwrap();
     server.wait().unwrap();
+
     let said = said.join("\n");
     assert!(said.contains("recorded scan scan (a recording of: brain phantom") && said.contains("SIMULATED"), "{said}");
 }

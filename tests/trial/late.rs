@@ -68,9 +68,11 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let (mut trial, session) = at_questions(folder.path()).await;
     trial.wait(60 * SECOND).await;
+
     // "5" is given on tablet B, while tablet A, which has no network, holds a "3" that was given 50 s before.
     let five = sharpness(&mut trial, 5, origin(TABLET_B, 1, Duration::ZERO));
     trial.conductor.answer(five).await.unwrap();
+
     trial.wait(30 * SECOND).await;
     let three = sharpness(&mut trial, 3, origin(TABLET_A, 7, 80 * SECOND));
     trial.conductor.answer(three).await.unwrap();
@@ -79,8 +81,10 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
 
     let trial = Trial::start(folder.path()).await;
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5), "over a restart too");
+
     let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!((&detail.answers[0].value, detail.answers[0].devices_disagree), (&AnswerValue::Point(5), true));
+
     let timeline = trial.conductor.timeline(session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!(
@@ -110,11 +114,14 @@ async fn of_two_tabs_the_one_that_answered_last_counts_whatever_the_devices_cloc
     let folder = tempfile::tempdir().unwrap();
     let (mut trial, session) = at_questions(folder.path()).await;
     trial.wait(60 * SECOND).await;
+
     let five = sharpness(&mut trial, 5, origin(TABLET_A, 8, 30 * SECOND));
     trial.conductor.answer(five).await.unwrap();
+
     // The wait of the first tab's answer was measured across a clock that was set.
     let three = sharpness(&mut trial, 3, origin(TABLET_A, 7, Duration::ZERO));
     trial.conductor.answer(three).await.unwrap();
+
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5));
     assert_eq!(trial.conductor.timeline(session, 10).await.unwrap().set_aside, []);
     assert!(!trial.conductor.session_detail(session).await.unwrap().answers[0].devices_disagree);
@@ -125,14 +132,17 @@ async fn a_servers_clock_that_was_set_back_while_it_was_down_makes_no_later_answ
     let folder = tempfile::tempdir().unwrap();
     let (mut trial, _) = at_questions(folder.path()).await;
     trial.wait(60 * MINUTE).await;
+
     let five = sharpness(&mut trial, 5, origin(TABLET_B, 1, Duration::ZERO));
     trial.conductor.answer(five).await.unwrap();
     drop(trial);
+
     // Both its clocks begin again where they were an hour before.
     let mut trial = Trial::start(folder.path()).await;
     let two = sharpness(&mut trial, 2, origin(TABLET_A, 1, Duration::ZERO));
     trial.wait(SECOND).await;
     trial.conductor.answer(two).await.unwrap();
+
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(2));
 }
 

@@ -15,19 +15,24 @@ pub async fn researcher(theatre: &Theatre) -> String {
     page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
     page.sees("tbody", "completed").await;
     shoot(page, "researcher-1-sessions").await;
+
     page.click("td a.button").await;
     page.sees("#comment-list", "Follows me well 🧠").await;
     page.sees(".closing", "SUS score 67.5").await;
+
     let session = page.attribute("#session", "data-session").await.unwrap();
     let export = format!("/api/researcher/sessions/{session}/export.zip");
     assert_eq!(page.start_of(&export).await, "200 PK");
     assert_eq!(page.start_of(&format!("{export}?unblinded=true")).await, "409 {\"");
+
     page.click("#comment-list li:first-child button").await;
     page.sees("#timeline figcaption", "Follows me well 🧠").await;
     shoot(page, "researcher-2-blinded").await;
+
     let held = page.properties(".timeline .pause title", "textContent").await;
     let restarted = held.iter().any(|reason| reason.contains("The server restarted"));
     assert!(restarted, "the timeline shows when the lens was held: {held:?}");
+
     page.click("#unblind").await;
     page.type_into("#reason", "Analysis begins").await;
     // A tablet might hold something that still counts: the dialog says so, and wants to be told that it is known.
@@ -40,10 +45,13 @@ pub async fn researcher(theatre: &Theatre) -> String {
     );
 
     shoot(page, "researcher-3-unblinding").await;
+
+    // Not without the box ticked.
     page.click("#reason-go").await;
     assert!(page.is("#reason-dialog", "open").await);
     page.click("#reason-confirmed").await;
     page.click("#reason-go").await;
+
     page.sees(".unblinded", "mlr-hill-climber").await;
     until("the focal path", || async {
         page.attribute(".timeline .path", "d").await.is_some_and(|path| path.len() > 100)
@@ -53,6 +61,7 @@ pub async fn researcher(theatre: &Theatre) -> String {
     page.to_top().await;
     shoot(page, "researcher-4-unblinded").await;
     assert_eq!(page.start_of(&format!("{export}?unblinded=true")).await, "200 PK");
+
     page.open(&theatre.server.url("/researcher/dictionary")).await;
     page.sees("main", "comments.csv").await;
     shoot(page, "researcher-5-dictionary").await;

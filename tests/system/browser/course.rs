@@ -17,6 +17,7 @@ const EMERGENCY: &str = "Bleeding: is it the mgm-hill-climber?";
 async fn practice_a_time_limit_an_emergency_and_an_abort() {
     let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
+
     the_belief_of_a_policy_that_has_one(&theatre).await;
     practice(&theatre).await;
     beside_another_operator(&theatre).await;
@@ -26,9 +27,11 @@ async fn practice_a_time_limit_an_emergency_and_an_abort() {
     abort(&theatre).await;
     practice_stays_apart(&theatre, &researcher).await;
     database(&theatre).await;
+
     for browser in [&theatre.surgeon, &theatre.operator] {
         assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
     }
+
     let seen = blinding::check(&theatre.proxy.recorded());
     assert_eq!(seen.segments.len(), 6);
     assert!(seen.texts > 40 && seen.pictures > 40, "{} texts, {} pictures", seen.texts, seen.pictures);
@@ -37,35 +40,44 @@ async fn practice_a_time_limit_an_emergency_and_an_abort() {
 async fn the_belief_of_a_policy_that_has_one(theatre: &Theatre) {
     let operator = &theatre.operator;
     operator.sees_no("#belief-choice").await;
+
     operator.select("#policy", "parfocal").await;
     operator.sees("#belief-choice", "Belief").await;
     operator.click("#belief-choice input").await;
     shoot(operator, "operator-6-belief").await;
+
     operator.select("#policy", "fixed").await;
     operator.sees_no("#belief-choice").await;
+
     operator.select("#policy", "parfocal").await;
     operator.sees("#belief-choice", "Belief").await;
 }
 
 async fn practice(theatre: &Theatre) {
     let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+
     theatre.begin("S-03", "practice").await;
     // That the policy has a belief would name it.
     operator.sees_no("#belief-choice").await;
     operator.sees("#session-badges", "Practice").await;
+
     surgeon.sees("#change-practice", "Practice").await;
     surgeon.sees("#change-what", "This is the first setting.").await;
     shoot(surgeon, "surgeon-11-practice").await;
+
     theatre.tap_notice(1).await;
     surgeon.sees("#practice", "Practice").await;
     theatre.say("Only trying", 1).await;
     theatre.finish_setting(4).await;
+
     surgeon.sees("#change-what", "The setting has changed.").await;
     theatre.tap_notice(2).await;
     theatre.finish_setting(5).await;
+
     surgeon.sees("#panel h2", "Final questions").await;
     surgeon.click(".questions .done button").await;
     surgeon.sees("#panel h2", "Thank you").await;
+
     operator.sees("#session-actions", "Close and prepare the next").await;
     operator.click("#session-actions .primary").await;
     surgeon.sees("#panel", "No trial is under way").await;
@@ -74,21 +86,27 @@ async fn practice(theatre: &Theatre) {
 /// Another operator closes the session while this one is asked why to pause it, and adds a participant.
 async fn beside_another_operator(theatre: &Theatre) {
     let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+
     theatre.begin("S-07", "practice").await;
     surgeon.sees("#change-what", "This is the first setting.").await;
     operator.sees("#session-actions button:first-child", "Pause").await;
     operator.click("#session-actions button:first-child").await;
+
     let other = async |path: &str, body: Value| {
         let request = client().post(theatre.server.url(path)).bearer_auth(theatre.server.key("operator"));
         request.json(&body).send().await.unwrap().error_for_status().unwrap().text().await.unwrap()
     };
 
     other("/api/operator/participants", json!({ "code": "S-08" })).await;
+
     let view = client().get(theatre.server.url("/api/operator/session")).bearer_auth(theatre.server.key("operator"));
     let session = view.send().await.unwrap().json::<Value>().await.unwrap()["session"].clone();
+
     let abort = json!({ "session": session, "action": "abort", "reason": "By the other" });
     other("/api/operator/actions", abort).await;
     other("/api/operator/dismissals", json!({ "session": session })).await;
+
+    // This operator only now gives the reason to pause.
     operator.sees("#new-session", "Prepare session").await;
     theatre.give_reason("Too late").await;
     operator.sees("#reason-trouble", "This session was closed in the meantime").await;
@@ -102,9 +120,11 @@ async fn a_link_that_breaks_without_a_word(theatre: &Theatre) {
     theatre.proxy.break_silently();
     theatre.begin("S-05", "practice").await;
     theatre.surgeon.sees("#change-what", "This is the first setting.").await;
+
     theatre.operator.click("#session-actions .danger").await;
     theatre.give_reason("Only to see").await;
     theatre.surgeon.sees("#panel h2", "The session was ended").await;
+
     theatre.operator.click("#session-actions .primary").await;
     theatre.surgeon.sees("#panel", "No trial is under way").await;
 }
@@ -114,8 +134,11 @@ async fn time_limit(theatre: &Theatre) {
     theatre.begin("S-04", "limited").await;
     theatre.tap_notice(1).await;
     theatre.write("Cut off in the mid").await;
+
     theatre.surgeon.sees("#panel h2", "Setting 1: a few questions").await;
     theatre.operator.sees("#log", "Setting 1 finished after 10.0 s · system").await;
+
+    // The half-written comment is still there to be finished.
     assert_eq!(theatre.comment_box().await, "Cut off in the mid");
     theatre.say("dle", 1).await;
     theatre.answer_questions(3).await;
@@ -126,23 +149,31 @@ async fn emergency_unblinding(theatre: &Theatre) -> String {
     let (surgeon, page) = (&theatre.surgeon, &theatre.operator);
     surgeon.sees("#change-title", "Setting 2 of 2").await;
     let before = surgeon.everything().await;
+
     let researcher = theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")));
     let operator = page.new_tab(&researcher).await;
     page.click("td a.button").await;
+
     page.sees("#unblind", "Emergency unblinding").await;
     page.click("#unblind").await;
     page.sees("#reason-consequence", "under way").await;
+
+    // Not without a reason.
     page.click("#reason-go").await;
     assert!(page.fails("#reason", "valueMissing").await);
     shoot(page, "researcher-6-emergency").await;
+
     theatre.give_reason(EMERGENCY).await;
     page.sees(".masthead", "Emergency unblinding").await;
     page.sees(".unblinded", "mgm-hill-climber").await;
     page.sees(".events", EMERGENCY).await;
+
     page.close_tab(&operator).await;
     page.sees("#log", "Unblinded by the researcher").await;
     assert!(!page.text("body").await.contains("Bleeding"), "the operator, beside the surgeon, is not told the reason");
+
     assert_eq!(surgeon.everything().await, before, "nothing on the surgeon's page has changed");
+
     surgeon.reload().await;
     surgeon.sees("#change-title", "Setting 2 of 2").await;
     assert_eq!(surgeon.everything().await, before, "nor has it after a reload");
@@ -151,14 +182,18 @@ async fn emergency_unblinding(theatre: &Theatre) -> String {
 
 async fn abort(theatre: &Theatre) {
     let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+
     theatre.tap_notice(2).await;
     theatre.say("The last word", 2).await;
+
     operator.click("#session-actions .danger").await;
     operator.sees("#reason-consequence", "All comments and answers so far are kept").await;
     theatre.give_reason("The participant was called away").await;
+
     surgeon.sees("#panel h2", "The session was ended").await;
     surgeon.sees("#panel", "Everything you said is saved").await;
     shoot(surgeon, "surgeon-12-aborted").await;
+
     operator.sees("#phase", "Aborted").await;
     operator.sees("#log", "Session aborted: The participant was called away").await;
     shoot(operator, "operator-7-aborted").await;
