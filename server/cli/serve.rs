@@ -257,6 +257,7 @@ async fn open_store(
         camera: arguments.camera.clone(),
         lens: arguments.lens.clone(),
         calibration: calibration.title(),
+        blur: arguments.blur,
         weights: registry.weights(),
         seed: arguments.seed,
     };

@@ -12,7 +12,7 @@ use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 use tokio::sync::{Mutex, MutexGuard};
 
-use crate::autofocus::PolicyName;
+use crate::autofocus::{BlurRate, PolicyName};
 use crate::clock::Moment;
 use crate::files::make_private;
 
@@ -37,6 +37,8 @@ pub struct Run {
     pub lens: String,
     /// The sensor's calibration, by its title.
     pub calibration: String,
+    /// What the policies were told of how fast the optic blurs.
+    pub blur: Option<BlurRate>,
     /// SHA-256 of each learned policy's weights, by its name.
     pub weights: BTreeMap<PolicyName, String>,
     /// The seed given on the command line.
@@ -204,8 +206,8 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let done = sqlx::query(
-        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, weights, seed)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, blur, weights, seed)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(run.wall.to_string())
     .bind(nanoseconds(run.at))
@@ -213,6 +215,7 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     .bind(&run.camera)
     .bind(&run.lens)
     .bind(&run.calibration)
+    .bind(run.blur.map(BlurRate::get))
     .bind(weights)
     .bind(run.seed.map(u64::cast_signed))
     .execute(trial)

@@ -14,7 +14,7 @@ impl Reader {
     /// The starts of the server that `session` has records of.
     pub(super) async fn export_runs(&self, session: SessionId) -> Result<Vec<RunRow>, StoreError> {
         let rows = sqlx::query(
-            "SELECT run, wall, monotonic_ns, version, camera, lens, calibration FROM runs WHERE run IN (
+            "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
                  SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
                  UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
                  UNION SELECT frame_run FROM comments WHERE session = ?1)
@@ -96,5 +96,6 @@ fn run_row(row: &SqliteRow) -> Result<RunRow, StoreError> {
         camera: row.try_get("camera")?,
         lens: row.try_get("lens")?,
         calibration: row.try_get("calibration")?,
+        blur: row.try_get("blur")?,
     })
 }

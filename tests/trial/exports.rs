@@ -65,6 +65,8 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
     let summary = export(trial.store.reader(), session, &out, false).await.unwrap();
     assert_eq!(files(&out), summary.files.iter().cloned().collect());
 
+    // What the policies were told of the optic.
+    assert_eq!(rows(&out, "runs")[0]["blur"], "6.2");
     let comments = rows(&out, "comments");
     assert_eq!(comments.len(), 6);
     assert_eq!(comments[1]["text"], "setting 2 🔬 \"quoted\", and\na second line");

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use parfocal::autofocus::{PolicyName, Registry};
+use parfocal::autofocus::{BlurRate, PolicyName, Registry};
 use parfocal::camera::{CameraHealth, CameraOffer};
 use parfocal::clock::{Clock, ManualClock};
 use parfocal::conductor::{ConductError, Conductor, Library, Parts};
@@ -42,6 +42,7 @@ pub fn a_run(clock: &ManualClock) -> Run {
         camera: "phantom".into(),
         lens: "simulated".into(),
         calibration: "typical".into(),
+        blur: BlurRate::new(6.2),
         weights: Registry::standard().weights(),
         seed: None,
     }

@@ -81,8 +81,8 @@ class MetricLearned(nn.Module):
 
 
 class Belief(nn.Module):
-    """Inputs `[N, T, 175]`, as `server/autofocus/belief.rs` makes them of frames, to logits `[N, T, 41]` of the
-    optimum's bins. Older weights took the first 87 inputs alone.
+    """Inputs `[N, T, 177]`, as `server/autofocus/belief.rs` makes them of frames, to logits `[N, T, 41]` of the
+    optimum's bins. Older weights took the first 175 or 87 of them alone.
     """
 
     def __init__(self, inputs, units, bins):
@@ -115,7 +115,7 @@ def main():
     fill(cnn)
     patches = wave(8 * 1024, 0.113, 100.0, 128.0).view(8, 1024)
     values = cnn(patches, wave(8, 0.7, 1.0))
-    inputs, units, bins = 175, 192, 41
+    inputs, units, bins = 177, 192, 41
     belief = Belief(inputs, units, bins)
     fill(belief)
     logits = belief(wave(2 * 5 * inputs, 0.29, 1.0).view(2, 5, inputs))

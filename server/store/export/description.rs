@@ -56,6 +56,10 @@ table! {
         camera: String = means("The camera"),
         lens: String = means("The lens"),
         calibration: String = means("The sensor's calibration: name, unit, version and date"),
+        blur: Option<f64> =
+            means("How fast the optic blurs a unit of focal power, as the policies were told; empty where they were not")
+                .in_unit("px")
+                .since(3),
     }
 }
 

@@ -39,9 +39,9 @@ pub struct Column {
     pub since: u64,
 }
 
-/// The format of exports that this version writes. The second tells what was said late and on which
-/// device; the first did not name itself.
-pub const FORMAT: u64 = 2;
+/// The format of exports that this version writes. The third tells what the policies knew of the
+/// optic, the second what was said late and on which device; the first did not name itself.
+pub const FORMAT: u64 = 3;
 
 /// A table without its rows.
 #[derive(Debug, Clone, Copy)]
