@@ -42,7 +42,8 @@ fn scenario(format: &str, fps: f64) {
     let driver = lens::open(&format!("optotune:{}", emulator.path().display()), clock.clone()).expect("connects");
     let settings = CameraSettings { fps, seed: 0, optics: emulator.glass(), clock };
     let camera = GigeCamera::open(&format!("{NAME}?format={format}"), settings).expect("connects");
-    let (arrivals, commands) = (Arrivals::default(), Commands::default());
+    let arrivals = Arrivals::default();
+    let commands = Commands::default();
     let lens = Box::new(Timed { lens: driver, commands: commands.clone() });
     let camera = Box::new(Watched { camera, arrivals: arrivals.clone() });
     let mut records = watch_loop(camera, lens, fps, WARM_UP + STEPS);

@@ -76,7 +76,8 @@ fn steps(criterion: &mut Criterion) {
         criterion.bench_function(&format!("step/{name}"), |bench| {
             bench.iter(|| {
                 number += 1;
-                let (exposed_at, exposure) = (clock.now(), Duration::ZERO);
+                let exposed_at = clock.now();
+                let exposure = Duration::ZERO;
                 let frame = Frame { number, exposed_at, exposure, image: image.clone(), truth: None };
                 stepper.step(frame)
             });
@@ -110,7 +111,8 @@ fn watch_loop(camera: Box<dyn Camera>, lens: Box<dyn Lens>, fps: f64, steps: usi
     });
     let frames = handle.frames.clone();
     let viewer = std::thread::spawn(move || {
-        let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+        let mut rgb = RgbImage::default();
+        let mut gray = GrayImage::default();
         let mut encoder = JpegEncoder::new(80).expect("starts");
         while !frames.is_closed() {
             if let Some(ControlledFrame { frame: Frame { image: FrameImage::Mosaic(mosaic), .. }, .. }) =

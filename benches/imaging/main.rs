@@ -17,7 +17,8 @@ const HEIGHT: usize = 1088;
 /// Texture inside a circle, dark outside, as the sensor sees it.
 fn mosaic() -> MosaicFrame {
     let samples = (0..WIDTH * HEIGHT).map(|i| {
-        let (x, y) = ((i % WIDTH) as f32, (i / WIDTH) as f32);
+        let x = (i % WIDTH) as f32;
+        let y = (i / WIDTH) as f32;
         let inside = (x - 1024.0).hypot(y - 544.0) < 700.0;
         let texture = 1.0 + 0.4 * (x / 9.0).sin() * (y / 13.0 + x / 40.0).cos();
         (if inside { 450.0 * texture } else { 12.0 }) as u16
@@ -35,7 +36,8 @@ fn per_pixel() -> Calibration {
 
 fn imaging(criterion: &mut Criterion) {
     let mosaic = mosaic();
-    let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+    let mut rgb = RgbImage::default();
+    let mut gray = GrayImage::default();
     let mut group = criterion.benchmark_group("imaging");
     group.sample_size(20).measurement_time(Duration::from_secs(2)).warm_up_time(Duration::from_millis(500));
 

@@ -93,6 +93,7 @@ async fn main() {
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
+
     println!(
         "{:<18} {:>7} {:>6} {:>6} {:>13} {:>13} {:>26} {:>6} {:>7}",
         "camera", "viewers", "fps", "KB", "age ms", "latency ms", "% of a core", "RSS", "answer"
@@ -101,6 +102,7 @@ async fn main() {
         "{:<18} {:>7} {:>6} {:>6} {:>13} {:>13} {:>26} {:>6} {:>7}",
         "", "", "", "", "p50 / p99", "p50 / p99", "loop / imaging / serving", "MB", "ms"
     );
+
     let busy_only = std::env::args().any(|argument| argument == "busy");
     for scenario in SCENARIOS.iter().filter(|scenario| !busy_only || scenario.beside != Beside::Nothing) {
         report(scenario, &measure(scenario).await);
@@ -113,6 +115,7 @@ async fn measure(scenario: &Scenario) -> Row {
         Camera::Phantom => "phantom".to_owned(),
         Camera::Picture => process::picture(&folder),
     };
+
     let mut server = Server::start(&camera, scenario.beside != WITHOUT);
     let first_answer = server.first_answer().await;
     let busy = match scenario.beside {
@@ -122,22 +125,30 @@ async fn measure(scenario: &Scenario) -> Row {
             Some(Busy::start(BUSY))
         }
     };
+
     let address = match scenario.link {
         Some(bits) => link::slow(server.address, bits).await,
         None => server.address,
     };
+
     let watch = |_| tokio::spawn(viewer::watch(address, server.key.clone(), WARM_UP + MEASURED));
     let viewers: Vec<_> = (0..scenario.viewers).map(watch).collect();
+
+    // What comes while the server warms up is left out of every figure.
     tokio::time::sleep(WARM_UP).await;
-    let (from, before) = (SystemClock.now().as_nanos(), server.usage());
+    let from = SystemClock.now().as_nanos();
+    let before = server.usage();
     tokio::time::sleep(MEASURED).await;
-    let (to, after) = (SystemClock.now().as_nanos(), server.usage());
+    let to = SystemClock.now().as_nanos();
+    let after = server.usage();
+
     drop(busy);
     let mut seen: Vec<Seen> = Vec::new();
     for viewer in viewers {
         seen.extend(viewer.await.expect("a viewer"));
     }
     seen.retain(|seen| (from..to).contains(&seen.at));
+
     let steps = steps(server.end()).await;
     let during = |exposed: u64| (from..to).contains(&exposed);
     Row {

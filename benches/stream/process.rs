@@ -160,9 +160,11 @@ fn resident_mb(process: u32) -> u64 {
 /// A picture for the footage camera, whose window shows three quarters of it, 512 by 272: with as
 /// much detail as makes a JPEG of about 30 KB.
 pub fn picture(folder: &TempDir) -> String {
-    let (width, height) = (683, 363);
+    let width = 683;
+    let height = 363;
     let picture = image::RgbImage::from_fn(width, height, |x, y| {
-        let (u, v) = (f64::from(x), f64::from(y));
+        let u = f64::from(x);
+        let v = f64::from(y);
         let waves = (u / 3.1).sin() * (v / 2.7).cos() + ((u + v) / 9.0).sin() + ((u - 2.0 * v) / 23.0).cos();
         let shade = |offset: f64| (128.0 + 35.0 * (waves + (waves * 1.7 + offset).sin())) as u8;
         image::Rgb([shade(0.0), shade(1.0), shade(2.0)])

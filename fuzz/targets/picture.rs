@@ -11,7 +11,8 @@ fuzz_target!(|bytes: &[u8]| {
         let gray = match decode(bytes, mosaic) {
             Ok(Picture::Rgb(_, gray) | Picture::Gray(gray)) => gray,
             Ok(Picture::Mosaic(frame)) => {
-                let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+                let mut rgb = RgbImage::default();
+                let mut gray = GrayImage::default();
                 Reconstructor::new(&parfocal::imaging::Calibration::default()).reconstruct(&frame, &mut rgb, &mut gray);
                 gray
             }

@@ -472,7 +472,8 @@ mod tests {
             let inputs = Tensor::randn([1, 4, BELIEF_INPUT as i64], (Kind::Float, Device::Cpu));
             let narrow = inputs.narrow(2, 0, width as i64);
             let blank = old.1.blank(1, Device::Cpu);
-            let (expected, found) = (old.1.forward(&narrow, &blank).0, new.1.forward(&inputs, &blank).0);
+            let expected = old.1.forward(&narrow, &blank).0;
+            let found = new.1.forward(&inputs, &blank).0;
             assert!(found.allclose(&expected, 1e-5, 1e-6, false));
         }
     }

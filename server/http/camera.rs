@@ -29,8 +29,9 @@ struct Change {
     value: f64,
 }
 
-/// Changes a setting, before the next frame. What the camera makes of it is in
-/// `/api/operator/camera` and the live status.
+/// Changes a setting, before the next frame.
+///
+/// What the camera makes of it is in `/api/operator/camera` and the live status.
 #[utoipa::path(post, path = "/api/operator/camera", tag = "operator", request_body = Change, responses(
     (status = 204, description = "The camera was asked"),
     (status = 409, description = "The camera does not offer this setting now", body = ErrorBody),

@@ -51,6 +51,7 @@ impl Defocus {
     pub fn patch_of(&mut self, sigma: f64, spot: Spot, look: impl FnOnce(usize, usize, &mut [f32])) -> Patch {
         let sigma = sigma.clamp(0.0, MOST_SIGMA);
         let reach = if sigma < LEAST_SIGMA { 0 } else { ((4.0 * sigma).ceil() as usize).min(MAX_REACH) };
+
         let mut patch = Patch([0.0; PATCH_SIDE * PATCH_SIDE]);
         let kernel = || single(gaussian::kernel(sigma, reach));
         self.blur(PATCH_SIDE, reach, Blur { sigma, spot, kernel }, look, &mut patch.0);
@@ -78,6 +79,7 @@ impl Defocus {
         let look = |reach: usize, side: usize, source: &mut [f32]| {
             gather(image, (x as isize - reach as isize, y as isize - reach as isize), side, source);
         };
+
         let kernel = || single(gaussian::kernel(sigma, reach));
         self.blur(side, reach, Blur { sigma, spot, kernel }, look, &mut levels);
         levels
@@ -95,6 +97,7 @@ impl Defocus {
         let sigma = sigma.clamp(0.0, MOST_SIGMA) / COARSE as f64;
         let side = side / COARSE;
         let mut levels = vec![0.0; side * side];
+
         if sigma < 1.0 {
             // Of so narrow a spot only the variance shows, not the shape; samples of a Gaussian
             // would have less than its variance.
@@ -122,6 +125,7 @@ impl Defocus {
         let side = width + 2 * reach;
         self.source.resize(side * side, 0.0);
         look(reach, side, &mut self.source);
+
         match blur.spot {
             _ if reach == 0 => out.copy_from_slice(&self.source),
             Spot::Gaussian => {
@@ -153,7 +157,8 @@ fn repeated(levels: &[f32], side: usize) -> Vec<f32> {
 
 /// Fills `source`, `side` pixels a row, from `image`'s `(left, top)` on.
 fn gather(image: &GrayImage, (left, top): (isize, isize), side: usize, source: &mut [f32]) {
-    let (width, height) = (image.width as isize, image.height as isize);
+    let width = image.width as isize;
+    let height = image.height as isize;
     for (row, target) in source.chunks_exact_mut(side).take(side).enumerate() {
         let y = (top + row as isize).clamp(0, height - 1) as usize;
         let line = &image.data[y * image.width..(y + 1) * image.width];
@@ -224,9 +229,12 @@ fn disc(source: &[f32], side: usize, reach: usize, radius: f32, width: usize, su
         let half = (radius * radius - high * high).max(0.0).sqrt().min(reach as f32);
         area += 2.0 * half;
         let middle = reach as f32 + 0.5;
+
         for (edge, sign) in [(middle + half, 1.0f32), (middle - half, -1.0)] {
             let whole = edge as usize;
-            let (near, far) = (sign * (1.0 - edge.fract()), sign * edge.fract());
+            let near = sign * (1.0 - edge.fract());
+            let far = sign * edge.fract();
+
             for (row, out) in out.chunks_exact_mut(width).enumerate() {
                 let sums = &sums[(row + offset) * (side + 1) + whole..][..=width];
                 for (value, pair) in out.iter_mut().zip(sums.windows(2)) {

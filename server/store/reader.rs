@@ -98,7 +98,8 @@ impl Reader {
         .await?;
 
         let participant = |row: &SqliteRow| {
-            let (code, sessions) = (row.try_get("code")?, row.try_get("sessions")?);
+            let code = row.try_get("code")?;
+            let sessions = row.try_get("sessions")?;
             Ok(Participant { code, added: parsed(row, "wall")?, sessions })
         };
 
@@ -180,7 +181,9 @@ impl Reader {
 
         let event = |row: &SqliteRow| {
             let Stamp { wall, at } = stamp(row)?;
-            let (device, working, message) = (row.try_get("device")?, row.try_get("working")?, row.try_get("message")?);
+            let device = row.try_get("device")?;
+            let working = row.try_get("working")?;
+            let message = row.try_get("message")?;
             Ok((row.try_get("number")?, row.try_get("run")?, DeviceEvent { wall, at, device, working, message }))
         };
 

@@ -149,7 +149,8 @@ mod tests {
 
     #[test]
     fn a_later_answer_of_one_piece_takes_the_place_of_the_earlier() {
-        let (before, after) = (AnswerValue::Points(vec![1, 2, 3]), AnswerValue::Points(vec![3, 1, 2]));
+        let before = AnswerValue::Points(vec![1, 2, 3]);
+        let after = AnswerValue::Points(vec![3, 1, 2]);
         assert_eq!(on_top_of(Some(&before), after.clone()), after);
         assert_eq!(on_top_of(Some(&AnswerValue::Point(3)), AnswerValue::Point(5)), AnswerValue::Point(5));
     }

@@ -50,7 +50,8 @@ fn dark_and_white_make_a_calibration_that_names_itself_and_flattens_the_picture(
         serde_json::from_str(&line).unwrap()
     };
 
-    let (plain, flat) = (inspect(&[]), inspect(&["--calibration", calibration]));
+    let plain = inspect(&[]);
+    let flat = inspect(&["--calibration", calibration]);
     assert!(flat["mgm"].as_f64().unwrap() < 0.01, "{flat}");
     assert!(plain["mgm"].as_f64().unwrap() > 0.5, "{plain}");
     assert!(flat["calibration"].as_str().unwrap().starts_with("theatre 2, unit 7, version 2"));

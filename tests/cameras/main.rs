@@ -77,7 +77,9 @@ fn colours(frame: &Frame) -> &RgbImage {
 #[test]
 fn the_phantom_is_the_same_for_the_same_seed_and_times() {
     let times = [0, 40, 90, 400];
-    let (one, same, other) = (frames("phantom", 1, &times), frames("phantom", 1, &times), frames("phantom", 2, &times));
+    let one = frames("phantom", 1, &times);
+    let same = frames("phantom", 1, &times);
+    let other = frames("phantom", 2, &times);
     for (one, same) in one.iter().zip(&same) {
         assert!(samples(one) == samples(same));
         assert_eq!((one.number, one.truth), (same.number, same.truth));
@@ -136,9 +138,11 @@ fn the_phantoms_picture_is_exposed_well_and_its_content_area_can_be_found() {
     }
 
     let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
-    let (mut rgb, mut gray) = (RgbImage::default(), GrayImage::default());
+    let mut rgb = RgbImage::default();
+    let mut gray = GrayImage::default();
     Reconstructor::new(&Calibration::default()).reconstruct(&mosaic, &mut rgb, &mut gray);
-    let (found, truth) = (content_area::detect(&gray).unwrap(), phantom.content_area());
+    let found = content_area::detect(&gray).unwrap();
+    let truth = phantom.content_area();
     assert!((found.x - truth.x).hypot(found.y - truth.y) < 3.0, "{found:?} {truth:?}");
     assert!((found.radius - truth.radius).abs() < 3.0, "{found:?} {truth:?}");
     let [red, green, blue] = [0, 1, 2].map(|channel| {
@@ -176,7 +180,8 @@ fn footage_is_sharp_at_its_optimum_and_blurred_away_from_it() {
     assert_eq!((colours(&shown[0]).width, colours(&shown[0]).height), (240, 180), "three quarters of the picture");
     let mut sharp: Vec<(f64, f64)> = shown.iter().map(sharpness).collect();
     sharp.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (nearest, furthest) = (sharp[0], sharp[49]);
+    let nearest = sharp[0];
+    let furthest = sharp[49];
     assert!(nearest.0 < 0.05 && furthest.0 > 0.4, "the lens sweeps past the optimum");
     assert!(nearest.1 > 3.0 * furthest.1, "{nearest:?} {furthest:?}");
     let again = frames(&spec, 3, &times);

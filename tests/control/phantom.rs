@@ -31,7 +31,8 @@ fn run(policy: &str, seed: u64) -> Vec<f64> {
     let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
     let lens = SimulatedLens::new(clock.clone());
     let glass = lens.optics();
-    let (mut phantom, mut hand) = (Phantom::new(seed), Hand::new(seed));
+    let mut phantom = Phantom::new(seed);
+    let mut hand = Hand::new(seed);
     let patience = Duration::from_secs(20);
     let mut stepper =
         Stepper::new(Box::new(lens), Eye::new(reconstructor()), Registry::standard(), clock.clone(), patience);

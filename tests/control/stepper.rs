@@ -386,7 +386,8 @@ proptest! {
     ) {
         let mut fixture = Fixture::new(PATIENT);
         fixture.stepper.obey(drive("scripted", None));
-        let (mut expected, mut lens_failed) = (0.5, false);
+        let mut expected = 0.5;
+        let mut lens_failed = false;
         for (answer, lens_fails) in answers {
             fixture.script.set(Deed::GoTo(answer));
             fixture.lens.fail(lens_fails.then(|| LensError::Stalled("as the test asked".into())));

@@ -30,7 +30,8 @@ impl Stage {
     fn new(telemetry_capacity: usize) -> Self {
         let clock = Arc::new(SystemClock);
         let (fake_camera, camera) = FakeCamera::new(clock.clone());
-        let (lens, script) = (FakeLens::at(power(0.5)), Script::new(Deed::GoTo(0.6)));
+        let lens = FakeLens::at(power(0.5));
+        let script = Script::new(Deed::GoTo(0.6));
         let rig = Rig {
             camera: Box::new(fake_camera),
             lens: Box::new(lens.clone()),

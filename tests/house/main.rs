@@ -31,7 +31,8 @@ fn a_room_uses_only_rooms_of_lower_floors() {
     let tree = SourceTree::read(root());
 
     let is_upward = |import: &&Import| {
-        let (from, to) = (import.user_room(), import.used_room());
+        let from = import.user_room();
+        let to = import.used_room();
         from != to && floors[to] >= floors[from]
     };
     let upward: Vec<String> = tree.imports.iter().filter(is_upward).map(ToString::to_string).collect();

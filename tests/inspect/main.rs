@@ -118,7 +118,8 @@ fn a_calibration_sets_the_scale_of_a_mosaic() {
 #[test]
 fn overlays_are_pictures_of_the_same_size_and_none_overwrites_another() {
     let folder = TempDir::new().unwrap();
-    let (one, other) = (folder.path().join("disc.png"), folder.path().join("sub/disc.png"));
+    let one = folder.path().join("disc.png");
+    let other = folder.path().join("sub/disc.png");
     fs::create_dir(folder.path().join("sub")).unwrap();
     disc().save(&one).unwrap();
     disc().save(&other).unwrap();

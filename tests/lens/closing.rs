@@ -158,7 +158,8 @@ fn server(emulator: &Emulator, data: &std::path::Path) -> Child {
 #[test]
 fn a_server_lets_the_lens_go_on_every_signal() {
     for signal in SIGNALS {
-        let (emulator, data) = (emulator(quick()), tempfile::tempdir().unwrap());
+        let emulator = emulator(quick());
+        let data = tempfile::tempdir().unwrap();
         assert!(end(server(&emulator, data.path()), signal).success());
         assert_eq!(emulator.mode_and_current(), AT_REST, "{signal:?}");
         assert_eq!(emulator.orders().last(), Some(&Order::Current(0)));
@@ -167,7 +168,8 @@ fn a_server_lets_the_lens_go_on_every_signal() {
 
 #[test]
 fn after_a_kill_the_next_start_begins_without_current() {
-    let (emulator, data) = (emulator(quick()), tempfile::tempdir().unwrap());
+    let emulator = emulator(quick());
+    let data = tempfile::tempdir().unwrap();
     end(server(&emulator, data.path()), Signal::KILL);
     assert_eq!(emulator.mode_and_current().0, 5, "nobody could tell it");
     let before = emulator.orders().len();

@@ -95,7 +95,8 @@ fn the_modelled_glass_follows_the_true_one() {
     }
 
     until("the last command arrives", || last_command(&emulator) == Some(2200));
-    let (model, glass) = (lens.optics(), emulator.glass());
+    let model = lens.optics();
+    let glass = emulator.glass();
     let moments = || (0..200).map(|millis| begun + Duration::from_millis(millis));
     let apart = moments().map(|at| model.focal_power_at(at).distance(glass.focal_power_at(at))).sum::<f64>() / 200.0;
     // A model that stood still would be 0.3 away on average; a busy machine may delay either side by some milliseconds.

@@ -79,7 +79,8 @@ fn simulated(delay: u64, settling: u64, contrast: f64, plan: Plan) -> Result<Mea
 fn a_simulated_lens_is_measured_as_it_was_made() {
     for (delay, settling) in [(2_u32, 15_u32), (20, 60), (0, 100)] {
         let found = simulated(delay.into(), settling.into(), 1.0, Plan::default()).unwrap();
-        let (seen_delay, seen_settling) = (1000.0 * found.both.delay, 1000.0 * found.both.settling);
+        let seen_delay = 1000.0 * found.both.delay;
+        let seen_settling = 1000.0 * found.both.settling;
         // To a millisecond, and to a tenth of the settling time; the camera sees a frame every 20 ms.
         assert!((seen_delay - f64::from(delay)).abs() < 1.0, "{seen_delay} for {delay}");
         assert!((seen_settling - f64::from(settling)).abs() < 1.0 + 0.1 * f64::from(settling), "{seen_settling}");
@@ -105,7 +106,8 @@ fn an_emulated_driver_is_measured_as_its_glass_moves() {
     let plan = Plan { stops: 11, repeats: 6, watch: Duration::from_millis(120) };
     let pause: Pause = Arc::new(std::thread::sleep);
     let found = measured(lens.as_mut(), emulator.glass(), (Arc::new(SystemClock), pause), 1.0, plan).unwrap();
-    let (delay, settling) = (1000.0 * found.both.delay, 1000.0 * found.both.settling);
+    let delay = 1000.0 * found.both.delay;
+    let settling = 1000.0 * found.both.settling;
     println!("10 ms and 40 ms were measured as {delay:.1} ms and {settling:.1} ms");
     // The way over the wire adds to the delay; a busy machine adds some milliseconds to either.
     assert!((7.0..25.0).contains(&delay), "{delay}");

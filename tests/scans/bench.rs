@@ -16,7 +16,9 @@ fn a_bench_is_recorded_by_a_stepper_whose_failure_loses_nothing() {
     let folder = TempDir::new().unwrap();
     let (camera, emulator) = bench(&folder);
     let lens = format!("optotune:{}", emulator.path().display());
-    let (out, log, broken) = (folder.path().join("scan"), folder.path().join("log"), folder.path().join("broken"));
+    let out = folder.path().join("scan");
+    let log = folder.path().join("log");
+    let broken = folder.path().join("broken");
     fs::write(&broken, "").unwrap();
     let stepper =
         format!("echo {{pose}} >> {}; if [ {{pose}} = 3 -a -e {} ]; then exit 5; fi", text(&log), text(&broken));

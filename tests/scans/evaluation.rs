@@ -120,7 +120,10 @@ fn gravel(path: &Path, side: u32) {
     };
 
     for _ in 0..side * 8 {
-        let (left, top, length, level) = (draw(side), draw(side), 4 + draw(20), draw(256));
+        let left = draw(side);
+        let top = draw(side);
+        let length = 4 + draw(20);
+        let level = draw(256);
         for (x, y) in (top..top + length).flat_map(|y| (left..left + length).map(move |x| (x, y))) {
             if x < side && y < side {
                 picture.put_pixel(x, y, image::Luma([u8::try_from(level).unwrap()]));
@@ -144,14 +147,16 @@ fn a_large_still_picture_is_focused_on_as_well_as_a_small_one() {
         report["rows"][1]["in_focus"].as_f64().unwrap()
     };
 
-    let (small, large) = (in_focus(480), in_focus(512));
+    let small = in_focus(480);
+    let large = in_focus(512);
     assert!(small > 0.9 && large > 0.9, "{small} {large}");
 }
 
 #[test]
 fn footage_without_anything_to_focus_on_is_refused_and_a_part_without_is_told() {
     let folder = TempDir::new().unwrap();
-    let (wall, gravel_picture) = (folder.path().join("1-wall.png"), folder.path().join("2-gravel.png"));
+    let wall = folder.path().join("1-wall.png");
+    let gravel_picture = folder.path().join("2-gravel.png");
     image::GrayImage::from_pixel(160, 160, image::Luma([200])).save(&wall).unwrap();
     let told = complaint(&evaluate(&["--policies", "fixed", "--footage", text(&wall)]).output().unwrap());
     assert!(told.contains("nothing to focus on: even the sharpest patch shows no detail in any of 1 scans"), "{told}");
@@ -173,7 +178,8 @@ fn footage_without_anything_to_focus_on_is_refused_and_a_part_without_is_told() 
 #[test]
 fn shards_put_together_are_one_run_to_the_last_digit() {
     let folder = TempDir::new().unwrap();
-    let (whole, parts) = (folder.path().join("whole"), folder.path().join("parts"));
+    let whole = folder.path().join("whole");
+    let parts = folder.path().join("parts");
     let arguments = ["evaluate", "--count", "5", "--seed", "11", "--policies", "mgm-hill-climber,mlr-learned,parfocal"];
     let run = |more: &[&str]| {
         let output = parfocal(&[&arguments, more].concat());

@@ -18,14 +18,16 @@ fn stack(folder: &Path, gaps: &[usize]) {
 
 fn save(picture: &GrayImage, path: &Path) {
     let levels = picture.data.iter().map(|level| level.round() as u8).collect();
-    let (width, height) = (picture.width.try_into().unwrap(), picture.height.try_into().unwrap());
+    let width = picture.width.try_into().unwrap();
+    let height = picture.height.try_into().unwrap();
     image::GrayImage::from_raw(width, height, levels).unwrap().save(path).unwrap();
 }
 
 #[test]
 fn a_focal_stack_becomes_a_scan_that_policies_can_be_evaluated_on() {
     let folder = TempDir::new().unwrap();
-    let (pictures, out) = (folder.path().join("pictures"), folder.path().join("scan"));
+    let pictures = folder.path().join("pictures");
+    let out = folder.path().join("scan");
     stack(&pictures, &[3]);
     let arguments = ["scan", "from-stack", text(&pictures), "--out", text(&out), "--size", "96", "--poses", "60"];
     let output = parfocal(&arguments);
@@ -90,7 +92,8 @@ fn policies_are_evaluated_on_a_stack_and_told_how_fast_its_optic_blurs() {
 #[test]
 fn what_is_no_focal_stack_is_refused_before_anything_is_written() {
     let folder = TempDir::new().unwrap();
-    let (pictures, out) = (folder.path().join("pictures"), folder.path().join("scan"));
+    let pictures = folder.path().join("pictures");
+    let out = folder.path().join("scan");
     stack(&pictures, &[]);
     let told = |more: &[&str]| {
         let output = parfocal(&[&["scan", "from-stack", text(&pictures), "--out", text(&out)], more].concat());

@@ -69,7 +69,8 @@ fn a_picture_is_what_its_content_is_whatever_its_name() {
 #[test]
 fn a_folder_of_pictures_is_imported() {
     let folder = TempDir::new().unwrap();
-    let (pictures, out) = (folder.path().join("pictures"), folder.path().join("scan"));
+    let pictures = folder.path().join("pictures");
+    let out = folder.path().join("scan");
     fs::create_dir(&pictures).unwrap();
     // Stripes of more contrast, the nearer the focal power is to 0.5 at pose 8 and to 0 at pose 9.
     let save = |pose: u32, power: f64, contrast: u8, size: u32| {

@@ -248,7 +248,8 @@ fn a_scan_plays_as_a_camera_and_the_lens_picks_the_picture() {
         assert!(health.simulated && health.name.contains("recording"), "{}", health.name);
     }
 
-    let (data, spec) = (folder.path().join("data"), format!("scan:{}", out.display()));
+    let data = folder.path().join("data");
+    let spec = format!("scan:{}", out.display());
     let mut server = command(&["serve", "--camera", &spec, "--bind", "127.0.0.1:0", "--data-dir", text(&data)])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
@@ -286,7 +287,8 @@ fn a_full_disk_keeps_what_is_whole() {
         other => return println!("skipped: a small disk cannot be mounted here: {other:?}"),
     };
 
-    let (out, error) = (said(&output), String::from_utf8_lossy(&output.stderr).into_owned());
+    let out = said(&output);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(out.starts_with("code 1\n") && error.contains("no space is left on the disk of"), "{out}{error}");
     let kept: usize = error.split(" poses are saved").next().unwrap().rsplit(' ').next().unwrap().parse().unwrap();
     let listed = out.lines().filter(|line| line.starts_with("pose0")).count();

@@ -33,7 +33,8 @@ fn refused(options: &str) -> String {
 
 /// Frames of the next `time`, and how often none came in time.
 fn watch(camera: &mut GigeCamera, time: Duration) -> (Vec<Frame>, usize) {
-    let (mut frames, mut failures) = (Vec::new(), 0);
+    let mut frames = Vec::new();
+    let mut failures = 0;
     let begun = SystemClock.now();
     while SystemClock.now().since(begun) < time {
         match camera.next_frame(Duration::from_millis(200)) {

@@ -103,7 +103,8 @@ fn training_resumed_is_training_never_stopped() {
     for recipe in ["mgm-learned", "mgm-learned-paper", "cnn-learned", "parfocal"] {
         let recipe = small(recipe, 2 * LEG);
         let policy = &recipe.policy;
-        let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let whole = tempfile::tempdir().unwrap();
+        let parts = tempfile::tempdir().unwrap();
 
         assert!(train(begin(&recipe, whole.path()), u64::MAX));
         assert!(!train(begin(&recipe, parts.path()), 1));
@@ -139,7 +140,8 @@ fn picture(folder: &Path, name: &str, side: u32) -> PathBuf {
 #[test]
 fn trainings_are_compared_by_what_their_folders_hold() {
     let folder = tempfile::tempdir().unwrap();
-    let (short, long) = (folder.path().join("short"), folder.path().join("long"));
+    let short = folder.path().join("short");
+    let long = folder.path().join("long");
     let run = |updates: u64, path: &Path| begin(&small("mgm-learned", updates), path);
     let mut complete = run(LEG, &short);
     assert!(complete.go(&SystemClock, &|| false, &mut |_| ()).unwrap());
@@ -173,7 +175,8 @@ fn trainings_are_compared_by_what_their_folders_hold() {
 #[test]
 fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
     let folder = tempfile::tempdir().unwrap();
-    let (first, other) = (picture(folder.path(), "first.png", 80), picture(folder.path(), "other.png", 90));
+    let first = picture(folder.path(), "first.png", 80);
+    let other = picture(folder.path(), "other.png", 90);
 
     let run = folder.path().join("run");
     let mut recipe = small("mgm-learned", 2 * LEG);
@@ -212,7 +215,8 @@ fn a_training_goes_on_on_the_footage_that_it_was_begun_on() {
 #[test]
 fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_process() {
     let folder = tempfile::tempdir().unwrap();
-    let (config, out) = (folder.path().join("recipe.toml"), folder.path().join("run"));
+    let config = folder.path().join("recipe.toml");
+    let out = folder.path().join("run");
 
     let mut recipe = small("mgm-learned", 1_000_000);
     (recipe.pictures, recipe.validate_every) = (1, LEG);
@@ -263,7 +267,8 @@ fn ctrl_c_saves_then_resume_needs_the_folder_alone_and_a_second_one_ends_the_pro
 #[test]
 fn a_training_outlives_its_log() {
     let folder = tempfile::tempdir().unwrap();
-    let (config, out) = (folder.path().join("recipe.toml"), folder.path().join("run"));
+    let config = folder.path().join("recipe.toml");
+    let out = folder.path().join("run");
 
     let mut recipe = small("mgm-learned", 200);
     (recipe.pictures, recipe.validate_every) = (1, LEG);
@@ -312,7 +317,8 @@ fn footage_is_read_as_what_it_is() {
 fn the_same_seed_gives_the_same_figures_to_the_last_digit() {
     let evaluate =
         || parfocal(&["evaluate", "--count", "2", "--policies", "fixed,mgm-hill-climber,parfocal", "--json"]);
-    let (first, second) = (evaluate(), evaluate());
+    let first = evaluate();
+    let second = evaluate();
     assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
     assert_eq!(first.stdout, second.stdout);
     let report: serde_json::Value = serde_json::from_slice(&first.stdout).unwrap();

@@ -111,7 +111,8 @@ async fn an_aborted_session_does_not_unblind_the_one_in_its_place() {
     let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 3).await;
     let left = session_that_is_left(&trial).await.session;
     let second = trial.whole_session("balanced").await;
-    let (one, other) = (made(&trial, left).await, made(&trial, second).await);
+    let one = made(&trial, left).await;
+    let other = made(&trial, second).await;
     assert!(one.segments.iter().zip(&other.segments).all(|(one, other)| one.1 == other.1), "both have the same order");
     let refused = trial
         .conductor

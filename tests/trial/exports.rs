@@ -165,7 +165,8 @@ async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     assert!(!data.path().join("early").exists());
 
     trial.unblind(session).await;
-    let (blinded, unblinded) = (data.path().join("blinded"), data.path().join("unblinded"));
+    let blinded = data.path().join("blinded");
+    let unblinded = data.path().join("unblinded");
     export(trial.store.reader(), session, &blinded, false).await.unwrap();
     export(trial.store.reader(), session, &unblinded, true).await.unwrap();
     let more: Vec<String> = files(&unblinded).difference(&files(&blinded)).cloned().collect();
@@ -218,7 +219,8 @@ async fn an_export_of_a_session_under_way_is_of_one_moment() {
     assert_eq!(snapshot.comments(session).await.unwrap().len(), 1);
     assert_eq!(now.comments(session).await.unwrap().len(), 3);
     assert_eq!(snapshot.events(session).await.unwrap().len(), 5, "created, started, three of the first setting");
-    let (one, other) = (data.path().join("one"), data.path().join("other"));
+    let one = data.path().join("one");
+    let other = data.path().join("other");
     export(&snapshot, session, &one, false).await.unwrap();
     assert_eq!(rows(&one, "comments").len(), 3, "each export takes a moment of its own");
     export(&now, session, &other, false).await.unwrap();
@@ -295,7 +297,9 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
     let trial = Trial::start(data.path()).await;
     let befalls = async |working: bool, message: &str| {
         trial.clock.advance(Duration::from_secs(2));
-        let (wall, at, device) = (trial.clock.wall(), trial.clock.now(), "lens".to_owned());
+        let wall = trial.clock.wall();
+        let at = trial.clock.now();
+        let device = "lens".to_owned();
         let event = DeviceEvent { wall, at, device, working, message: message.to_owned() };
         trial.store.device_event(&event).await.unwrap();
     };

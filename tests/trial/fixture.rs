@@ -151,7 +151,8 @@ impl Trial {
 
     pub async fn answer(&mut self, question: &str, value: AnswerValue) -> Result<(), ConductError> {
         let view = self.view();
-        let (key, question) = (self.key(), question.to_owned());
+        let key = self.key();
+        let question = question.to_owned();
         let origin = Origin::default();
         let answer = NewAnswer { key, session: view.session, segment: view.segment, question, value, origin };
         self.conductor.answer(answer).await

@@ -39,7 +39,8 @@ fn origin(device: DeviceId, sequence: i64, waited: Duration) -> Origin {
 /// An answer about the sharpness of the setting whose questions are asked now.
 fn sharpness(trial: &mut Trial, point: u8, origin: Origin) -> NewAnswer {
     let view = trial.view();
-    let (key, question) = (trial.key(), "sharpness".to_owned());
+    let key = trial.key();
+    let question = "sharpness".to_owned();
     NewAnswer { key, session: view.session, segment: view.segment, question, value: AnswerValue::Point(point), origin }
 }
 

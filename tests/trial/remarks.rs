@@ -148,7 +148,8 @@ async fn what_comes_late_is_kept_though_the_sessions_protocol_can_no_longer_be_r
         origin: Origin::default(),
     };
 
-    let (key, other) = (trial.key(), trial.key());
+    let key = trial.key();
+    let other = trial.key();
     trial.conductor.answer(answer(key, segment)).await.unwrap();
     let elsewhere = trial.view().segment;
     assert!(matches!(trial.conductor.answer(answer(other, elsewhere)).await, Err(ConductError::NotFound(_))));

@@ -43,9 +43,11 @@ async fn a_surgeon_goes_through_six_blinded_settings_and_everything_is_kept() {
 async fn nothing_that_surgeon_or_operator_get_tells_a_policy() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
-    let (mut surgeon, mut operator) = (trial.conductor.surgeon_view(), trial.conductor.operator_view());
+    let mut surgeon = trial.conductor.surgeon_view();
+    let mut operator = trial.conductor.operator_view();
     let session = trial.begin("paper").await;
-    let (mut seen, mut segments) = (String::new(), BTreeSet::new());
+    let mut seen = String::new();
+    let mut segments = BTreeSet::new();
     for _ in 0..6 {
         segments.insert(trial.whole_setting().await);
         seen += &serde_json::to_string(surgeon.borrow_and_update().as_deref().unwrap()).unwrap();

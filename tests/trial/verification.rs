@@ -35,7 +35,8 @@ async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
     assert_eq!(change("protocol.toml", "120", "121"), ["checksums", "protocol", "commitment"]);
 
     let schedule = json(&out, "allocation.json")["schedule"].clone();
-    let (first, other) = (schedule[0].as_str().unwrap(), schedule.as_array().unwrap());
+    let first = schedule[0].as_str().unwrap();
+    let other = schedule.as_array().unwrap();
     let other = other.iter().map(|name| name.as_str().unwrap()).find(|name| *name != first).unwrap();
     assert_eq!(change("allocation.csv", first, other), ["checksums", "commitment", "schedule"]);
 

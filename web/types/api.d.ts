@@ -65,7 +65,10 @@ export interface paths {
         /** What can be changed now, with the camera's own bounds. Empty for a camera that has nothing to change, or is away. */
         get: operations["operator_offer"];
         put?: never;
-        /** Changes a setting, before the next frame. What the camera makes of it is in `/api/operator/camera` and the live status. */
+        /**
+         * Changes a setting, before the next frame. What the camera makes of it is in
+         *     `/api/operator/camera` and the live status.
+         */
         post: operations["operator_change"];
         delete?: never;
         options?: never;
@@ -545,8 +548,8 @@ export interface components {
             session: components["schemas"]["SessionId"];
         };
         /**
-         * @description Something that moves a session on. `segment` names the one that the page was showing, so that a stale tab or a double
-         *     click moves nothing twice.
+         * @description Something that moves a session on. `segment` names the one that the page was showing, so that a
+         *     stale tab or a double click moves nothing twice.
          */
         Action: {
             /** @enum {string} */

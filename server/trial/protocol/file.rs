@@ -94,15 +94,18 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
     let file: File = toml::from_str(source)?;
     let reader = Reader { known };
     identifier(&file.name, "name")?;
+
     let policies = reader.policies(&file.policies)?;
     let repeats = between(&file.repeats, "repeats", 1..=10, "")?;
     check_order(&file, policies.len() * repeats)?;
+
     let segment_seconds = between(&file.segment_seconds, "segment_seconds", 5..=3600, " seconds")?;
     let stay =
         file.prompt_seconds.as_ref().map_or(Ok(15), |stay| between(stay, "prompt_seconds", 1..=600, " seconds"))?;
     let grace = file.grace_minutes.as_ref().map_or(Ok(DEFAULT_GRACE), |minutes| {
         between(minutes, "grace_minutes", 0..=24 * 60, " minutes").map(|minutes| Duration::from_mins(minutes.into()))
     })?;
+
     let mut ids = BTreeSet::new();
     Ok(Protocol {
         title: reader.shown(&file.title, "title")?,

@@ -54,7 +54,8 @@ async fn the_belief_of_a_policy_that_has_one(theatre: &Theatre) {
 }
 
 async fn practice(theatre: &Theatre) {
-    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    let surgeon = &theatre.surgeon;
+    let operator = &theatre.operator;
 
     theatre.begin("S-03", "practice").await;
     // That the policy has a belief would name it.
@@ -85,7 +86,8 @@ async fn practice(theatre: &Theatre) {
 
 /// Another operator closes the session while this one is asked why to pause it, and adds a participant.
 async fn beside_another_operator(theatre: &Theatre) {
-    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    let surgeon = &theatre.surgeon;
+    let operator = &theatre.operator;
 
     theatre.begin("S-07", "practice").await;
     surgeon.sees("#change-what", "This is the first setting.").await;
@@ -146,7 +148,8 @@ async fn time_limit(theatre: &Theatre) {
 
 /// The researcher unblinds the session while it is under way; gives the address of the list of sessions.
 async fn emergency_unblinding(theatre: &Theatre) -> String {
-    let (surgeon, page) = (&theatre.surgeon, &theatre.operator);
+    let surgeon = &theatre.surgeon;
+    let page = &theatre.operator;
     surgeon.sees("#change-title", "Setting 2 of 2").await;
     let before = surgeon.everything().await;
 
@@ -181,7 +184,8 @@ async fn emergency_unblinding(theatre: &Theatre) -> String {
 }
 
 async fn abort(theatre: &Theatre) {
-    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    let surgeon = &theatre.surgeon;
+    let operator = &theatre.operator;
 
     theatre.tap_notice(2).await;
     theatre.say("The last word", 2).await;

@@ -55,7 +55,8 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
 async fn a_pause_that_cannot_be_recorded_yet_is_said_to_be_so() {
     let driver = Driver::start();
     let theatre = Theatre::open(&driver).await;
-    let (surgeon, operator) = (&theatre.surgeon, &theatre.operator);
+    let surgeon = &theatre.surgeon;
+    let operator = &theatre.operator;
     theatre.begin("S-07", "short").await;
     theatre.tap_notice(1).await;
     let file = SqliteConnectOptions::new().filename(theatre.server.data.path().join("parfocal.db"));

@@ -98,7 +98,8 @@ impl Trial {
     async fn post(&self, role: &str, what: &str, body: Value) -> Value {
         let request = client().post(self.server.url(&format!("/api/{role}/{what}"))).bearer_auth(self.server.key(role));
         let answer = request.json(&body).send().await.unwrap();
-        let (status, text) = (answer.status(), answer.text().await.unwrap());
+        let status = answer.status();
+        let text = answer.text().await.unwrap();
         assert!(status.is_success(), "{what} {body}: {status} {text}");
         if status == StatusCode::NO_CONTENT { Value::Null } else { serde_json::from_str(&text).unwrap() }
     }

@@ -33,7 +33,8 @@ async fn a_surgeon_completes_a_blinded_trial() {
 
 /// The operator adds a participant and prepares and starts a session; the surgeon waits.
 async fn prepare(theatre: &Theatre) {
-    let (operator, surgeon) = (&theatre.operator, &theatre.surgeon);
+    let operator = &theatre.operator;
+    let surgeon = &theatre.surgeon;
     surgeon.sees("#panel", "No trial is under way").await;
     surgeon.sees("#simulated", "Simulated camera and lens").await;
     operator.sees("#warnings", "Simulated camera and lens").await;
@@ -214,7 +215,8 @@ async fn fifth_setting_killed_server(theatre: &mut Theatre) {
 }
 
 async fn sixth_setting_paused_and_ended_by_the_operator(theatre: &Theatre) {
-    let (operator, surgeon) = (&theatre.operator, &theatre.surgeon);
+    let operator = &theatre.operator;
+    let surgeon = &theatre.surgeon;
     theatre.tap_notice(6).await;
     operator.sees("#phase", "Setting 6 of 6: inspecting").await;
 

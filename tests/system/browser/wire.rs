@@ -70,7 +70,8 @@ fn body(head: &str, rest: &[u8]) -> (Vec<u8>, usize) {
 }
 
 fn chunks(rest: &[u8]) -> (Vec<u8>, usize) {
-    let (mut body, mut at) = (Vec::new(), 0);
+    let mut body = Vec::new();
+    let mut at = 0;
     while let Some(end) = find(&rest[at..], b"\r\n") {
         let size = std::str::from_utf8(&rest[at..at + end]).unwrap();
         let size = usize::from_str_radix(size, 16).unwrap();

@@ -27,7 +27,8 @@ impl Stage {
     async fn post(&self, role: &str, what: &str, body: Value) -> Value {
         let request = client().post(self.server.url(&format!("/api/{role}/{what}"))).bearer_auth(self.server.key(role));
         let answer = request.json(&body).send().await.unwrap();
-        let (status, said) = (answer.status(), answer.text().await.unwrap());
+        let status = answer.status();
+        let said = answer.text().await.unwrap();
         assert!(status.is_success(), "{what} {body}: {status} {said}");
         serde_json::from_str(&said).unwrap_or_default()
     }

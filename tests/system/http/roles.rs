@@ -213,7 +213,8 @@ async fn the_start_page_is_that_of_the_link_that_let_one_in() {
         response.headers()[LOCATION].to_str().unwrap().to_owned()
     };
 
-    let (surgeon, researcher) = (cookie(&server, "surgeon").await, cookie(&server, "researcher").await);
+    let surgeon = cookie(&server, "surgeon").await;
+    let researcher = cookie(&server, "researcher").await;
     assert_eq!(start(&surgeon).await, "/surgeon");
     assert_eq!(start(&format!("{surgeon}; {researcher}")).await, "/researcher");
 }

@@ -39,7 +39,8 @@ async fn first_of(protocol: &str) -> Drawn {
 
 #[tokio::test]
 async fn a_seed_does_not_foretell_a_real_session() {
-    let (one, other) = (first_of("paper").await, first_of("paper").await);
+    let one = first_of("paper").await;
+    let other = first_of("paper").await;
     assert_ne!(one.session, other.session);
     assert_ne!(one.seed, other.seed);
     assert!(one.segments.iter().all(|(segment, _)| other.segments.iter().all(|(known, _)| known != segment)));
