@@ -66,8 +66,8 @@ export interface paths {
         get: operations["operator_offer"];
         put?: never;
         /**
-         * Changes a setting, before the next frame. What the camera makes of it is in
-         *     `/api/operator/camera` and the live status.
+         * Changes a setting, before the next frame.
+         * @description What the camera makes of it is in `/api/operator/camera` and the live status.
          */
         post: operations["operator_change"];
         delete?: never;
