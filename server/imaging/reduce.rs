@@ -31,8 +31,8 @@ pub fn in_blocks(picture: &GrayImage, scale: usize) -> GrayImage {
 /// Fills `out`, `columns` values a row, with the means of blocks of `SCALE` x `SCALE` pixels of
 /// `levels`, which has `width` pixels a row and begins with the first block.
 ///
-/// It does for part of a picture what [`in_blocks`] does for a whole one, and is much faster: each
-/// frame's view is made with it.
+/// It does for part of a picture, and into given memory, what [`in_blocks`] does for a whole one. It is
+/// apart because each frame's view is made with it, and because its sums round in another order.
 pub fn fill_block_means<const SCALE: usize>(levels: &[f32], width: usize, columns: usize, out: &mut [f32]) {
     const { assert!(SCALE > 0, "a block has pixels") };
     let mut sums = vec![0.0f32; columns * SCALE];
