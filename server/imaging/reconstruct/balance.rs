@@ -4,10 +4,10 @@ use crate::imaging::calibration::{BANDS, Calibration, Reference};
 use crate::imaging::frame::{CELL, MosaicFrame};
 
 /// The value of a sample as dark as the dark reference; above 0, so that noise below dark is kept.
-pub(super) const DARK: f32 = 2048.0;
+pub(in crate::imaging) const DARK: f32 = 2048.0;
 /// The value of a sample as bright as the white reference; leaves room for highlights three times as
 /// bright.
-pub(super) const WHITE: f32 = DARK + 16_384.0;
+pub(in crate::imaging) const WHITE: f32 = DARK + 16_384.0;
 
 /// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper
 /// than a cast.
@@ -19,7 +19,7 @@ const LEAST_SPAN: f32 = 0.1;
 
 /// Gain and offset of every pixel of the sensor, so that dark becomes [`DARK`] and white [`WHITE`].
 #[derive(Debug, Clone)]
-pub(super) struct PixelBalance {
+pub(in crate::imaging) struct PixelBalance {
     width: usize,
     height: usize,
     gains: Vec<f32>,
@@ -63,6 +63,12 @@ impl PixelBalance {
     /// Whether `mosaic` is of the references' size.
     pub(super) fn fits(&self, mosaic: &MosaicFrame) -> bool {
         (mosaic.width(), mosaic.height()) == (self.width, self.height)
+    }
+
+    /// Gains and offsets of the sensor's row `y`.
+    pub(in crate::imaging) fn row(&self, y: usize) -> (&[f32], &[f32]) {
+        let places = y * self.width..(y + 1) * self.width;
+        (&self.gains[places.clone()], &self.offsets[places])
     }
 
     /// White-balances the samples from column `x` on of the row of cells `y` into `balanced`, which is

@@ -2,7 +2,7 @@
 //! policies.
 
 mod avx2;
-mod balance;
+pub(super) mod balance;
 mod mix;
 #[cfg(test)]
 mod tests;
@@ -34,7 +34,7 @@ pub struct Reconstructor {
 
 /// The weighted sums over the 16 samples of a cell.
 #[derive(Debug, Clone)]
-struct Mixes {
+pub(super) struct Mixes {
     /// Red, green and blue, each as an index of an [`Encoder`], and gray.
     picture: Mix<4>,
     /// The same in integers, where the processor can.
@@ -46,7 +46,7 @@ struct Mixes {
 impl Mixes {
     /// Sums weighted by `weights`, which are for samples that are 0 for dark and 1 for white; the
     /// samples given later are `dark` and `white` there.
-    fn new(weights: [[f32; BANDS]; 4], dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
+    pub(super) fn new(weights: [[f32; BANDS]; 4], dark: &[f32; BANDS], white: &[f32; BANDS]) -> Self {
         let picture = Mix::new(weights, dark, white);
         Self { kernel: Kernel::new(&picture), picture, gray: Mix::new([weights[3]], dark, white) }
     }
@@ -92,16 +92,34 @@ impl Reconstructor {
         gray.height = height;
         rgb.data.resize(3 * width * height, 0);
         gray.data.resize(width * height, 0.0);
-        self.lines.colours.iter_mut().for_each(|line| line.resize(width, 0.0));
 
+        let rows = rgb.data.chunks_exact_mut(3 * width).zip(gray.data.chunks_exact_mut(width));
+        for (y, (rgb, gray)) in rows.enumerate() {
+            self.reconstruct_row(mosaic, y, rgb, gray);
+        }
+    }
+
+    /// Makes the pixels and gray values of the row of cells `y`.
+    pub(super) fn reconstruct_row(&mut self, mosaic: &MosaicFrame, y: usize, rgb: &mut [u8], gray: &mut [f32]) {
+        self.lines.colours.iter_mut().for_each(|line| line.resize(mosaic.band_width(), 0.0));
         let lines = &mut self.lines;
         match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
-            None => picture_of_counts(&self.of_counts, mosaic, &self.encoder, lines, rgb, gray),
-            Some((balance, mixes)) => {
+            None => row_of_counts(&self.of_counts, mosaic, y, &self.encoder, lines, rgb, gray),
+            Some(of_balanced) => {
                 lines.balanced.resize(CELL * mosaic.width(), 0);
-                picture_of_balanced(balance, mixes, mosaic, &self.encoder, lines, rgb, gray);
+                row_of_balanced(of_balanced, mosaic, y, &self.encoder, lines, rgb, gray);
             }
         }
+    }
+
+    /// The balance by references per pixel, where there are some and they are of the size of `mosaic`.
+    pub(super) fn pixel_balance(&self, mosaic: &MosaicFrame) -> Option<&PixelBalance> {
+        self.of_balanced.as_ref().map(|(balance, _)| balance).filter(|balance| balance.fits(mosaic))
+    }
+
+    /// The encoding of linear colours.
+    pub(super) const fn encoder(&self) -> &Encoder {
+        &self.encoder
     }
 
     /// The patch of the gray picture at `area` (in cells), computing just those cells; black where
@@ -144,7 +162,7 @@ impl Reconstructor {
 }
 
 /// The weights of [`Mixes::picture`] for white-balanced samples.
-fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
+pub(super) fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
     let corrected = |colour: [f32; BANDS]| {
         std::array::from_fn(|band| {
             let through = calibration.correction.iter().zip(colour).map(|(from, weight)| weight * from[band]);
@@ -157,37 +175,30 @@ fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn picture_of_counts(
+fn row_of_counts(
     mixes: &Mixes,
     mosaic: &MosaicFrame,
+    y: usize,
     encoder: &Encoder,
     lines: &mut Lines,
-    rgb: &mut RgbImage,
-    gray: &mut GrayImage,
+    rgb: &mut [u8],
+    gray: &mut [f32],
 ) {
-    let width = mosaic.band_width();
-    let rows = rgb.data.chunks_exact_mut(3 * width).zip(gray.data.chunks_exact_mut(width));
-    for (y, (rgb, gray)) in rows.enumerate() {
-        picture_row(mixes, cell_row(mosaic, 0, y, width), encoder, &mut lines.colours, rgb, gray);
-    }
+    picture_row(mixes, cell_row(mosaic, 0, y, mosaic.band_width()), encoder, &mut lines.colours, rgb, gray);
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn picture_of_balanced(
-    balance: &PixelBalance,
-    mixes: &Mixes,
+fn row_of_balanced(
+    (balance, mixes): &(PixelBalance, Mixes),
     mosaic: &MosaicFrame,
+    y: usize,
     encoder: &Encoder,
     lines: &mut Lines,
-    rgb: &mut RgbImage,
-    gray: &mut GrayImage,
+    rgb: &mut [u8],
+    gray: &mut [f32],
 ) {
-    let width = mosaic.band_width();
-    let rows = rgb.data.chunks_exact_mut(3 * width).zip(gray.data.chunks_exact_mut(width));
-    for (y, (rgb, gray)) in rows.enumerate() {
-        balance.apply(cell_row(mosaic, 0, y, width), 0, y, &mut lines.balanced);
-        picture_row(mixes, quarters(&lines.balanced), encoder, &mut lines.colours, rgb, gray);
-    }
+    balance.apply(cell_row(mosaic, 0, y, mosaic.band_width()), 0, y, &mut lines.balanced);
+    picture_row(mixes, quarters(&lines.balanced), encoder, &mut lines.colours, rgb, gray);
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
@@ -219,7 +230,7 @@ fn cell_row(mosaic: &MosaicFrame, x: usize, y: usize, cells: usize) -> [&[u16]; 
     std::array::from_fn(|row| &mosaic.samples()[(CELL * y + row) * mosaic.width()..][CELL * x..][..CELL * cells])
 }
 
-fn quarters(values: &[u16]) -> [&[u16]; CELL] {
+pub(super) fn quarters(values: &[u16]) -> [&[u16]; CELL] {
     let length = values.len() / CELL;
     std::array::from_fn(|row| &values[row * length..][..length])
 }
@@ -227,7 +238,7 @@ fn quarters(values: &[u16]) -> [&[u16]; CELL] {
 /// Makes one row of pixels and of gray values from four rows of samples: in integers as far as whole
 /// vectors go, in floating point for the rest.
 #[inline(always)]
-fn picture_row(
+pub(super) fn picture_row(
     mixes: &Mixes,
     rows: [&[u16]; CELL],
     encoder: &Encoder,

@@ -1,0 +1,87 @@
+//! Development at each size on one thread, in copies of the mosaic: each round times a plain copy and
+//! everything else, and the table has the medians over the rounds. `cargo bench --bench development`
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use parfocal::clock::{Clock, SystemClock};
+use parfocal::imaging::{Calibration, Developer, GrayImage, MosaicFrame, Reference, RgbImage, Size};
+
+const WIDTH: usize = 2048;
+const HEIGHT: usize = 1088;
+const ROUNDS: usize = 60;
+/// Runs within a round; the fastest counts, because other programs only slow a run down.
+const RUNS: usize = 3;
+
+/// Texture inside a circle, dark outside, as the sensor sees it, with detail down to the sample.
+fn mosaic() -> MosaicFrame {
+    let sample = |index: usize| {
+        let x = (index % WIDTH) as f32;
+        let y = (index / WIDTH) as f32;
+        let inside = (x - 1024.0).hypot(y - 544.0) < 700.0;
+        let waves = 1.0 + 0.3 * (x / 9.0).sin() * (y / 13.0 + x / 40.0).cos() + 0.1 * (1.7 * x + 0.9 * y).sin();
+        (if inside { 450.0 * waves } else { 12.0 }) as u16
+    };
+    MosaicFrame::new(WIDTH, HEIGHT, (0..WIDTH * HEIGHT).map(sample).collect()).unwrap()
+}
+
+fn per_pixel() -> Calibration {
+    let reference = |count: u16| {
+        let samples = (0..WIDTH * HEIGHT).map(|i| count + u16::try_from(i % 7).unwrap()).collect();
+        Reference::PerPixel(MosaicFrame::new(WIDTH, HEIGHT, samples).unwrap())
+    };
+    Calibration { dark: reference(30), white: reference(900), ..Calibration::default() }
+}
+
+/// The fastest of some runs.
+fn time(mut run: impl FnMut()) -> Duration {
+    let fastest = (0..RUNS).map(|_| {
+        let begin = SystemClock.now();
+        run();
+        SystemClock.now().since(begin)
+    });
+    fastest.min().unwrap_or_default()
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn main() {
+    // `cargo test --benches` only wants to see that it builds.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+
+    let mosaic = mosaic();
+    let mut copy = vec![0; mosaic.samples().len()];
+    let mut by_band = Developer::new(&Calibration::default());
+    let mut by_pixel = Developer::new(&per_pixel());
+    let mut rgb = Size::ALL.map(|_| RgbImage::default());
+    let mut gray = GrayImage::default();
+
+    let mut copies = Vec::new();
+    let mut steps = vec![(Vec::new(), Vec::new()); 2 * Size::ALL.len()];
+
+    for _ in 0..ROUNDS {
+        let of_copy = time(|| black_box(&mut copy).copy_from_slice(black_box(mosaic.samples()))).as_secs_f64();
+        copies.push(1e3 * of_copy);
+
+        for (index, (times, ratios)) in steps.iter_mut().enumerate() {
+            let which = index % Size::ALL.len();
+            let developer = if index < Size::ALL.len() { &mut by_band } else { &mut by_pixel };
+            let of_step = time(|| developer.develop(black_box(&mosaic), Size::ALL[which], &mut rgb[which], &mut gray));
+            times.push(1e3 * of_step.as_secs_f64());
+            ratios.push(of_step.as_secs_f64() / of_copy);
+        }
+    }
+
+    println!("| step | time, ms | copies of the mosaic |\n|---|---|---|");
+    println!("| copy of the mosaic | {:.3} | 1 |", median(&mut copies));
+    for (index, (times, ratios)) in steps.iter_mut().enumerate() {
+        let name = format!("{:?}", Size::ALL[index % Size::ALL.len()]).to_lowercase();
+        let references = if index < Size::ALL.len() { "band" } else { "pixel" };
+        println!("| {name}, references per {references} | {:.3} | {:.1} |", median(times), median(ratios));
+    }
+}

@@ -1,0 +1,144 @@
+//! White-balanced samples in whole numbers, small enough that four of them fit 16 bits.
+
+use multiversion::multiversion;
+
+use super::ring::Ring;
+use crate::imaging::calibration::{BANDS, Calibration};
+use crate::imaging::frame::{CELL, GrayImage, MosaicFrame};
+use crate::imaging::reconstruct::balance::{self, PixelBalance};
+
+/// Level of a sample as dark as the dark reference; above 0, so that noise below dark is kept.
+pub(super) const BLACK: u16 = 512;
+/// Level of a sample as bright as the white reference.
+pub(super) const WHITE: u16 = 8192;
+/// Highest level: twice white.
+pub(super) const HIGHEST: u16 = 16_383;
+/// Levels from black to white.
+pub(super) const SPAN: f32 = (WHITE - BLACK) as f32;
+
+/// 2^23: added to a small number it leaves that number, rounded, in the lowest bits, which is cheaper
+/// than a cast.
+pub(super) const LOW_BITS: f32 = 8_388_608.0;
+
+/// From [`PixelBalance`]'s numbers to levels: factor and summand.
+const FROM_BALANCED: (f32, f32) = (
+    SPAN / (balance::WHITE - balance::DARK),
+    BLACK as f32 - SPAN / (balance::WHITE - balance::DARK) * balance::DARK,
+);
+
+/// Turns samples into levels, by references per band or per pixel, and sums them up cell by cell.
+#[derive(Debug, Clone)]
+pub(super) struct Levels {
+    dark: [f32; BANDS],
+    white: [f32; BANDS],
+    /// Gains and offsets of four rows of samples, by references per band.
+    of_bands: [(Vec<f32>, Vec<f32>); CELL],
+    /// Sums of four levels, one below another.
+    sums: Vec<u16>,
+}
+
+impl Levels {
+    pub(super) fn new(calibration: &Calibration) -> Self {
+        Self {
+            dark: calibration.dark.band_means(),
+            white: calibration.white.band_means(),
+            of_bands: Default::default(),
+            sums: Vec::new(),
+        }
+    }
+
+    /// Makes ready for mosaics of `width` samples a row.
+    pub(super) fn resize(&mut self, width: usize) {
+        if self.sums.len() == width {
+            return;
+        }
+
+        self.sums.resize(width, 0);
+        for (row, (gains, offsets)) in self.of_bands.iter_mut().enumerate() {
+            let gain = |band: usize| SPAN / (self.white[band] - self.dark[band]);
+            let offset = |band: usize| f32::from(BLACK) - self.dark[band] * gain(band);
+
+            let bands = (0..width).map(|x| CELL * row + x % CELL);
+            gains.clear();
+            gains.extend(bands.clone().map(gain));
+            offsets.clear();
+            offsets.extend(bands.map(offset));
+        }
+    }
+
+    /// Makes the levels of the row of cells `y`, its cells' mean levels into `means`, and its part of
+    /// `gray`.
+    pub(super) fn make(
+        &mut self,
+        mosaic: &MosaicFrame,
+        balance: Option<&PixelBalance>,
+        y: usize,
+        levels: &mut Ring<u16>,
+        means: &mut [u16],
+        gray: &mut GrayImage,
+    ) {
+        for row in 0..CELL {
+            let samples = &mosaic.samples()[(CELL * y + row) * mosaic.width()..][..mosaic.width()];
+            let out = levels.row_mut(CELL * y + row);
+
+            match balance {
+                Some(balance) => {
+                    let (gains, offsets) = balance.row(CELL * y + row);
+                    balance_row(samples, gains, offsets, FROM_BALANCED, out);
+                }
+                None => {
+                    let (gains, offsets) = &self.of_bands[row];
+                    balance_row(samples, gains, offsets, (1.0, 0.0), out);
+                }
+            }
+
+            levels.fill_margins(CELL * y + row, CELL);
+        }
+
+        let rows = [0, 1, 2, 3].map(|row| levels.row(CELL * y + row));
+        let width = mosaic.band_width();
+        cell_means(rows, &mut self.sums, means, &mut gray.data[y * width..][..width]);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn balance_row(samples: &[u16], gains: &[f32], offsets: &[f32], (factor, summand): (f32, f32), levels: &mut [u16]) {
+    let balances = gains.iter().zip(offsets);
+    for ((level, &sample), (gain, offset)) in levels.iter_mut().zip(samples).zip(balances) {
+        let balanced = (f32::from(sample) * gain + offset) * factor + summand;
+        *level = (balanced.clamp(0.0, f32::from(HIGHEST)) + LOW_BITS).to_bits() as u16;
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn cell_means(rows: [&[u16]; CELL], sums: &mut [u16], means: &mut [u16], gray: &mut [f32]) {
+    for (x, sum) in sums.iter_mut().enumerate() {
+        *sum = rows[0][x] + rows[1][x] + rows[2][x] + rows[3][x];
+    }
+
+    let sums = sums.as_chunks::<CELL>().0;
+    for ((mean, gray), sums) in means.iter_mut().zip(gray).zip(sums) {
+        let sum: u32 = sums.iter().map(|&sum| u32::from(sum)).sum();
+        *mean = ((sum + 8) / 16) as u16;
+        let share = (sum as f32 / 16.0 - f32::from(BLACK)) / SPAN;
+        *gray = (255.0 * share).clamp(0.0, 255.0);
+    }
+}
+
+/// Makes the means of blocks of two by two levels of the row of cells `y`: two rows of them.
+pub(super) fn make_blocks(levels: &Ring<u16>, y: usize, blocks: &mut Ring<u16>) {
+    for row in 0..CELL / 2 {
+        let top = levels.row(CELL * y + 2 * row);
+        let bottom = levels.row(CELL * y + 2 * row + 1);
+        block_row(top, bottom, blocks.row_mut(CELL / 2 * y + row));
+        blocks.fill_margins(CELL / 2 * y + row, CELL / 2);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn block_row(top: &[u16], bottom: &[u16], blocks: &mut [u16]) {
+    let pairs = top.as_chunks::<2>().0.iter().zip(bottom.as_chunks::<2>().0);
+    for (block, (top, bottom)) in blocks.iter_mut().zip(pairs) {
+        *block = (top[0] + top[1] + bottom[0] + bottom[1] + 2) / 4;
+    }
+}

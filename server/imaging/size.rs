@@ -1,0 +1,39 @@
+//! The sizes at which a mosaic is developed.
+
+use serde::Serialize;
+
+use super::frame::{CELL, MosaicFrame};
+
+/// How large a picture is made from a mosaic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// One pixel a mosaic cell.
+    #[default]
+    Cell,
+    /// Two by two pixels a mosaic cell.
+    Half,
+    /// One pixel a sample.
+    Full,
+}
+
+impl Size {
+    /// All sizes, smallest first.
+    pub const ALL: [Self; 3] = [Self::Cell, Self::Half, Self::Full];
+
+    /// Pixels along each side of a mosaic cell.
+    #[must_use]
+    pub const fn per_cell(self) -> usize {
+        match self {
+            Self::Cell => 1,
+            Self::Half => 2,
+            Self::Full => CELL,
+        }
+    }
+
+    /// Width and height of the picture of `mosaic`, in pixels.
+    #[must_use]
+    pub const fn of(self, mosaic: &MosaicFrame) -> (usize, usize) {
+        (self.per_cell() * mosaic.band_width(), self.per_cell() * mosaic.band_height())
+    }
+}
