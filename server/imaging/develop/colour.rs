@@ -7,7 +7,7 @@
 use multiversion::multiversion;
 
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
-use super::luminance::{Luminance, between, expand, mixed};
+use super::luminance::{Luminance, between, expand, mixed, reciprocal};
 use super::ring::Ring;
 use crate::imaging::calibration::{BANDS, Calibration};
 use crate::imaging::colour::Encoder;
@@ -113,12 +113,8 @@ impl Colour {
         for (component, plane) in self.planes.iter_mut().enumerate() {
             let cells = &mut self.cells[1..=count];
             match component {
-                3 => cells.iter_mut().zip(&self.gray).for_each(|(cell, gray)| {
-                    *cell = (gray * (SPAN / 255.0) + f32::from(BLACK)) as u16;
-                }),
-                _ => cells.iter_mut().zip(self.rgb.as_chunks::<3>().0).for_each(|(cell, pixel)| {
-                    *cell = (u16::from(pixel[component]) + ENCODING_OFFSET) * PARTS + 2;
-                }),
+                3 => mean_cells(&self.gray, cells),
+                _ => component_cells(&self.rgb, component, cells),
             }
             expand(&mut self.cells, per_cell, plane.row_mut(y));
         }
@@ -156,6 +152,22 @@ fn colour_cells(
     gray: &mut [f32],
 ) {
     picture_row(mixes, rows, encoder, colours, rgb, gray);
+}
+
+/// The levels of gray values.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn mean_cells(gray: &[f32], cells: &mut [u16]) {
+    for (cell, gray) in cells.iter_mut().zip(gray) {
+        *cell = (gray * (SPAN / 255.0) + f32::from(BLACK) + LOW_BITS).to_bits() as u16;
+    }
+}
+
+/// One component of pixels, with its offset, in [`PARTS`].
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn component_cells(rgb: &[u8], component: usize, cells: &mut [u16]) {
+    for (cell, &value) in cells.iter_mut().zip(rgb.iter().skip(component).step_by(3)) {
+        *cell = (u16::from(value) + ENCODING_OFFSET) * PARTS + 2;
+    }
 }
 
 /// How far the luminance of each pixel lies from its cell's mean, where that is far.
@@ -209,7 +221,7 @@ fn level_pairs(levels: &[u16], excess: &[i16], out: &mut [u16]) {
 /// The gain of each pixel's encoded colour: r^(1/2.4), of [`UNITY`], for a pixel r times as bright as
 /// its surroundings.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn gain_row(luminance: &[u16], means: [&[u16]; 2], weights: [u32; 2], gains: &mut [u16]) {
+fn gain_row(luminance: &[u16], means: [&[u16]; 2], weights: [u16; 2], gains: &mut [u16]) {
     // A quotient of two quadratics that is within 0.8 % of r^(1/2.4) from 1/20 to 6, and 1 at 1.
     const ABOVE: [f32; 3] = [0.166_25, 3.680_4, 2.407_6];
     const BELOW: [f32; 3] = [1.0, 4.604_25, 0.65];
@@ -221,7 +233,7 @@ fn gain_row(luminance: &[u16], means: [&[u16]; 2], weights: [u32; 2], gains: &mu
     for x in 0..count {
         let mean = (f32::from(mixed([means[0][x], means[1][x]], weights)) - FLOOR).max(1.0);
         let here = (f32::from(luminance[x]) - FLOOR).max(0.0).min(6.0 * mean);
-        let gain = UNITY * quadratic(ABOVE, mean, here) / quadratic(BELOW, mean, here);
+        let gain = UNITY * quadratic(ABOVE, mean, here) * reciprocal(quadratic(BELOW, mean, here));
         gains[x] = (gain + LOW_BITS).to_bits() as u16;
     }
 }
@@ -233,7 +245,7 @@ fn quadratic([a, b, c]: [f32; 3], mean: f32, here: f32) -> f32 {
 
 /// One component of a row of pixels: the cells' colours, enlarged, times the gains.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn component_row(plane: [&[u16]; 2], weights: [u32; 2], gains: &[u16], out: &mut [u8]) {
+fn component_row(plane: [&[u16]; 2], weights: [u16; 2], gains: &[u16], out: &mut [u8]) {
     // Colour and gain together have 64 * 16384 / 65536 = 16 parts a step.
     const OFFSET: u16 = 16 * ENCODING_OFFSET - 8;
 

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::ring::Ring;
-use crate::imaging::calibration::{BANDS, Calibration};
+use crate::imaging::calibration::Calibration;
 use crate::imaging::frame::{CELL, GrayImage, MosaicFrame};
 use crate::imaging::reconstruct::balance::{self, PixelBalance};
 
@@ -20,50 +20,46 @@ pub(super) const SPAN: f32 = (WHITE - BLACK) as f32;
 /// than a cast.
 pub(super) const LOW_BITS: f32 = 8_388_608.0;
 
+/// Samples worked on at once.
+const LANES: usize = 16;
+
 /// From [`PixelBalance`]'s numbers to levels: factor and summand.
 const FROM_BALANCED: (f32, f32) = (
     SPAN / (balance::WHITE - balance::DARK),
     BLACK as f32 - SPAN / (balance::WHITE - balance::DARK) * balance::DARK,
 );
 
+/// The gray value (0..=255) of a level.
+pub(super) fn gray(level: u16) -> f32 {
+    (255.0 / SPAN * (f32::from(level) - f32::from(BLACK))).clamp(0.0, 255.0)
+}
+
 /// Turns samples into levels, by references per band or per pixel, and sums them up cell by cell.
 #[derive(Debug, Clone)]
 pub(super) struct Levels {
-    dark: [f32; BANDS],
-    white: [f32; BANDS],
-    /// Gains and offsets of four rows of samples, by references per band.
-    of_bands: [(Vec<f32>, Vec<f32>); CELL],
+    /// Gains and offsets of each row of a cell, by references per band, repeated over a vector.
+    of_bands: [[[f32; LANES]; 2]; CELL],
     /// Sums of four levels, one below another.
     sums: Vec<u16>,
 }
 
 impl Levels {
     pub(super) fn new(calibration: &Calibration) -> Self {
-        Self {
-            dark: calibration.dark.band_means(),
-            white: calibration.white.band_means(),
-            of_bands: Default::default(),
-            sums: Vec::new(),
-        }
+        let dark = calibration.dark.band_means();
+        let white = calibration.white.band_means();
+
+        let of_row = |row: usize| {
+            let bands = std::array::from_fn(|lane| CELL * row + lane % CELL);
+            let gain = |band: usize| SPAN / (white[band] - dark[band]);
+            let offset = |band: usize| f32::from(BLACK) - dark[band] * gain(band);
+            [bands.map(gain), bands.map(offset)]
+        };
+        Self { of_bands: std::array::from_fn(of_row), sums: Vec::new() }
     }
 
     /// Makes ready for mosaics of `width` samples a row.
     pub(super) fn resize(&mut self, width: usize) {
-        if self.sums.len() == width {
-            return;
-        }
-
         self.sums.resize(width, 0);
-        for (row, (gains, offsets)) in self.of_bands.iter_mut().enumerate() {
-            let gain = |band: usize| SPAN / (self.white[band] - self.dark[band]);
-            let offset = |band: usize| f32::from(BLACK) - self.dark[band] * gain(band);
-
-            let bands = (0..width).map(|x| CELL * row + x % CELL);
-            gains.clear();
-            gains.extend(bands.clone().map(gain));
-            offsets.clear();
-            offsets.extend(bands.map(offset));
-        }
     }
 
     /// Makes the levels of the row of cells `y`, its cells' mean levels into `means`, and its part of
@@ -84,12 +80,9 @@ impl Levels {
             match balance {
                 Some(balance) => {
                     let (gains, offsets) = balance.row(CELL * y + row);
-                    balance_row(samples, gains, offsets, FROM_BALANCED, out);
+                    balance_pixels(samples, gains, offsets, out);
                 }
-                None => {
-                    let (gains, offsets) = &self.of_bands[row];
-                    balance_row(samples, gains, offsets, (1.0, 0.0), out);
-                }
+                None => balance_bands(samples, &self.of_bands[row], out),
             }
 
             levels.fill_margins(CELL * y + row, CELL);
@@ -102,12 +95,33 @@ impl Levels {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn balance_row(samples: &[u16], gains: &[f32], offsets: &[f32], (factor, summand): (f32, f32), levels: &mut [u16]) {
+fn balance_pixels(samples: &[u16], gains: &[f32], offsets: &[f32], levels: &mut [u16]) {
+    let (factor, summand) = FROM_BALANCED;
     let balances = gains.iter().zip(offsets);
     for ((level, &sample), (gain, offset)) in levels.iter_mut().zip(samples).zip(balances) {
-        let balanced = (f32::from(sample) * gain + offset) * factor + summand;
-        *level = (balanced.clamp(0.0, f32::from(HIGHEST)) + LOW_BITS).to_bits() as u16;
+        *level = rounded((f32::from(sample) * gain + offset) * factor + summand);
     }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn balance_bands(samples: &[u16], [gains, offsets]: &[[f32; LANES]; 2], levels: &mut [u16]) {
+    let (chunks, rest) = samples.as_chunks::<LANES>();
+    let (out, out_rest) = levels.as_chunks_mut::<LANES>();
+    for (levels, samples) in out.iter_mut().zip(chunks) {
+        for lane in 0..LANES {
+            levels[lane] = rounded(f32::from(samples[lane]) * gains[lane] + offsets[lane]);
+        }
+    }
+
+    for (lane, (level, &sample)) in out_rest.iter_mut().zip(rest).enumerate() {
+        *level = rounded(f32::from(sample) * gains[lane] + offsets[lane]);
+    }
+}
+
+/// The nearest level.
+#[inline(always)]
+fn rounded(level: f32) -> u16 {
+    (level.clamp(0.0, f32::from(HIGHEST)) + LOW_BITS).to_bits() as u16
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]

@@ -178,4 +178,20 @@ impl Rows<'_> {
 
         true
     }
+    /// The gray levels (0..=255) of row `row` of the pixels just made: luminance, the mean of all bands,
+    /// at the picture's own size.
+    pub fn gray_into(&self, row: usize, gray: &mut [f32]) {
+        let Some(y) = self.done.checked_sub(1) else { return };
+
+        if self.per_cell == 1 {
+            let width = self.gray.width;
+            gray.copy_from_slice(&self.gray.data[y * width..][..width]);
+            return;
+        }
+
+        let levels = self.developer.luminance.row(self.per_cell * y + row);
+        for (gray, &level) in gray.iter_mut().zip(levels) {
+            *gray = levels::gray(level);
+        }
+    }
 }

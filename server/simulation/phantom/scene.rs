@@ -9,9 +9,9 @@ use super::cortex::{Cortex, Folding};
 use super::defocus::Texel;
 use super::field::{Field, SIDE, Spline, UNIT};
 use super::mosaic::Bands;
-use super::spectra::{ARTERIAL, ENDMEMBERS, LAMP, PALE, VENOUS};
+use super::spectra::{ARTERIAL, ENDMEMBERS, LAMP, PALE, VENOUS, endmembers_in_band};
 use super::vessels::{Density, Vessels};
-use crate::imaging::{Calibration, GrayImage};
+use crate::imaging::{Band, Calibration, GrayImage};
 
 /// A brain's surface, sharp and without noise.
 pub struct Scene {
@@ -88,6 +88,15 @@ impl Scene {
         let scale = 200.0 / percentile_98(&picture.data).max(1e-6);
         picture.data.iter_mut().for_each(|value| *value = (*value * scale).min(255.0));
         picture
+    }
+
+    /// The middle of the scene as `band` sees it through a perfect lens, under the light that gives the
+    /// scene's white 255: `width` x `height` texels (at most [`SIDE`] each; more is cut), linear in light.
+    #[must_use]
+    pub fn sharp_band(&self, band: &Band, width: usize, height: usize) -> GrayImage {
+        let response = endmembers_in_band(band.centre_nm, band.fwhm_nm);
+        let weights = response.map(|value| 255.0 * value as f32 / UNIT);
+        self.middle(width, height, |texel| mix(texel, weights))
     }
 
     /// The middle of the scene, with `value` applied to each texel.
