@@ -177,7 +177,197 @@ fn colours_are_those_of_the_cells_without_fringes_at_edges() {
     ];
     for (name, scene) in scenes {
         let [to_cells, before, after] = colour_quality(name, &scene, 7);
-        assert!(to_cells < 2.0, "{name}: {to_cells}");
-        assert!(after < before, "{name}: {before} {after}");
+        // The leaves have strong detail nearly everywhere, which the cell picture lacks.
+        let limit = if name.starts_with("brain") { 2.0 } else { 3.0 };
+        assert!(to_cells < limit, "{name}: {to_cells}");
+        assert!(after < 0.85 * before, "{name}: {before} {after}");
+    }
+}
+
+/// A mosaic of `width` x `height` whose samples are given by band, column and row.
+fn mosaic(width: usize, height: usize, count: impl Fn(usize, usize, usize) -> f32) -> MosaicFrame {
+    let samples = (0..width * height).map(|place| {
+        let x = place % width;
+        let y = place / width;
+        count(CELL * (y % CELL) + x % CELL, x, y).round().clamp(0.0, 1023.0) as u16
+    });
+    MosaicFrame::new(width, height, samples.collect()).unwrap()
+}
+
+/// Very unequal bands, as of a deep red surface.
+fn reflectance(band: usize) -> f32 {
+    [0.9, 0.8, 0.95, 1.0, 0.35, 0.3, 0.4, 0.5, 0.2, 0.25, 0.3, 0.3, 0.1, 0.12, 0.15, 0.2][band]
+}
+
+#[test]
+fn an_even_surface_has_no_pattern_up_to_the_edges() {
+    for (width, height) in [(4, 4), (8, 4), (4, 12), (40, 24), (68, 20)] {
+        let seen = mosaic(width, height, |band, _, _| 700.0 * reflectance(band));
+        let (cells, _) = developed(&seen, Size::Cell);
+
+        for size in [Size::Half, Size::Full] {
+            let (rgb, gray) = developed(&seen, size);
+            assert_eq!((rgb.width, rgb.height), size.of(&seen));
+            assert_eq!((gray.width, gray.height), (width / CELL, height / CELL));
+
+            for pixel in rgb.data.as_chunks::<3>().0 {
+                let near = pixel.iter().zip(&cells.data[..3]).all(|(one, other)| one.abs_diff(*other) <= 2);
+                assert!(near, "{size:?} of {width}x{height}: {pixel:?} {:?}", &cells.data[..3]);
+            }
+        }
+    }
+}
+
+#[test]
+fn light_that_changes_from_sample_to_sample_changes_brightness_and_not_colour() {
+    // Stripes of 5 samples, in all bands alike: no cell sees all of one.
+    let light = |x: usize| 1.0 + 0.25 * (std::f32::consts::TAU * x as f32 / 5.0).cos();
+    let seen = mosaic(160, 80, |band, x, _| 500.0 * reflectance(band) * light(x));
+    let mean = (0..BANDS).map(reflectance).sum::<f32>() / 16.0 * 500.0 / 1023.0;
+
+    let (rgb, _) = developed(&seen, Size::Full);
+    let found = luminance(&seen, Size::Full);
+    for y in 16..64 {
+        for x in 16..144 {
+            let share = found[y * 160 + x] / mean;
+            assert!((share - light(x)).abs() < 0.06, "({x}, {y}): {share} {}", light(x));
+
+            let [_, a, b] = lab(rgb.data.as_chunks::<3>().0[y * 160 + x]);
+            let [_, even_a, even_b] = lab(rgb.data.as_chunks::<3>().0[40 * 160 + 80]);
+            assert!((a - even_a).hypot(b - even_b) < 12.0, "({x}, {y}): {a} {b}, {even_a} {even_b}");
+        }
+    }
+}
+
+#[test]
+fn highlights_are_white_and_darken_nothing_beside_them() {
+    // Bands that reach white at different counts, so that they saturate at different levels.
+    let white: [f32; BANDS] = std::array::from_fn(|band| 500.0 + 30.0 * band as f32);
+    let calibration = Calibration { white: Reference::PerBand(white), ..Calibration::default() };
+    let inside = |x: usize, y: usize| (x as f32 - 80.3).hypot(y as f32 - 40.8) < 14.0;
+    let seen = mosaic(160, 80, |band, x, y| {
+        let surface = 0.5 * reflectance(band) * white[band];
+        if inside(x, y) { 4.0 * white[band] } else { surface }
+    });
+
+    for size in [Size::Half, Size::Full] {
+        let (rgb, _) = developed_by(&mut Developer::new(&calibration), &seen, size);
+        let times = CELL / size.per_cell();
+        let pixel = |x: usize, y: usize| rgb.data.as_chunks::<3>().0[y * rgb.width + x];
+        let surface = pixel(4, 4);
+
+        for y in 0..rgb.height {
+            for x in 0..rgb.width {
+                let (column, row) = (x * times, y * times);
+                let distance = (column as f32 - 80.3).hypot(row as f32 - 40.8);
+                if distance < 10.0 {
+                    assert!(pixel(x, y).iter().all(|&value| value >= 250), "{size:?} ({x}, {y}): {:?}", pixel(x, y));
+                }
+                if distance > 16.0 {
+                    let darker = pixel(x, y)[0] as i32 - i32::from(surface[0]);
+                    assert!(darker > -40, "{size:?} ({x}, {y}): {:?} {surface:?}", pixel(x, y));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn references_per_pixel_even_out_the_pixels() {
+    let (width, height) = (160, 96);
+    let uneven = |x: usize, y: usize| 0.7 + 0.3 * ((x * 29 + y * 53) % 97) as f32 / 97.0;
+    let dark = mosaic(width, height, |_, x, y| 20.0 + ((x + 3 * y) % 9) as f32);
+    let white = mosaic(width, height, |_, x, y| 950.0 * uneven(x, y));
+    let light = |x: usize, y: usize| 0.5 + 0.2 * (0.9 * x as f32 + 0.4 * y as f32).sin();
+    let seen = mosaic(width, height, |band, x, y| {
+        let place = y * width + x;
+        let of = |frame: &MosaicFrame| f32::from(frame.samples()[place]);
+        of(&dark) + light(x, y) * reflectance(band) * (of(&white) - of(&dark))
+    });
+    let even = mosaic(width, height, |band, x, y| 1023.0 * light(x, y) * reflectance(band));
+    let calibration =
+        Calibration { dark: Reference::PerPixel(dark), white: Reference::PerPixel(white), ..Calibration::default() };
+
+    for size in Size::ALL {
+        let (found, gray) = developed_by(&mut Developer::new(&calibration), &seen, size);
+        let (expected, expected_gray) = developed(&even, size);
+        let differences = found.data.iter().zip(&expected.data).map(|(one, other)| f64::from(one.abs_diff(*other)));
+        let largest = quantile(differences.collect(), 0.999);
+        assert!(largest <= 3.0, "{size:?}: {largest}");
+        assert!(gray.data.iter().zip(&expected_gray.data).all(|(one, other)| (one - other).abs() < 0.5));
+    }
+}
+
+#[test]
+fn bands_of_a_calibration_decide_the_colour_at_every_size() {
+    let mut other = Calibration::default();
+    other.bands.reverse();
+    let seen = mosaic(64, 64, |band, _, _| 700.0 * reflectance(band));
+
+    for size in Size::ALL {
+        let pixel = |calibration: &Calibration| {
+            let (rgb, _) = developed_by(&mut Developer::new(calibration), &seen, size);
+            rgb.data.as_chunks::<3>().0[rgb.width * rgb.height / 2]
+        };
+        let [red, _, blue] = pixel(&Calibration::default());
+        assert!(red > blue, "long waves are reflected");
+        let [red, _, blue] = pixel(&other);
+        assert!(blue > red, "short waves are reflected");
+    }
+}
+
+#[test]
+fn gray_is_that_of_the_cells_at_every_size() {
+    let seen = Scene::leaves(107).mosaic(3);
+    let (_, cells) = developed(&seen, Size::Cell);
+    for size in [Size::Half, Size::Full] {
+        let (_, gray) = developed(&seen, size);
+        let largest = gray.data.iter().zip(&cells.data).map(|(one, other)| (one - other).abs()).fold(0.0, f32::max);
+        assert!(largest < 0.05, "{size:?}: {largest}");
+    }
+}
+
+#[test]
+fn a_cell_picture_is_the_reconstructors() {
+    let seen = Scene::leaves(108).mosaic(3);
+    let mut rgb = RgbImage::default();
+    let mut gray = GrayImage::default();
+    Reconstructor::new(&Calibration::default()).reconstruct(&seen, &mut rgb, &mut gray);
+    assert_eq!(developed(&seen, Size::Cell), (rgb, gray));
+}
+
+#[test]
+fn a_developer_remembers_nothing_of_other_frames_and_sizes() {
+    let large = Scene::leaves(109).mosaic(3);
+    let small = mosaic(64, 40, |band, x, y| 300.0 + ((band * 31 + x * 17 + y * 23) % 400) as f32);
+    let mut developer = Developer::new(&Calibration::default());
+
+    for (seen, size) in [
+        (&large, Size::Full),
+        (&small, Size::Full),
+        (&large, Size::Half),
+        (&large, Size::Cell),
+        (&small, Size::Half),
+        (&large, Size::Full),
+    ] {
+        assert_eq!(developed_by(&mut developer, seen, size), developed(seen, size), "{size:?}");
+    }
+}
+
+#[test]
+fn rows_are_those_of_the_whole_picture() {
+    let seen = Scene::leaves(110).mosaic(3);
+    let mut developer = Developer::new(&Calibration::default());
+    for size in Size::ALL {
+        let (whole, whole_gray) = developed(&seen, size);
+        let mut gray = GrayImage::default();
+        let mut pixels = vec![0; 3 * whole.width * size.per_cell()];
+        let mut found = Vec::new();
+
+        let mut rows = developer.rows(&seen, size, &mut gray);
+        while rows.next_into(&mut pixels) {
+            found.extend_from_slice(&pixels);
+        }
+        assert_eq!((found, gray), (whole.data, whole_gray), "{size:?}");
     }
 }

@@ -27,8 +27,7 @@ pub fn amplitude_kept(found: &[f32], truth: &[f32], cycles: std::ops::Range<f64>
     let truth = spectrum(truth);
 
     let frequency = |index: usize| index.min(SQUARE - index) as f64 / SQUARE as f64;
-    let places =
-        (0..SQUARE * SQUARE).filter(|i| cycles.contains(&frequency(i % SQUARE).hypot(frequency(i / SQUARE))));
+    let places = (0..SQUARE * SQUARE).filter(|i| cycles.contains(&frequency(i % SQUARE).hypot(frequency(i / SQUARE))));
 
     let mut common = 0.0;
     let mut whole = 0.0;

@@ -15,6 +15,9 @@ const READ_NOISE: f32 = 13.0;
 /// The largest count.
 const FULL_SCALE: f32 = 1023.0;
 
+/// Leaves of a scene, and the ground below them.
+const LEAVES: usize = 400;
+
 /// Wavelengths at which spectra are sampled, in nm.
 const WAVELENGTHS: std::ops::Range<u32> = 400..701;
 
@@ -28,7 +31,7 @@ impl Scene {
     /// and uneven light over all: sharp edges between colours, and detail down to the sample.
     pub fn leaves(seed: u64) -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-        let spectra = |rng: &mut ChaCha8Rng| (0..500).map(|_| in_bands(&spectrum(rng))).collect::<Vec<_>>();
+        let spectra = |rng: &mut ChaCha8Rng| (0..LEAVES).map(|_| in_bands(&spectrum(rng))).collect::<Vec<_>>();
         let ground = spectra(rng);
         let pattern = spectra(rng);
 
@@ -105,10 +108,9 @@ fn mean_at(bands: &[Vec<f32>; BANDS], place: usize) -> f32 {
 
 /// A smooth random reflectance at [`WAVELENGTHS`].
 fn spectrum(rng: &mut ChaCha8Rng) -> Vec<f32> {
-    let hills: Vec<(f32, f32)> =
-        (0..8_u8).map(|hill| (400.0 + 300.0 * f32::from(hill) / 7.0, normal(rng))).collect();
+    let hills: Vec<(f32, f32)> = (0..8_u8).map(|hill| (400.0 + 300.0 * f32::from(hill) / 7.0, normal(rng))).collect();
     let base = -2.5 + 4.0 * rng.random::<f32>();
-    let strength = 0.2 + rng.random::<f32>();
+    let strength = 0.1 + 0.6 * rng.random::<f32>();
 
     let at = |nm: u32| {
         let wave = |&(centre, height): &(f32, f32)| height * (-0.5 * ((nm as f32 - centre) / 40.0).powi(2)).exp();
@@ -132,7 +134,7 @@ fn leaves(side: usize, count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let mut labels = vec![count - 1; side * side];
 
     for leaf in (0..count - 1).rev() {
-        let radius = (12.0 / (0.002 + 0.998 * rng.random::<f32>()).sqrt()).min(280.0);
+        let radius = (16.0 / (0.002 + 0.998 * rng.random::<f32>()).sqrt()).min(280.0);
         let thin = 0.15 + 0.85 * rng.random::<f32>();
         let [x, y] = [(); 2].map(|()| side as f32 * rng.random::<f32>());
         let (sin, cos) = (std::f32::consts::PI * rng.random::<f32>()).sin_cos();
@@ -154,9 +156,11 @@ fn leaves(side: usize, count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     labels
 }
 
-/// Smooth noise with bumps of each of `sizes`, of standard deviation about 1.
+/// Smooth noise with bumps of each of `sizes`, the larger ones higher as in nature, of standard
+/// deviation about 1.
 fn noise(sizes: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
     let mut sum = vec![0.0; SIDE * SIDE];
+    let squares: f32 = sizes.iter().sum();
     for &size in sizes {
         let knots = (SIDE as f32 / size) as usize + 2;
         let heights: Vec<f32> = (0..knots * knots).map(|_| normal(rng)).collect();
@@ -167,7 +171,7 @@ fn noise(sizes: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
             let first = y as usize * knots + x as usize;
             let row = |from: usize| heights[from] + x.fract() * (heights[from + 1] - heights[from]);
             let value = row(first) + y.fract() * (row(first + knots) - row(first));
-            *sum += 1.5 * value / (sizes.len() as f32).sqrt();
+            *sum += 1.5 * value * (size / squares).sqrt();
         }
     }
     sum

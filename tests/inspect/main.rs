@@ -137,6 +137,73 @@ fn overlays_are_pictures_of_the_same_size_and_none_overwrites_another() {
     }
 }
 
+/// A mosaic of 512x256 samples with a bright disc, saved as PNG: fine stripes in every band on it.
+fn striped_mosaic(folder: &TempDir) -> PathBuf {
+    let path = folder.path().join("mosaic.png");
+    let mosaic = image::ImageBuffer::from_fn(512, 256, |x, y| {
+        let inside = (f64::from(x) - 256.0).hypot(f64::from(y) - 128.0) < 110.0;
+        let stripe = if x % 6 < 3 { 650_u16 } else { 350 };
+        image::Luma([if inside { stripe } else { 8 }])
+    });
+    mosaic.save(&path).unwrap();
+    path
+}
+
+#[test]
+fn a_mosaic_is_developed_at_the_size_that_is_asked_for() {
+    let folder = TempDir::new().unwrap();
+    let path = striped_mosaic(&folder);
+
+    let mut reports = Vec::new();
+    let mut contrasts = Vec::new();
+    for (size, width, height) in [("cell", 128, 64), ("half", 256, 128), ("full", 512, 256)] {
+        let out = folder.path().join(size);
+        let output =
+            inspect(&["--json", "--mosaic", "--size", size, "--out", out.to_str().unwrap()], &[path.as_path()]);
+        assert!(output.status.success(), "{}", complaint(&output));
+        reports.push(objects(&output));
+
+        let picture = image::open(out.join("mosaic.png.overlay.png")).unwrap().to_rgb8();
+        assert_eq!(picture.dimensions(), (width, height));
+
+        // Within the patch, where nothing is drawn.
+        let row = |x: u32| f64::from(picture.get_pixel(x, height / 2)[1]);
+        let middle: Vec<f64> = (width / 2 - width / 12..width / 2 + width / 12).map(row).collect();
+        let brightest = middle.iter().copied().fold(0.0, f64::max);
+        contrasts.push(brightest - middle.iter().copied().fold(255.0, f64::min));
+    }
+
+    assert!(reports.iter().all(|report| *report == reports[0]), "values are those of the cells: {reports:?}");
+    // sRGB encodes 350 and 650 of 1023 as 158 and 207.
+    assert!(contrasts[0] < 30.0 && (contrasts[2] - 49.0).abs() < 8.0, "{contrasts:?}");
+
+    // Without --size it is the size of the cells.
+    let out = folder.path().join("default");
+    assert!(inspect(&["--mosaic", "--out", out.to_str().unwrap()], &[path.as_path()]).status.success());
+    let name = "mosaic.png.overlay.png";
+    assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(folder.path().join("cell").join(name)).unwrap());
+}
+
+#[test]
+fn only_mosaics_have_sizes() {
+    let folder = TempDir::new().unwrap();
+    let mosaic = striped_mosaic(&folder);
+    let picture = folder.path().join("disc.png");
+    disc().save(&picture).unwrap();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+
+    let output = inspect(&["--json", "--mosaic", "--size", "full", "--out", out], &[&picture, &mosaic]);
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(objects(&output).len(), 1, "the mosaic is still developed");
+    assert!(complaint(&output).contains("disc.png: --size is for mosaics"), "{}", complaint(&output));
+
+    let unknown = inspect(&["--size", "double", "--out", out], &[&mosaic]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(complaint(&unknown).contains("cell, half, full"), "{}", complaint(&unknown));
+    assert_eq!(inspect(&["--size", "half"], &[&mosaic]).status.code(), Some(2), "nothing would be written");
+}
+
 #[test]
 fn bad_files_are_named_and_the_others_still_inspected() {
     let folder = TempDir::new().unwrap();

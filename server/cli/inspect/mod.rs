@@ -14,7 +14,7 @@ use crate::autofocus::{mgm, mlr};
 use crate::camera::calibration;
 use crate::files::replace;
 use crate::imaging::{
-    Calibration, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode,
+    Calibration, Developer, GrayImage, PATCH_SIDE, Patch, PatchArea, Picture, RgbImage, Size, content_area, decode,
     decode_raw,
 };
 use crate::notices::tell;
@@ -36,6 +36,10 @@ pub struct Arguments {
     /// Treat 16-bit gray pictures of any size as mosaics
     #[arg(long)]
     mosaic: bool,
+    /// Size of the pictures that --out saves of mosaics: one pixel a mosaic cell, two by two, or one a sample. Values
+    /// and lengths are those of the cells at every size
+    #[arg(long, value_enum, default_value_t, requires = "out")]
+    size: Size,
     /// Calibration of the sensor that took the mosaics: a TOML file, or a folder of `parfocal calibrate`; a typical
     /// unit's by default
     #[arg(long, value_name = "PATH")]
@@ -79,7 +83,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 struct Inspector<'a> {
     mosaic: bool,
     out: Option<&'a Path>,
-    reconstructor: Reconstructor,
+    size: Size,
+    developer: Developer,
     calibration: Calibration,
     /// Its title, where it was asked for.
     titled: Option<String>,
@@ -105,7 +110,8 @@ impl<'a> Inspector<'a> {
         Ok(Self {
             mosaic: arguments.mosaic,
             out: arguments.out.as_deref(),
-            reconstructor: Reconstructor::new(&calibration),
+            size: arguments.size,
+            developer: Developer::new(&calibration),
             titled: arguments.calibration.is_some().then(|| calibration.title()),
             calibration,
             taken: HashSet::new(),
@@ -156,7 +162,12 @@ impl<'a> Inspector<'a> {
             path.extension().is_some_and(|end| end.eq_ignore_ascii_case("raw") || end.eq_ignore_ascii_case("bin"));
         let picture = if raw { decode_raw(&bytes).map(Picture::Mosaic) } else { decode(&bytes, self.mosaic) };
 
-        Ok(match picture.map_err(|error| named(&error))? {
+        let picture = picture.map_err(|error| named(&error))?;
+        if self.size != Size::Cell && !matches!(picture, Picture::Mosaic(_)) {
+            return Err(named(&"--size is for mosaics, and this is a developed picture; leave it out").into());
+        }
+
+        Ok(match picture {
             Picture::Rgb(rgb, gray) => Seen { kind: Kind::Rgb, rgb, gray },
             Picture::Gray(gray) => Seen { kind: Kind::Gray, rgb: overlay::from_gray(&gray), gray },
             Picture::Mosaic(frame) => {
@@ -175,7 +186,11 @@ impl<'a> Inspector<'a> {
                 }
 
                 let mut seen = Seen { kind: Kind::Mosaic, rgb: RgbImage::default(), gray: GrayImage::default() };
-                self.reconstructor.reconstruct(&frame, &mut seen.rgb, &mut seen.gray);
+                self.developer.develop(&frame, Size::Cell, &mut seen.rgb, &mut seen.gray);
+                if self.size != Size::Cell {
+                    // Gray stays that of the cells as policies see it.
+                    self.developer.develop(&frame, self.size, &mut seen.rgb, &mut GrayImage::default());
+                }
                 seen
             }
         })

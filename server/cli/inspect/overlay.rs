@@ -29,14 +29,21 @@ const GLYPHS: [(char, u16); 16] = [
     ('R', 0o65655),
 ];
 
-/// The picture with what `report` says of it drawn in.
+/// The picture with what `report` says of it drawn in. The picture may be a whole number of times as
+/// large as the report's lengths.
 pub(super) fn draw(rgb: RgbImage, report: &Report) -> image::RgbImage {
+    let times = (rgb.width / report.width.max(1)).max(1);
     let mut canvas = Canvas { scale: (rgb.width / 400).max(1), picture: rgb };
+
     if let Some(area) = &report.content_area {
-        canvas.circle(area);
+        // Whole numbers are pixels' centres.
+        let enlarged = |place: f64| (place + 0.5) * times as f64 - 0.5;
+        let radius = area.radius * times as f64;
+        canvas.circle(&ContentArea { x: enlarged(area.x), y: enlarged(area.y), radius, ..*area });
     }
 
-    canvas.frame(report.patch);
+    let PatchArea { x, y, width, height } = report.patch;
+    canvas.frame(PatchArea { x: times * x, y: times * y, width: times * width, height: times * height });
     canvas.text(&format!("MGM {:.2}", report.mgm), 0);
     canvas.text(&format!("MLR {:.4}", report.mlr), 1);
 

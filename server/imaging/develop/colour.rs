@@ -1,21 +1,19 @@
 //! Colour: that of the cells, lit by the luminance of each pixel.
 //!
 //! The 16 samples of a cell lie at 16 places, so at an edge they would disagree in brightness, and
-//! that would look like colour. So the samples are first brought to their cell's mean luminance. Small
-//! differences stay as they are, because there noise would only be carried from luminance to colour.
+//! that would look like colour. So the samples are first brought to their cell's mean luminance.
+//! Differences below three sixteenths of that mean stay, so that where there is no strong edge the
+//! colours are the cells' own; from nine sixteenths on nothing stays.
 
 use multiversion::multiversion;
 
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
-use super::luminance::{Luminance, between, expand, mixed, reciprocal};
+use super::luminance::{Luminance, between, expand, mixed, mixed_row, reciprocal};
 use super::ring::Ring;
 use crate::imaging::calibration::{BANDS, Calibration};
 use crate::imaging::colour::Encoder;
 use crate::imaging::frame::CELL;
 use crate::imaging::reconstruct::{Mixes, picture_row, quarters, weights};
-
-/// A difference from the cell's mean below this part of it is left as it is (an eighth).
-const LEFT_ALONE: u32 = 3;
 
 /// Rows of cells that are kept.
 const KEPT: usize = 4;
@@ -48,6 +46,8 @@ pub(super) struct Colour {
     cells: Vec<u16>,
     /// Red, green, blue and mean of all bands, enlarged across; a row of cells each.
     planes: [Ring<u16>; 4],
+    /// Mean of all bands of the cells around each pixel of a row, and the pixel's gain.
+    means: Vec<u16>,
     gains: Vec<u16>,
     components: [Vec<u8>; 3],
 }
@@ -64,6 +64,7 @@ impl Colour {
             colours: Default::default(),
             cells: Vec::new(),
             planes: Default::default(),
+            means: Vec::new(),
             gains: Vec::new(),
             components: Default::default(),
         }
@@ -79,6 +80,7 @@ impl Colour {
         self.colours.iter_mut().for_each(|line| line.resize(cells, 0.0));
         self.cells.resize(cells + 2, 0);
         self.planes.iter_mut().for_each(|plane| plane.resize(width, KEPT));
+        self.means.resize(width, 0);
         self.gains.resize(width, 0);
         self.components.iter_mut().for_each(|line| line.resize(width, 0));
     }
@@ -133,7 +135,8 @@ impl Colour {
         let (near, weights) = between(row, per_cell, y, cells);
         let [red, green, blue, means] = self.planes.each_ref().map(|plane| [plane.row(y), plane.row(near)]);
 
-        gain_row(luminance, means, weights, &mut self.gains);
+        mixed_row(means, weights, &mut self.means);
+        gain_row(luminance, &self.means, &mut self.gains);
         for (plane, component) in [red, green, blue].into_iter().zip(&mut self.components) {
             component_row(plane, weights, &self.gains, component);
         }
@@ -188,10 +191,15 @@ fn excess_of_two(luminance: &[u16], means: &[u16], excess: &mut [i16]) {
 #[inline(always)]
 fn excess_of<const PER_CELL: usize>(luminance: &[[u16; PER_CELL]], means: &[u16], excess: &mut [[i16; PER_CELL]]) {
     for ((excess, luminance), &mean) in excess.iter_mut().zip(luminance).zip(means) {
-        let limit = (mean.saturating_sub(BLACK) >> LEFT_ALONE) as i16;
+        let above_black = mean.saturating_sub(BLACK);
+        // Three sixteenths: more than noise and most texture.
+        let limit = ((above_black >> 3) + (above_black >> 4)) as i16;
+
         for (excess, &luminance) in excess.iter_mut().zip(luminance) {
             let difference = luminance as i16 - mean as i16;
-            *excess = difference - difference.max(-limit).min(limit);
+            let size = difference.abs();
+            let left_alone = size.min(limit).min((3 * limit - size).max(0));
+            *excess = if difference < 0 { left_alone - size } else { size - left_alone };
         }
     }
 }
@@ -221,20 +229,16 @@ fn level_pairs(levels: &[u16], excess: &[i16], out: &mut [u16]) {
 /// The gain of each pixel's encoded colour: r^(1/2.4), of [`UNITY`], for a pixel r times as bright as
 /// its surroundings.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn gain_row(luminance: &[u16], means: [&[u16]; 2], weights: [u16; 2], gains: &mut [u16]) {
+fn gain_row(luminance: &[u16], means: &[u16], gains: &mut [u16]) {
     // A quotient of two quadratics that is within 0.8 % of r^(1/2.4) from 1/20 to 6, and 1 at 1.
     const ABOVE: [f32; 3] = [0.166_25, 3.680_4, 2.407_6];
     const BELOW: [f32; 3] = [1.0, 4.604_25, 0.65];
 
-    let count = gains.len();
-    let luminance = &luminance[..count];
-    let means = means.map(|values| &values[..count]);
-
-    for x in 0..count {
-        let mean = (f32::from(mixed([means[0][x], means[1][x]], weights)) - FLOOR).max(1.0);
-        let here = (f32::from(luminance[x]) - FLOOR).max(0.0).min(6.0 * mean);
-        let gain = UNITY * quadratic(ABOVE, mean, here) * reciprocal(quadratic(BELOW, mean, here));
-        gains[x] = (gain + LOW_BITS).to_bits() as u16;
+    for (gain, (&luminance, &mean)) in gains.iter_mut().zip(luminance.iter().zip(means)) {
+        let mean = (f32::from(mean) - FLOOR).max(1.0);
+        let here = (f32::from(luminance) - FLOOR).max(0.0).min(6.0 * mean);
+        let found = UNITY * quadratic(ABOVE, mean, here) * reciprocal(quadratic(BELOW, mean, here));
+        *gain = (found + LOW_BITS).to_bits() as u16;
     }
 }
 

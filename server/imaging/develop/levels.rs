@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::ring::Ring;
-use crate::imaging::calibration::Calibration;
+use crate::imaging::calibration::{BANDS, Calibration};
 use crate::imaging::frame::{CELL, GrayImage, MosaicFrame};
 use crate::imaging::reconstruct::balance::{self, PixelBalance};
 
@@ -20,14 +20,9 @@ pub(super) const SPAN: f32 = (WHITE - BLACK) as f32;
 /// than a cast.
 pub(super) const LOW_BITS: f32 = 8_388_608.0;
 
-/// Samples worked on at once.
-const LANES: usize = 16;
-
 /// From [`PixelBalance`]'s numbers to levels: factor and summand.
-const FROM_BALANCED: (f32, f32) = (
-    SPAN / (balance::WHITE - balance::DARK),
-    BLACK as f32 - SPAN / (balance::WHITE - balance::DARK) * balance::DARK,
-);
+const FROM_BALANCED: (f32, f32) =
+    (SPAN / (balance::WHITE - balance::DARK), BLACK as f32 - SPAN / (balance::WHITE - balance::DARK) * balance::DARK);
 
 /// The gray value (0..=255) of a level.
 pub(super) fn gray(level: u16) -> f32 {
@@ -37,8 +32,11 @@ pub(super) fn gray(level: u16) -> f32 {
 /// Turns samples into levels, by references per band or per pixel, and sums them up cell by cell.
 #[derive(Debug, Clone)]
 pub(super) struct Levels {
-    /// Gains and offsets of each row of a cell, by references per band, repeated over a vector.
-    of_bands: [[[f32; LANES]; 2]; CELL],
+    /// Gain and offset of each band, by references per band.
+    of_bands: [(f32, f32); BANDS],
+    /// The same for each sample of four rows.
+    gains: [Vec<f32>; CELL],
+    offsets: [Vec<f32>; CELL],
     /// Sums of four levels, one below another.
     sums: Vec<u16>,
 }
@@ -48,18 +46,32 @@ impl Levels {
         let dark = calibration.dark.band_means();
         let white = calibration.white.band_means();
 
-        let of_row = |row: usize| {
-            let bands = std::array::from_fn(|lane| CELL * row + lane % CELL);
-            let gain = |band: usize| SPAN / (white[band] - dark[band]);
-            let offset = |band: usize| f32::from(BLACK) - dark[band] * gain(band);
-            [bands.map(gain), bands.map(offset)]
+        let of_band = |band: usize| {
+            let gain = SPAN / (white[band] - dark[band]);
+            (gain, f32::from(BLACK) - dark[band] * gain)
         };
-        Self { of_bands: std::array::from_fn(of_row), sums: Vec::new() }
+        Self {
+            of_bands: std::array::from_fn(of_band),
+            gains: Default::default(),
+            offsets: Default::default(),
+            sums: Vec::new(),
+        }
     }
 
     /// Makes ready for mosaics of `width` samples a row.
     pub(super) fn resize(&mut self, width: usize) {
+        if self.sums.len() == width {
+            return;
+        }
+
         self.sums.resize(width, 0);
+        for (row, (gains, offsets)) in self.gains.iter_mut().zip(&mut self.offsets).enumerate() {
+            let balances = (0..width).map(|x| self.of_bands[CELL * row + x % CELL]);
+            gains.clear();
+            gains.extend(balances.clone().map(|(gain, _)| gain));
+            offsets.clear();
+            offsets.extend(balances.map(|(_, offset)| offset));
+        }
     }
 
     /// Makes the levels of the row of cells `y`, its cells' mean levels into `means`, and its part of
@@ -82,7 +94,7 @@ impl Levels {
                     let (gains, offsets) = balance.row(CELL * y + row);
                     balance_pixels(samples, gains, offsets, out);
                 }
-                None => balance_bands(samples, &self.of_bands[row], out),
+                None => balance_bands(samples, &self.gains[row], &self.offsets[row], out),
             }
 
             levels.fill_margins(CELL * y + row, CELL);
@@ -104,17 +116,10 @@ fn balance_pixels(samples: &[u16], gains: &[f32], offsets: &[f32], levels: &mut 
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn balance_bands(samples: &[u16], [gains, offsets]: &[[f32; LANES]; 2], levels: &mut [u16]) {
-    let (chunks, rest) = samples.as_chunks::<LANES>();
-    let (out, out_rest) = levels.as_chunks_mut::<LANES>();
-    for (levels, samples) in out.iter_mut().zip(chunks) {
-        for lane in 0..LANES {
-            levels[lane] = rounded(f32::from(samples[lane]) * gains[lane] + offsets[lane]);
-        }
-    }
-
-    for (lane, (level, &sample)) in out_rest.iter_mut().zip(rest).enumerate() {
-        *level = rounded(f32::from(sample) * gains[lane] + offsets[lane]);
+fn balance_bands(samples: &[u16], gains: &[f32], offsets: &[f32], levels: &mut [u16]) {
+    let balances = gains.iter().zip(offsets);
+    for ((level, &sample), (gain, offset)) in levels.iter_mut().zip(samples).zip(balances) {
+        *level = rounded(f32::from(sample) * gain + offset);
     }
 }
 

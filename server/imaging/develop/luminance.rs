@@ -69,6 +69,9 @@ struct Lines {
     levels: Vec<u16>,
     means: Vec<u16>,
     details: Vec<i16>,
+    /// Smooth levels of each sample's band, and smooth means of all bands.
+    band: Vec<u16>,
+    all: Vec<u16>,
     /// Absolute detail summed down the columns of a row of cells.
     coarse: Vec<u16>,
     fine: Vec<u16>,
@@ -96,6 +99,8 @@ impl Luminance {
         self.lines.levels.resize(padded, 0);
         self.lines.means.resize(padded, 0);
         self.lines.details.resize(padded, 0);
+        self.lines.band.resize(width, 0);
+        self.lines.all.resize(width, 0);
         self.lines.coarse.resize(width, 0);
         self.lines.fine.resize(width, 0);
         self.lines.cells.resize(width / cell + 2, 0);
@@ -138,9 +143,12 @@ impl Luminance {
             smooth(near.map(|row| self.mean.padded(row)), &mut self.lines.means);
 
             let places = [MARGIN - cell, MARGIN, MARGIN + cell];
-            let band_means = places.map(|place| &self.lines.levels[place..][..self.width]);
-            let means = places.map(|place| &self.lines.means[place..][..self.width]);
-            detail_row(levels.row(row), self.mean.row(row), band_means, means, self.detail.row_mut(row));
+            let across = places.map(|place| &self.lines.levels[place..][..self.width]);
+            smooth(across, &mut self.lines.band);
+            let across = places.map(|place| &self.lines.means[place..][..self.width]);
+            smooth(across, &mut self.lines.all);
+            let smooth = (&self.lines.band[..], &self.lines.all[..]);
+            detail_row(levels.row(row), self.mean.row(row), smooth, self.detail.row_mut(row));
             self.detail.fill_margins(row, 1);
         }
     }
@@ -195,6 +203,14 @@ pub(super) fn mixed(values: [u16; 2], weights: [u16; 2]) -> u16 {
     let own = (u32::from(values[0]) * u32::from(weights[0])) >> 16;
     let other = (u32::from(values[1]) * u32::from(weights[1])) >> 16;
     own as u16 + other as u16
+}
+
+/// A row between two.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub(super) fn mixed_row([own, near]: [&[u16]; 2], weights: [u16; 2], out: &mut [u16]) {
+    for (out, (&own, &near)) in out.iter_mut().zip(own.iter().zip(near)) {
+        *out = mixed([own, near], weights);
+    }
 }
 
 /// Enlarges a row of one value a cell to `cell` values a cell, linearly between the cells' centres.
@@ -260,29 +276,21 @@ fn smooth_detail(near: [&[i16]; 3], out: &mut [i16]) {
     }
 }
 
-/// The detail of a row: how far the mean of all bands at each value lies from that around it.
-/// `band_means` and `means` lie one cell to the left, here, and one to the right.
+/// The detail of a row: how far the mean of all bands at each value lies from that around it, from
+/// the smooth levels of the value's band and of all bands.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn detail_row(levels: &[u16], around: &[u16], band_means: [&[u16]; 3], means: [&[u16]; 3], detail: &mut [i16]) {
-    let count = detail.len();
-    let levels = &levels[..count];
-    let around = &around[..count];
-    let band_means = band_means.map(|values| &values[..count]);
-    let means = means.map(|values| &values[..count]);
-
-    for x in 0..count {
-        let band_mean = (band_means[0][x] + 2 * band_means[1][x] + band_means[2][x] + 2) >> 2;
-        let mean = (means[0][x] + 2 * means[1][x] + means[2][x] + 2) >> 2;
-
-        let deviation = f32::from(levels[x] as i16 - band_mean as i16);
+fn detail_row(levels: &[u16], around: &[u16], (band, all): (&[u16], &[u16]), detail: &mut [i16]) {
+    let values = levels.iter().zip(around).zip(band.iter().zip(all));
+    for (detail, ((&level, &around), (&band_mean, &mean))) in detail.iter_mut().zip(values) {
+        let deviation = f32::from(level as i16 - band_mean as i16);
         let of_band = f32::from(band_mean as i16 - BLACK as i16);
         let of_all = f32::from(mean as i16 - BLACK as i16);
         let divisor = (of_band + SHARE_OF_MEAN * of_all).max(LEAST);
         let here = (1.0 + SHARE_OF_MEAN) * of_all * deviation * reciprocal(divisor);
-        let found = here + f32::from(mean as i16 - around[x] as i16);
+        let found = here + f32::from(mean as i16 - around as i16);
 
-        let least = if levels[x] >= SATURATED { 0.0 } else { -MOST_DETAIL };
-        detail[x] = rounded(found.clamp(-MOST_DETAIL, MOST_DETAIL).max(least));
+        let least = if level >= SATURATED { 0.0 } else { -MOST_DETAIL };
+        *detail = rounded(found.clamp(-MOST_DETAIL, MOST_DETAIL).max(least));
     }
 }
 

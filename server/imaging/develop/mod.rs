@@ -8,8 +8,6 @@ mod colour;
 mod levels;
 mod luminance;
 mod ring;
-#[cfg(test)]
-mod tests;
 
 use super::calibration::Calibration;
 use super::frame::{CELL, GrayImage, MosaicFrame, RgbImage};
