@@ -59,11 +59,22 @@ impl Scene {
         Self { bands: std::array::from_fn(band) }
     }
 
-    /// The surface of a phantom's brain with a sample on each of its texels, as bright as the camera
-    /// exposes it.
+    /// The surface of a phantom's brain with two samples on each of its texels, as bright as the camera
+    /// exposes it. Nearer than its camera ever goes, so there is finer detail than it ever shows.
     pub fn brain(seed: u64) -> Self {
+        const TEXELS: usize = SIDE / 2 + 1;
         let brain = Brain::new(seed);
-        let bands = Calibration::default().bands.map(|band| brain.sharp_band(&band, SIDE, SIDE).data);
+        let bands = Calibration::default().bands.map(|band| {
+            let texels = brain.sharp_band(&band, TEXELS, TEXELS).data;
+            let between = |place: usize| {
+                let first = place / SIDE / 2 * TEXELS + place % SIDE / 2;
+                let right = place % 2;
+                let below = place / SIDE % 2 * TEXELS;
+                let corners = [first, first + right, first + below, first + right + below];
+                corners.iter().map(|&texel| texels[texel]).sum::<f32>() / 4.0
+            };
+            (0..SIDE * SIDE).map(between).collect::<Vec<f32>>()
+        });
 
         let mut means: Vec<f32> = (0..SIDE * SIDE).map(|place| mean_at(&bands, place)).collect();
         means.sort_by(f32::total_cmp);

@@ -8,7 +8,7 @@
 use multiversion::multiversion;
 
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
-use super::luminance::{Luminance, between, expand, mixed, mixed_row, reciprocal};
+use super::luminance::{Luminance, between, expand, mixed, mixed_row};
 use super::ring::Ring;
 use crate::imaging::calibration::{BANDS, Calibration};
 use crate::imaging::colour::Encoder;
@@ -237,7 +237,7 @@ fn gain_row(luminance: &[u16], means: &[u16], gains: &mut [u16]) {
     for (gain, (&luminance, &mean)) in gains.iter_mut().zip(luminance.iter().zip(means)) {
         let mean = (f32::from(mean) - FLOOR).max(1.0);
         let here = (f32::from(luminance) - FLOOR).max(0.0).min(6.0 * mean);
-        let found = UNITY * quadratic(ABOVE, mean, here) * reciprocal(quadratic(BELOW, mean, here));
+        let found = UNITY * quadratic(ABOVE, mean, here) / quadratic(BELOW, mean, here);
         *gain = (found + LOW_BITS).to_bits() as u16;
     }
 }

@@ -11,8 +11,11 @@ use crate::imaging::reconstruct::balance::{self, PixelBalance};
 pub(super) const BLACK: u16 = 512;
 /// Level of a sample as bright as the white reference.
 pub(super) const WHITE: u16 = 8192;
-/// Highest level: twice white.
-pub(super) const HIGHEST: u16 = 16_383;
+/// Highest level that is developed, a little above white. Bands saturate at different levels above
+/// white; cut here, a highlight is white in all bands, and not a colour of its own.
+pub(super) const HIGHEST: u16 = WHITE + (WHITE - BLACK) / 16;
+/// Highest level that counts for gray: twice white, so that four of them fit 16 bits.
+const HIGHEST_OF_GRAY: u16 = 16_383;
 /// Levels from black to white.
 pub(super) const SPAN: f32 = (WHITE - BLACK) as f32;
 
@@ -37,7 +40,8 @@ pub(super) struct Levels {
     /// The same for each sample of four rows.
     gains: [Vec<f32>; CELL],
     offsets: [Vec<f32>; CELL],
-    /// Sums of four levels, one below another.
+    /// Sums of four levels, one below another, as they count for gray and as they are developed.
+    of_gray: Vec<u16>,
     sums: Vec<u16>,
 }
 
@@ -54,6 +58,7 @@ impl Levels {
             of_bands: std::array::from_fn(of_band),
             gains: Default::default(),
             offsets: Default::default(),
+            of_gray: Vec::new(),
             sums: Vec::new(),
         }
     }
@@ -65,6 +70,7 @@ impl Levels {
         }
 
         self.sums.resize(width, 0);
+        self.of_gray.resize(width, 0);
         for (row, (gains, offsets)) in self.gains.iter_mut().zip(&mut self.offsets).enumerate() {
             let balances = (0..width).map(|x| self.of_bands[CELL * row + x % CELL]);
             gains.clear();
@@ -85,6 +91,9 @@ impl Levels {
         means: &mut [u16],
         gray: &mut GrayImage,
     ) {
+        self.of_gray.fill(0);
+        self.sums.fill(0);
+
         for row in 0..CELL {
             let samples = &mosaic.samples()[(CELL * y + row) * mosaic.width()..][..mosaic.width()];
             let out = levels.row_mut(CELL * y + row);
@@ -97,12 +106,12 @@ impl Levels {
                 None => balance_bands(samples, &self.gains[row], &self.offsets[row], out),
             }
 
+            cut_row(out, &mut self.of_gray, &mut self.sums);
             levels.fill_margins(CELL * y + row, CELL);
         }
 
-        let rows = [0, 1, 2, 3].map(|row| levels.row(CELL * y + row));
         let width = mosaic.band_width();
-        cell_means(rows, &mut self.sums, means, &mut gray.data[y * width..][..width]);
+        cell_means(&self.of_gray, &self.sums, means, &mut gray.data[y * width..][..width]);
     }
 }
 
@@ -126,21 +135,33 @@ fn balance_bands(samples: &[u16], gains: &[f32], offsets: &[f32], levels: &mut [
 /// The nearest level.
 #[inline(always)]
 fn rounded(level: f32) -> u16 {
-    (level.clamp(0.0, f32::from(HIGHEST)) + LOW_BITS).to_bits() as u16
+    (level.clamp(0.0, f32::from(HIGHEST_OF_GRAY)) + LOW_BITS).to_bits() as u16
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn cell_means(rows: [&[u16]; CELL], sums: &mut [u16], means: &mut [u16], gray: &mut [f32]) {
-    for (x, sum) in sums.iter_mut().enumerate() {
-        *sum = rows[0][x] + rows[1][x] + rows[2][x] + rows[3][x];
-    }
+fn cell_means(of_gray: &[u16], sums: &[u16], means: &mut [u16], gray: &mut [f32]) {
+    let sums = of_gray.as_chunks::<CELL>().0.iter().zip(sums.as_chunks::<CELL>().0);
+    for ((mean, gray), (of_gray, sums)) in means.iter_mut().zip(gray).zip(sums) {
+        let mut whole = 0_u32;
+        let mut sum = 0_u32;
+        for (&value, &cut) in of_gray.iter().zip(sums) {
+            whole += u32::from(value);
+            sum += u32::from(cut);
+        }
 
-    let sums = sums.as_chunks::<CELL>().0;
-    for ((mean, gray), sums) in means.iter_mut().zip(gray).zip(sums) {
-        let sum: u32 = sums.iter().map(|&sum| u32::from(sum)).sum();
         *mean = ((sum + 8) / 16) as u16;
-        let share = (sum as f32 / 16.0 - f32::from(BLACK)) / SPAN;
+        let share = (whole as f32 / 16.0 - f32::from(BLACK)) / SPAN;
         *gray = (255.0 * share).clamp(0.0, 255.0);
+    }
+}
+
+/// Adds a row of levels to the sums for gray, cuts it at [`HIGHEST`], and adds it to the others.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn cut_row(levels: &mut [u16], of_gray: &mut [u16], sums: &mut [u16]) {
+    for (level, (of_gray, sum)) in levels.iter_mut().zip(of_gray.iter_mut().zip(sums)) {
+        *of_gray += *level;
+        *level = (*level).min(HIGHEST);
+        *sum += *level;
     }
 }
 

@@ -86,7 +86,7 @@ impl Luminance {
         self.width = width;
         self.height = height;
         // Two by two samples together are less noisy, and differ less in colour.
-        self.doubt = if cell == 4 { 1.0 } else { 0.15 };
+        self.doubt = if cell == 4 { 0.6 } else { 0.15 };
 
         self.mean.resize(width, KEPT * cell);
         self.detail.resize(width, KEPT * cell);
@@ -286,21 +286,12 @@ fn detail_row(levels: &[u16], around: &[u16], (band, all): (&[u16], &[u16]), det
         let of_band = f32::from(band_mean as i16 - BLACK as i16);
         let of_all = f32::from(mean as i16 - BLACK as i16);
         let divisor = (of_band + SHARE_OF_MEAN * of_all).max(LEAST);
-        let here = (1.0 + SHARE_OF_MEAN) * of_all * deviation * reciprocal(divisor);
+        let here = (1.0 + SHARE_OF_MEAN) * of_all * deviation / divisor;
         let found = here + f32::from(mean as i16 - around as i16);
 
         let least = if level >= SATURATED { 0.0 } else { -MOST_DETAIL };
         *detail = rounded(found.clamp(-MOST_DETAIL, MOST_DETAIL).max(least));
     }
-}
-
-/// One over a positive number, to a ten-thousandth: cheaper than a division where there are many.
-#[inline(always)]
-pub(super) fn reciprocal(value: f32) -> f32 {
-    // Subtracting the bits negates the exponent; each step of Newton's method squares the error.
-    let estimate = f32::from_bits(0x7EF3_11C7 - value.to_bits());
-    let better = estimate * (2.0 - value * estimate);
-    better * (2.0 - value * better)
 }
 
 /// The nearest whole number to one within 16 bits, without the cost of a cast, which must handle NaN.

@@ -57,7 +57,7 @@ impl Developer {
     /// Makes the picture of `mosaic` at `size` into `rgb` (sRGB), and the gray picture of its cells
     /// (0..=255) into `gray`; resizes both as needed.
     ///
-    /// Gray is the same at every size, to a fiftieth of a level, but that at the larger sizes a sample
+    /// Gray is the same at every size, to a twentieth of a level, but that at the larger sizes a sample
     /// counts as at most twice as bright as white. References per pixel apply to mosaics of their own
     /// size, as for [`Reconstructor::reconstruct`].
     pub fn develop(&mut self, mosaic: &MosaicFrame, size: Size, rgb: &mut RgbImage, gray: &mut GrayImage) {
