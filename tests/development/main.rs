@@ -50,7 +50,7 @@ fn enlarged(picture: &[f32], scale: usize) -> Vec<f32> {
         let part = place - place.floor();
         let weights = [
             ((2.0 - part) * part - 1.0) * part / 2.0,
-            ((3.0 * part - 5.0) * part * part + 2.0) / 2.0,
+            1.0 + (1.5 * part - 2.5) * part * part,
             ((4.0 - 3.0 * part) * part + 1.0) * part / 2.0,
             (part - 1.0) * part * part / 2.0,
         ];
@@ -262,7 +262,7 @@ fn highlights_are_white_and_darken_nothing_beside_them() {
                     assert!(pixel(x, y).iter().all(|&value| value >= 240), "{size:?} ({x}, {y}): {:?}", pixel(x, y));
                 }
                 if distance > 20.0 {
-                    let darker = pixel(x, y)[0] as i32 - i32::from(surface[0]);
+                    let darker = i32::from(pixel(x, y)[0]) - i32::from(surface[0]);
                     assert!(darker > -40, "{size:?} ({x}, {y}): {:?} {surface:?}", pixel(x, y));
                 }
             }
