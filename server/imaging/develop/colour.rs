@@ -138,7 +138,7 @@ impl Colour {
         mixed_row(means, weights, &mut self.means);
         gain_row(luminance, &self.means, &mut self.gains);
         for (plane, component) in [red, green, blue].into_iter().zip(&mut self.components) {
-            component_row(plane, weights, &self.gains, component);
+            component_row(plane, weights, (&self.gains, luminance), component);
         }
 
         interleave(self.components.each_ref().map(Vec::as_slice), rgb);
@@ -248,19 +248,26 @@ fn quadratic([a, b, c]: [f32; 3], mean: f32, here: f32) -> f32 {
 }
 
 /// One component of a row of pixels: the cells' colours, enlarged, times the gains.
+///
+/// A place whose mean of all bands is white reflects all bands, whatever colour the cells around it
+/// have: towards white every component is lifted to it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn component_row(plane: [&[u16]; 2], weights: [u16; 2], gains: &[u16], out: &mut [u8]) {
+fn component_row(plane: [&[u16]; 2], weights: [u16; 2], (gains, luminance): (&[u16], &[u16]), out: &mut [u8]) {
     // Colour and gain together have 64 * 16384 / 65536 = 16 parts a step.
     const OFFSET: u16 = 16 * ENCODING_OFFSET - 8;
+    // Two levels a step, up to white.
+    const LIFTED: u16 = WHITE - 2 * 255;
 
     let count = out.len();
     let gains = &gains[..count];
+    let luminance = &luminance[..count];
     let plane = plane.map(|values| &values[..count]);
 
     for (x, out) in out.iter_mut().enumerate() {
         let colour = mixed([plane[0][x], plane[1][x]], weights);
         let lit = ((u32::from(colour) * u32::from(gains[x])) >> 16) as u16;
-        *out = (lit.saturating_sub(OFFSET) >> 4).min(255) as u8;
+        let least = luminance[x].saturating_sub(LIFTED) >> 1;
+        *out = (lit.saturating_sub(OFFSET) >> 4).max(least).min(255) as u8;
     }
 }
 
