@@ -1,6 +1,6 @@
-//! Development at each size on one thread, in copies of the mosaic: each round times a plain copy and
-//! everything else, and the table has the medians over the rounds. Times are the thread's own, without
-//! what other programs take meanwhile. `cargo bench --bench development`
+//! Development at each size on one thread, in copies of the mosaic: each round times a plain copy
+//! and everything else, and the table has the medians over the rounds. Times are the thread's own,
+//! without what other programs take meanwhile. `cargo bench --bench development`
 
 use std::hint::black_box;
 use std::time::Duration;

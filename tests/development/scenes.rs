@@ -1,5 +1,5 @@
-//! Multispectral scenes whose every band is known at every place, and the mosaics that a sensor would
-//! take of them.
+//! Multispectral scenes whose every band is known at every place, and the mosaics that a sensor
+//! would take of them.
 
 use parfocal::imaging::{BANDS, CELL, Calibration, MosaicFrame};
 use parfocal::simulation::phantom::Scene as Brain;
@@ -27,8 +27,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Overlapping coloured leaves, each with a spectrum of its own, a pattern of a second spectrum on it,
-    /// and uneven light over all: sharp edges between colours, and detail down to the sample.
+    /// Overlapping coloured leaves, each with a spectrum of its own, a pattern of a second spectrum
+    /// on it, and uneven light over all: sharp edges between colours, and detail down to the
+    /// sample.
     pub fn leaves(seed: u64) -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let spectra = |rng: &mut ChaCha8Rng| (0..LEAVES).map(|_| in_bands(&spectrum(rng))).collect::<Vec<_>>();
@@ -59,8 +60,9 @@ impl Scene {
         Self { bands: std::array::from_fn(band) }
     }
 
-    /// The surface of a phantom's brain with two samples on each of its texels, as bright as the camera
-    /// exposes it. Nearer than its camera ever goes, so there is finer detail than it ever shows.
+    /// The surface of a phantom's brain with two samples on each of its texels, as bright as the
+    /// camera exposes it. Nearer than its camera ever goes, so there is finer detail than it ever
+    /// shows.
     pub fn brain(seed: u64) -> Self {
         const TEXELS: usize = SIDE / 2 + 1;
         let brain = Brain::new(seed);
@@ -100,8 +102,9 @@ impl Scene {
         MosaicFrame::new(SIDE, SIDE, samples.collect()).unwrap()
     }
 
-    /// A mosaic in which every sample of a cell has the same place's light for all bands: its picture
-    /// at the size of a cell is this scene's own at that place. `place` is the cell's first sample.
+    /// A mosaic in which every sample of a cell has the same place's light for all bands: its
+    /// picture at the size of a cell is this scene's own at that place. `place` is the cell's first
+    /// sample.
     pub fn mosaic_of_places(&self, x: usize, y: usize) -> MosaicFrame {
         let samples = (0..SIDE * SIDE).map(|place| {
             let column = (place % SIDE / CELL * CELL + x).min(SIDE - 1);

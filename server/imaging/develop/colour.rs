@@ -18,8 +18,8 @@ use crate::imaging::reconstruct::{Mixes, picture_row, quarters, weights};
 /// Rows of cells that are kept.
 const KEPT: usize = 4;
 
-/// sRGB's encoding of c is 1.055 c^(1/2.4) - 0.055, but for the darkest colours. So light times r makes
-/// the encoding plus this offset (of 255) times r^(1/2.4).
+/// sRGB's encoding of c is 1.055 c^(1/2.4) - 0.055, but for the darkest colours. So light times r
+/// makes the encoding plus this offset (of 255) times r^(1/2.4).
 const ENCODING_OFFSET: u16 = 14;
 
 /// Parts of an 8-bit step in which the cells' colours are kept.
@@ -85,8 +85,8 @@ impl Colour {
         self.components.iter_mut().for_each(|line| line.resize(width, 0));
     }
 
-    /// Makes the colours of the row of cells `y` from its `levels`, the `means` of its cells, and its
-    /// luminance, which has `per_cell` pixels along each side of a cell.
+    /// Makes the colours of the row of cells `y` from its `levels`, the `means` of its cells, and
+    /// its luminance, which has `per_cell` pixels along each side of a cell.
     pub(super) fn make_cells(
         &mut self,
         y: usize,
@@ -122,8 +122,8 @@ impl Colour {
         }
     }
 
-    /// Makes the pixels of row `row` of the row of cells `y`, of `cells` such rows; needs the colours of
-    /// the next.
+    /// Makes the pixels of row `row` of the row of cells `y`, of `cells` such rows; needs the
+    /// colours of the next.
     pub(super) fn row(
         &mut self,
         (y, cells): (usize, usize),
@@ -226,8 +226,8 @@ fn level_pairs(levels: &[u16], excess: &[i16], out: &mut [u16]) {
     }
 }
 
-/// The gain of each pixel's encoded colour: r^(1/2.4), of [`UNITY`], for a pixel r times as bright as
-/// its surroundings.
+/// The gain of each pixel's encoded colour: r^(1/2.4), of [`UNITY`], for a pixel r times as bright
+/// as its surroundings.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn gain_row(luminance: &[u16], means: &[u16], gains: &mut [u16]) {
     // A quotient of two quadratics that is within 0.8 % of r^(1/2.4) from 1/20 to 6, and 1 at 1.

@@ -1,17 +1,18 @@
 //! Luminance at every sample: what each sample says of the mean of all bands at its own place.
 //!
 //! A sample senses one band, so its level must be turned into the mean that all bands would have
-//! there. The samples of the same band around it, and the mean of all bands at those places, tell how
-//! the two go together: where a surface is only lit more or less, they stay in proportion; where
-//! something white is added, they differ by a constant. [`SHARE_OF_MEAN`] stands between the two.
+//! there. The samples of the same band around it, and the mean of all bands at those places, tell
+//! how the two go together: where a surface is only lit more or less, they stay in proportion;
+//! where something white is added, they differ by a constant. [`SHARE_OF_MEAN`] stands between the
+//! two.
 //!
-//! That is wrong where bands change quickly beside one another, at the edge between two colours: the
-//! error then differs from sample to sample and shows as a maze. Detail that changes from sample to
-//! sample is therefore kept only as far as coarser detail is there too.
+//! That is wrong where bands change quickly beside one another, at the edge between two colours:
+//! the error then differs from sample to sample and shows as a maze. Detail that changes from
+//! sample to sample is therefore kept only as far as coarser detail is there too.
 //!
 //! The idea of carrying the mean of all bands over to each sample is that of Mihoubi, Losson,
-//! Mathon, Macaire: "Multispectral demosaicing using pseudo-panchromatic image", IEEE Transactions on
-//! Computational Imaging 3(4), 2017.
+//! Mathon, Macaire: "Multispectral demosaicing using pseudo-panchromatic image", IEEE Transactions
+//! on Computational Imaging 3(4), 2017.
 
 use multiversion::multiversion;
 
@@ -19,8 +20,8 @@ use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
 use super::ring::{MARGIN, Ring, same_bands};
 
 /// How much of the mean of all bands stands beside a band's own mean as that to which a band's
-/// deviation is in proportion. At 0 a band deviates in proportion to its level; at infinity all bands
-/// deviate by the same amount.
+/// deviation is in proportion. At 0 a band deviates in proportion to its level; at infinity all
+/// bands deviate by the same amount.
 const SHARE_OF_MEAN: f32 = 0.5;
 
 /// Least level above black by which a deviation is divided.
@@ -153,8 +154,8 @@ impl Luminance {
         }
     }
 
-    /// Parts the detail of the row of cells `y` into coarse and fine, and finds how far to trust the
-    /// fine part; needs the detail of the next.
+    /// Parts the detail of the row of cells `y` into coarse and fine, and finds how far to trust
+    /// the fine part; needs the detail of the next.
     pub(super) fn part(&mut self, y: usize) {
         let cell = self.cell;
         self.lines.coarse.fill(0);
@@ -187,8 +188,8 @@ impl Luminance {
     }
 }
 
-/// For row `row` of the row of cells `y`: the nearest other row of cells, and the weights (of 65536)
-/// of the own one and of that, by their centres' distances.
+/// For row `row` of the row of cells `y`: the nearest other row of cells, and the weights (of
+/// 65536) of the own one and of that, by their centres' distances.
 pub(super) fn between(row: usize, cell: usize, y: usize, cells: usize) -> (usize, [u16; 2]) {
     let near = if row < cell / 2 { y.saturating_sub(1) } else { (y + 1).min(cells - 1) };
     // At least 1, so that the own weight fits 16 bits.
@@ -294,7 +295,8 @@ fn detail_row(levels: &[u16], around: &[u16], (band, all): (&[u16], &[u16]), det
     }
 }
 
-/// The nearest whole number to one within 16 bits, without the cost of a cast, which must handle NaN.
+/// The nearest whole number to one within 16 bits, without the cost of a cast, which must handle
+/// NaN.
 #[inline(always)]
 fn rounded(value: f32) -> i16 {
     // 1.5 * 2^23: a number of either sign then stands in the lowest bits.
@@ -302,7 +304,8 @@ fn rounded(value: f32) -> i16 {
 }
 
 /// Parts a row's detail into a smooth part, added to the mean, and the rest, and adds the absolute
-/// values of both to `sums`. `around` are sums down the columns, to the left, here and to the right.
+/// values of both to `sums`. `around` are sums down the columns, to the left, here and to the
+/// right.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn part_row(
     around: [&[i16]; 3],
@@ -326,8 +329,8 @@ fn part_row(
     }
 }
 
-/// How far fine detail is trusted in each cell, of 32767: the energy of the coarse detail beside that
-/// of both.
+/// How far fine detail is trusted in each cell, of 32767: the energy of the coarse detail beside
+/// that of both.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn trust_row(cell: usize, doubt: f32, coarse: &[u16], fine: &[u16], trust: &mut [u16]) {
     let least = (NOISE * (cell * cell) as f32).powi(2);

@@ -1,8 +1,8 @@
 //! Development: a mosaic's picture at any [`Size`].
 //!
-//! At the size of the cells, [`Reconstructor`] makes it. At the larger ones luminance comes from every
-//! sample, colour from the cells. Everything is made in one pass from top to bottom, a row of cells
-//! at a time, and keeps only the rows that the next ones need.
+//! At the size of the cells, [`Reconstructor`] makes it. At the larger ones luminance comes from
+//! every sample, colour from the cells. Everything is made in one pass from top to bottom, a row of
+//! cells at a time, and keeps only the rows that the next ones need.
 
 mod colour;
 mod levels;
@@ -23,7 +23,8 @@ const KEPT: usize = 6;
 /// Rows of cells that must be begun before one is finished.
 const AHEAD: usize = 5;
 
-/// Develops mosaics by one calibration. Keep one and reuse it: its buffers stay from frame to frame.
+/// Develops mosaics by one calibration. Keep one and reuse it: its buffers stay from frame to
+/// frame.
 #[derive(Debug, Clone)]
 pub struct Developer {
     reconstructor: Reconstructor,
@@ -57,9 +58,9 @@ impl Developer {
     /// Makes the picture of `mosaic` at `size` into `rgb` (sRGB), and the gray picture of its cells
     /// (0..=255) into `gray`; resizes both as needed.
     ///
-    /// Gray is the same at every size, to a twentieth of a level, but that at the larger sizes a sample
-    /// counts as at most twice as bright as white. References per pixel apply to mosaics of their own
-    /// size, as for [`Reconstructor::reconstruct`].
+    /// Gray is the same at every size, to a twentieth of a level, but that at the larger sizes a
+    /// sample counts as at most twice as bright as white. References per pixel apply to mosaics of
+    /// their own size, as for [`Reconstructor::reconstruct`].
     pub fn develop(&mut self, mosaic: &MosaicFrame, size: Size, rgb: &mut RgbImage, gray: &mut GrayImage) {
         (rgb.width, rgb.height) = size.of(mosaic);
         rgb.data.resize(3 * rgb.width * rgb.height, 0);
@@ -71,7 +72,8 @@ impl Developer {
         }
     }
 
-    /// Makes the same pictures row by row; see [`Rows`]. `gray` is complete when the last row is made.
+    /// Makes the same pictures row by row; see [`Rows`]. `gray` is complete when the last row is
+    /// made.
     pub fn rows<'a>(&'a mut self, mosaic: &'a MosaicFrame, size: Size, gray: &'a mut GrayImage) -> Rows<'a> {
         let cells = mosaic.band_width();
         gray.width = cells;
@@ -145,9 +147,9 @@ pub struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Makes the pixels of the next row of cells into `rgb`: as many rows of the picture as a cell has
-    /// at this size, one after another. Returns whether there was such a row of cells. Allocates
-    /// nothing.
+    /// Makes the pixels of the next row of cells into `rgb`: as many rows of the picture as a cell
+    /// has at this size, one after another. Returns whether there was such a row of cells.
+    /// Allocates nothing.
     pub fn next_into(&mut self, rgb: &mut [u8]) -> bool {
         let y = self.done;
         let cells = self.mosaic.band_height();
@@ -176,8 +178,8 @@ impl Rows<'_> {
 
         true
     }
-    /// The gray levels (0..=255) of row `row` of the pixels just made: luminance, the mean of all bands,
-    /// at the picture's own size.
+    /// The gray levels (0..=255) of row `row` of the pixels just made: luminance, the mean of all
+    /// bands, at the picture's own size.
     pub fn gray_into(&self, row: usize, gray: &mut [f32]) {
         let Some(y) = self.done.checked_sub(1) else { return };
 
