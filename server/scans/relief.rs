@@ -23,6 +23,8 @@ use crate::simulation::texture::{Canvas, texture, vary_contrast};
 const SIDE: usize = 360;
 /// Standard deviations in pixels at which each layer is blurred; between them pictures are mixed.
 const SIGMAS: [f32; 12] = [0.0, 0.4, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 7.5, 9.5, 12.0];
+/// Most that a place is higher or lower than the middle, in pixels of blur.
+const MOST_RELIEF: f64 = 4.5;
 /// Most softness of the best picture, in pixels of standard deviation.
 const MOST_SOFTNESS: f64 = 3.0;
 /// Blur in pixels a unit of focal power: least and most of any scene.
@@ -33,9 +35,8 @@ const SLOPES: (f64, f64) = (1.5, 24.0);
 pub struct Style {
     /// Share of scenes without relief.
     flat: f64,
-    /// Least and most relief of the others: how much a place is higher or lower than the middle, in
-    /// pixels of blur.
-    relief: (f64, f64),
+    /// Least relief of the others, in pixels of blur.
+    least_relief: f64,
     /// Most of the range that the relief takes from the middle: its height over the slope.
     most_share: f64,
     /// How many times its least slope a scene's slope may be.
@@ -52,7 +53,7 @@ impl Style {
     /// What a policy may meet: from flat scenes without noise to deep relief, slow lenses and fast ones.
     const VARIED: Self = Self {
         flat: 0.15,
-        relief: (0.3, 4.5),
+        least_relief: 0.3,
         most_share: 0.35,
         slopes: f64::INFINITY,
         steps: 0.6,
@@ -64,24 +65,12 @@ impl Style {
     /// `docs/notebook.md` says how it was calibrated.
     const DEEP: Self = Self {
         flat: 0.0,
-        relief: (2.0, 4.5),
+        least_relief: 2.0,
         most_share: 0.7,
         slopes: 1.3,
         steps: 1.0,
         photographed: 0.9,
         least_noise: 1.0,
-    };
-
-    /// Steps so deep that a patch on an edge is sharp at two positions, farther apart than a lens may
-    /// reach. On the real stacks up to a third of the patches are so.
-    const STEPPED: Self = Self {
-        flat: 0.0,
-        relief: (3.0, 7.0),
-        most_share: 1.2,
-        slopes: 1.5,
-        steps: 1.0,
-        photographed: 0.7,
-        least_noise: 0.0,
     };
 }
 
@@ -97,17 +86,12 @@ pub struct StackScene {
     pub photographed: bool,
 }
 
-/// The scenes `0..count` of `split`: half of them varied, a quarter deep, a quarter with deep steps.
-/// Each is drawn from its number alone.
+/// The scenes `0..count` of `split`, every second one deep, the others varied; each is drawn from its number alone.
 ///
 /// # Errors
 /// None in practice: the scenes are large enough.
 pub fn scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesError> {
-    let style = |index: u64| match index % 4 {
-        1 => Style::DEEP,
-        3 => Style::STEPPED,
-        _ => Style::VARIED,
-    };
+    let style = |index: u64| if index.is_multiple_of(2) { Style::VARIED } else { Style::DEEP };
     (0..count).into_par_iter().map(|index| scene(split, index, style(index)).map(Arc::new)).collect()
 }
 
@@ -125,7 +109,7 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7265_6c69_6566);
     let softness = if rng.random_bool(0.3) { rng.random_range(0.0..0.6) } else { rng.random_range(0.0..MOST_SOFTNESS) };
     let relief =
-        if rng.random_bool(style.flat) { 0.0 } else { rng.random_range(style.relief.0..style.relief.1) as f32 };
+        if rng.random_bool(style.flat) { 0.0 } else { rng.random_range(style.least_relief..MOST_RELIEF) as f32 };
 
     let ground = gaussian_blur(&surface(split, index, &mut rng), softness);
     let heights = heights(relief, style.steps, &mut rng);
