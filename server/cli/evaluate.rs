@@ -41,7 +41,12 @@ pub struct Arguments {
     /// Evaluate on a photographed focal stack instead: a folder of pictures of one still scene in order of focus.
     /// `DIR:K` makes K of its planes the range 0 to 1, by default two fifths of them. Each stack runs at two scales and
     /// with three seeds, 31 to 33 unless --seed names the first. May be repeated.
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"])]
+    #[arg(
+        long,
+        value_name = "DIR",
+        num_args = 1..,
+        conflicts_with_all = ["scans", "footage", "between", "count", "shard", "merge"]
+    )]
     stacks: Vec<String>,
     /// Tell the policies how fast the optic blurs: pixels (standard deviation) for a change of focal power by 1, as
     /// `parfocal scan info` measures them; with --stacks also `measured`, each stack by its own pictures.

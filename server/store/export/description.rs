@@ -57,7 +57,7 @@ table! {
         lens: String = means("The lens"),
         calibration: String = means("The sensor's calibration: name, unit, version and date"),
         blur: Option<f64> =
-            means("How fast the optic blurs a unit of focal power, as the policies were told; empty where they were not")
+            means("How fast the optic blurs a unit of focal power, as the policies were told; else empty")
                 .in_unit("px")
                 .since(3),
     }
