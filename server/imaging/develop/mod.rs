@@ -161,7 +161,7 @@ impl Rows<'_> {
         if self.per_cell == 1 {
             let cells = self.mosaic.band_width();
             let gray = &mut self.gray.data[y * cells..][..cells];
-            self.developer.reconstructor.reconstruct_row(self.mosaic, y, rgb, gray);
+            self.developer.reconstructor.reconstruct_rows(self.mosaic, y, rgb, gray);
             return true;
         }
 

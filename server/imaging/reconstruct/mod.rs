@@ -93,21 +93,18 @@ impl Reconstructor {
         rgb.data.resize(3 * width * height, 0);
         gray.data.resize(width * height, 0.0);
 
-        let rows = rgb.data.chunks_exact_mut(3 * width).zip(gray.data.chunks_exact_mut(width));
-        for (y, (rgb, gray)) in rows.enumerate() {
-            self.reconstruct_row(mosaic, y, rgb, gray);
-        }
+        self.reconstruct_rows(mosaic, 0, &mut rgb.data, &mut gray.data);
     }
 
-    /// Makes the pixels and gray values of the row of cells `y`.
-    pub(super) fn reconstruct_row(&mut self, mosaic: &MosaicFrame, y: usize, rgb: &mut [u8], gray: &mut [f32]) {
+    /// Makes the pixels and gray values of as many rows of cells as fit into `gray`, from row `first` on.
+    pub(super) fn reconstruct_rows(&mut self, mosaic: &MosaicFrame, first: usize, rgb: &mut [u8], gray: &mut [f32]) {
         self.lines.colours.iter_mut().for_each(|line| line.resize(mosaic.band_width(), 0.0));
         let lines = &mut self.lines;
         match self.of_balanced.as_ref().filter(|(balance, _)| balance.fits(mosaic)) {
-            None => row_of_counts(&self.of_counts, mosaic, y, &self.encoder, lines, rgb, gray),
+            None => rows_of_counts(&self.of_counts, mosaic, first, &self.encoder, lines, rgb, gray),
             Some(of_balanced) => {
                 lines.balanced.resize(CELL * mosaic.width(), 0);
-                row_of_balanced(of_balanced, mosaic, y, &self.encoder, lines, rgb, gray);
+                rows_of_balanced(of_balanced, mosaic, first, &self.encoder, lines, rgb, gray);
             }
         }
     }
@@ -175,30 +172,38 @@ pub(super) fn weights(calibration: &Calibration) -> [[f32; BANDS]; 4] {
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn row_of_counts(
+fn rows_of_counts(
     mixes: &Mixes,
     mosaic: &MosaicFrame,
-    y: usize,
+    first: usize,
     encoder: &Encoder,
     lines: &mut Lines,
     rgb: &mut [u8],
     gray: &mut [f32],
 ) {
-    picture_row(mixes, cell_row(mosaic, 0, y, mosaic.band_width()), encoder, &mut lines.colours, rgb, gray);
+    let width = mosaic.band_width();
+    let rows = rgb.chunks_exact_mut(3 * width).zip(gray.chunks_exact_mut(width));
+    for (y, (rgb, gray)) in (first..).zip(rows) {
+        picture_row(mixes, cell_row(mosaic, 0, y, width), encoder, &mut lines.colours, rgb, gray);
+    }
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn row_of_balanced(
+fn rows_of_balanced(
     (balance, mixes): &(PixelBalance, Mixes),
     mosaic: &MosaicFrame,
-    y: usize,
+    first: usize,
     encoder: &Encoder,
     lines: &mut Lines,
     rgb: &mut [u8],
     gray: &mut [f32],
 ) {
-    balance.apply(cell_row(mosaic, 0, y, mosaic.band_width()), 0, y, &mut lines.balanced);
-    picture_row(mixes, quarters(&lines.balanced), encoder, &mut lines.colours, rgb, gray);
+    let width = mosaic.band_width();
+    let rows = rgb.chunks_exact_mut(3 * width).zip(gray.chunks_exact_mut(width));
+    for (y, (rgb, gray)) in (first..).zip(rows) {
+        balance.apply(cell_row(mosaic, 0, y, width), 0, y, &mut lines.balanced);
+        picture_row(mixes, quarters(&lines.balanced), encoder, &mut lines.colours, rgb, gray);
+    }
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]

@@ -17,6 +17,7 @@ use crate::scans::pictures::{Split, varied};
 use crate::scans::relief;
 use crate::scans::scenery::Scenery;
 use crate::scans::simulated::Scene;
+use crate::scans::stack::source::StackSource;
 use crate::training::error::TrainError;
 use crate::training::recipe::Recipe;
 
@@ -167,8 +168,8 @@ impl Known {
 
     /// Why the training cannot go on, if it is because what it was begun on is gone; else `error`.
     fn unusable(&self, error: TrainError) -> TrainError {
-        let gone = self.asked.is_empty() && self.paths().iter().any(|path| !folder_of(path).exists());
-        if !gone {
+        let is_there = |path: &String| Path::new(path).exists() || StackSource::parse(path).folder.exists();
+        if !self.asked.is_empty() || self.paths().iter().all(is_there) {
             return error;
         }
         let Kind { name, option } = self.kind;
@@ -199,14 +200,6 @@ impl Known {
                  the same order"
             )
         }))
-    }
-}
-
-/// The file or folder that `path` names, which may end in `:PLANES`.
-fn folder_of(path: &str) -> &Path {
-    match path.rsplit_once(':') {
-        Some((folder, planes)) if planes.parse::<usize>().is_ok() => Path::new(folder),
-        _ => Path::new(path),
     }
 }
 
