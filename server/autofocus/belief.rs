@@ -1,5 +1,5 @@
-//! The policy `parfocal`: tracks a belief about where the optimum is, goes where the lens is most
-//! likely in focus, and looks around where that is in doubt.
+//! The policy `parfocal`: tracks a belief about where the optimum is, holds it against the sharpness
+//! seen lately, goes where the lens is most likely in focus, and looks around where that is in doubt.
 
 use std::sync::LazyLock;
 
@@ -7,6 +7,7 @@ use tch::{Device, Kind, Tensor, nn};
 
 use super::networks::{BELIEF_INPUT, BINS, BeliefNetwork, NEAR_INPUT, SEEN_INPUT, WIDER_INPUT};
 use super::registration::{CHANGES, changes};
+use super::sharpness_memory::SharpnessMemory;
 use super::spectrum::{FEATURES, SHARPNESS, Spectrum, features, spectrum};
 use super::weights::{self, WeightsError};
 use super::{BlurRate, Decision, FieldOfView, IN_FOCUS, Observation, Policy};
@@ -39,6 +40,7 @@ pub struct Trace {
     last: Option<Box<Frame>>,
     asked: Option<f32>,
     stand: Stand,
+    sharpness: SharpnessMemory,
 }
 
 /// How sharp the picture has been since the lens last moved.
@@ -143,6 +145,7 @@ impl Trace {
         let before = self.last.as_ref().unwrap_or(&now);
         let moved = self.last.is_none() || (focal_power - before.focal_power).abs() > STILL;
         self.stand.see(now.near.features[SHARPNESS], moved);
+        self.sharpness.see(focal_power, now.near.features[SHARPNESS]);
 
         let mut input = [0.0; BELIEF_INPUT];
         let (seen, known) = input.split_at_mut(SEEN_INPUT);
@@ -170,6 +173,11 @@ impl Trace {
 
         self.last = Some(now);
         input
+    }
+
+    /// Holds the network's `belief` (one value a bin) against the sharpness that was seen lately.
+    pub fn reconsider(&self, belief: &mut [f32]) {
+        self.sharpness.weigh(belief);
     }
 
     /// Where to go from `focal_power` under `belief` (see [`target`]); nowhere while the latest frame
@@ -327,6 +335,7 @@ impl BeliefTracker {
 
         let mut belief = vec![0.0; BINS];
         logits.view([-1]).softmax(0, Kind::Float).copy_data(&mut belief, BINS);
+        self.trace.reconsider(&mut belief);
         belief
     }
 }

@@ -9,6 +9,7 @@ pub mod networks;
 mod registration;
 mod registry;
 pub mod scripted;
+mod sharpness_memory;
 pub mod shipped;
 pub mod spectrum;
 pub mod weights;

@@ -100,7 +100,9 @@ impl BeliefTrainer {
 
             for (index, actor) in self.actors.iter_mut().enumerate() {
                 let stands = actor.environment.focal_power().get();
-                let mut aim = actor.trace.aim(stands, &believed[index * BINS..][..BINS]);
+                let belief = &mut believed[index * BINS..][..BINS];
+                actor.trace.reconsider(belief);
+                let mut aim = actor.trace.aim(stands, belief);
                 if actor.environment.wanders {
                     aim = lead_astray(aim, &mut self.rng);
                 }
