@@ -9,17 +9,20 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+};
 use tokio::sync::{Mutex, MutexGuard};
 
 use crate::autofocus::{BlurRate, PolicyName};
 use crate::clock::Moment;
 use crate::files::make_private;
 
+use super::chain::{self, Head};
 use super::counts::Counts;
 use super::schema::{DATABASE, MIGRATOR};
-use super::values::nanoseconds;
-use super::{DeviceEvent, Reader, StoreError};
+use super::values::{begin, drop_if_failed, nanoseconds};
+use super::{DeviceEvent, Reader, Stamp, StoreError};
 
 /// Name of the lock in the data folder.
 const LOCK: &str = "parfocal.lock";
@@ -60,6 +63,8 @@ pub(super) struct Inner {
     /// `SQLite` lets one connection write at a time and polls for its turn; this queue is fair and wakes at once.
     turn: Mutex<()>,
     pub(super) run: i64,
+    /// When this run began.
+    pub(super) started: Stamp,
     pub(super) telemetry_counts: Counts,
     /// Released when dropped, or by the kernel when the process ends in whatever way.
     _lock: File,
@@ -99,6 +104,7 @@ impl Store {
         let checkpoints = connect(relaxed).await?;
 
         let reader = Reader::open_file(&file).await?;
+        let started = Stamp { wall: run.wall, at: run.at };
         let run = begin_run(&trial, run).await?;
 
         let inner = Inner {
@@ -108,6 +114,7 @@ impl Store {
             reader,
             turn: Mutex::new(()),
             run,
+            started,
             telemetry_counts: Counts::default(),
             _lock: lock,
         };
@@ -133,6 +140,14 @@ impl Store {
         &self.inner.telemetry_counts
     }
 
+    /// The latest row of the chain.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn head(&self) -> Result<Head, StoreError> {
+        chain::head(&mut *self.inner.reader.pool().acquire().await?).await
+    }
+
     /// Closes the database; what was acknowledged is on disk with or without it.
     pub async fn close(&self) {
         self.inner.reader.close().await;
@@ -151,19 +166,10 @@ impl Store {
     /// When the disk or database failed.
     pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
         let _turn = self.turn().await;
-        sqlx::query(
-            "INSERT INTO device_events (run, wall, monotonic_ns, device, working, message) VALUES (?, ?, ?, ?, ?, ?)",
-        )
-        .bind(self.inner.run)
-        .bind(event.wall.to_string())
-        .bind(nanoseconds(event.at))
-        .bind(&event.device)
-        .bind(event.working)
-        .bind(&event.message)
-        .execute(&self.inner.telemetry)
-        .await?;
-
-        Ok(())
+        let mut connection = self.inner.trial.acquire().await?;
+        let recorded = insert_device_event(&mut connection, self.inner.run, event).await;
+        drop_if_failed(connection, &recorded);
+        recorded
     }
 
     /// Adds participant `code`; one that is there already stays as it is.
@@ -172,13 +178,10 @@ impl Store {
     /// When the disk or database failed.
     pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
         let _turn = self.turn().await;
-        sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")
-            .bind(code)
-            .bind(wall.to_string())
-            .execute(&self.inner.trial)
-            .await?;
-
-        Ok(())
+        let mut connection = self.inner.trial.acquire().await?;
+        let added = insert_participant(&mut connection, code, &wall.to_string()).await;
+        drop_if_failed(connection, &added);
+        added
     }
 
     /// Lets no more than `pages` pages be written, as a full disk would: for tests.
@@ -203,13 +206,22 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     Ok(pool.connect_with(options).await?)
 }
 
+/// Records the start of a run. Before it what an earlier version recorded is chained, and the telemetry that the run before
+/// did not come to chain.
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
+    let wall = run.wall.to_string();
+
+    let mut connection = trial.acquire().await?;
+    let mut transaction = begin(&mut connection).await?;
+    chain::adopt(&mut transaction, &wall).await?;
+    seal_what_was_left(&mut transaction, &wall).await?;
+
     let done = sqlx::query(
         "INSERT INTO runs (wall, monotonic_ns, version, camera, lens, calibration, blur, weights, seed)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
-    .bind(run.wall.to_string())
+    .bind(&wall)
     .bind(nanoseconds(run.at))
     .bind(env!("CARGO_PKG_VERSION"))
     .bind(&run.camera)
@@ -218,10 +230,57 @@ async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     .bind(run.blur.map(BlurRate::get))
     .bind(weights)
     .bind(run.seed.map(u64::cast_signed))
-    .execute(trial)
+    .execute(&mut *transaction)
     .await?;
 
-    Ok(done.last_insert_rowid())
+    let number = done.last_insert_rowid();
+    chain::append(&mut transaction, "run", &number.to_string(), &wall).await?;
+    transaction.commit().await?;
+    Ok(number)
+}
+
+/// Chains the telemetry of the latest run that it did not come to chain: a session under way has an event in every run.
+async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Result<(), StoreError> {
+    let sessions = sqlx::query_scalar("SELECT DISTINCT session FROM events WHERE run = (SELECT max(run) FROM events)");
+    let sessions: Vec<String> = sessions.fetch_all(&mut *connection).await?;
+    for session in sessions {
+        chain::seal(connection, &session, wall, false).await?;
+    }
+    Ok(())
+}
+
+async fn insert_device_event(connection: &mut SqliteConnection, run: i64, event: &DeviceEvent) -> Result<(), StoreError> {
+    let wall = event.wall.to_string();
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query(
+        "INSERT INTO device_events (run, wall, monotonic_ns, device, working, message) VALUES (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(event.at))
+    .bind(&event.device)
+    .bind(event.working)
+    .bind(&event.message)
+    .execute(&mut *transaction)
+    .await?;
+
+    let number = done.last_insert_rowid().to_string();
+    chain::append(&mut transaction, "device", &number, &wall).await?;
+    Ok(transaction.commit().await?)
+}
+
+async fn insert_participant(connection: &mut SqliteConnection, code: &str, wall: &str) -> Result<(), StoreError> {
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query("INSERT INTO participants (code, wall) VALUES (?, ?) ON CONFLICT (code) DO NOTHING")
+        .bind(code)
+        .bind(wall)
+        .execute(&mut *transaction)
+        .await?;
+
+    if done.rows_affected() == 1 {
+        chain::append(&mut transaction, "participant", code, wall).await?;
+    }
+    Ok(transaction.commit().await?)
 }
 
 /// Keeps other accounts out of the folder and its files, which tell seeds, policies and what
@@ -241,7 +300,8 @@ fn keep_private(folder: &Path) {
     }
 }
 
-fn lock(folder: &Path) -> Result<File, StoreError> {
+/// Holds `folder` for this process alone, until what comes back is dropped.
+pub(super) fn lock(folder: &Path) -> Result<File, StoreError> {
     let path: PathBuf = folder.join(LOCK);
     let failed = |error: std::io::Error| StoreError::folder(folder, &error);
     let mut file =

@@ -5,6 +5,8 @@
 //! never write. A lock on the folder keeps a second server out, while programs that only read come
 //! and go.
 
+mod accesses;
+pub mod chain;
 mod counts;
 mod database;
 pub mod device_log;
@@ -20,6 +22,8 @@ mod sets;
 pub mod telemetry;
 mod values;
 
+pub use accesses::{Access, Recorder};
+pub use chain::Head;
 pub use counts::Counts;
 pub use database::{Run, Store};
 pub use error::StoreError;

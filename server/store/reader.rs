@@ -28,11 +28,15 @@ impl Reader {
     /// # Errors
     /// When there is none, or it is not of this version.
     pub async fn open(folder: &Path) -> Result<Self, StoreError> {
-        let file = folder.join(DATABASE);
+        Self::open_checked(&folder.join(DATABASE)).await
+    }
+
+    /// Opens the database `file`.
+    pub(super) async fn open_checked(file: &Path) -> Result<Self, StoreError> {
         if !file.is_file() {
-            return Err(StoreError::Missing(file));
+            return Err(StoreError::Missing(file.to_owned()));
         }
-        let reader = Self::open_file(&file).await?;
+        let reader = Self::open_file(file).await?;
         reader.check_version().await?;
         Ok(reader)
     }

@@ -1,10 +1,10 @@
 //! Comments and answers: kept once each, however often they are sent, and never changed.
 
 use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
-use super::values::{moment, nanoseconds};
-use super::values::{parsed, stamp};
+use super::chain;
+use super::values::{begin, drop_if_failed, moment, nanoseconds, parsed, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::trial::question::AnswerValue;
@@ -28,44 +28,10 @@ impl Store {
     /// When the disk or database failed.
     pub async fn keep_comment(&self, comment: &Comment) -> Result<Kept, StoreError> {
         let _turn = self.turn().await;
-        let (kind, text) = said_columns(&comment.said);
-
-        let done = sqlx::query(
-            "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, device, sequence,
-                 client_millis, waited_ms, waited_by, late, frame, frame_run, kind, text)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
-        )
-        .bind(comment.key.to_string())
-        .bind(comment.session.to_string())
-        .bind(comment.segment.map(|segment| segment.to_string()))
-        .bind(self.inner.run)
-        .bind(comment.stamp.wall.to_string())
-        .bind(nanoseconds(comment.stamp.at))
-        .bind(comment.origin.device.map(|device| device.to_string()))
-        .bind(comment.origin.sequence)
-        .bind(comment.origin.client_millis)
-        .bind(comment.origin.waited_millis)
-        .bind(comment.origin.waited_by.map(WaitClock::name))
-        .bind(comment.late)
-        .bind(comment.frame.map(u64::cast_signed))
-        .bind(comment.frame_run)
-        .bind(kind)
-        .bind(text)
-        .execute(&self.inner.trial)
-        .await?;
-
-        if done.rows_affected() == 1 {
-            return Ok(Kept::New);
-        }
-
-        // Sent again, or another comment under the same key?
-        let row = sqlx::query("SELECT session, kind, text FROM comments WHERE key = ?")
-            .bind(comment.key.to_string())
-            .fetch_one(&self.inner.trial)
-            .await?;
-
-        let same = parsed::<SessionId>(&row, "session")? == comment.session && said(&row)? == comment.said;
-        Ok(if same { Kept::Before } else { Kept::KeyTaken })
+        let mut connection = self.inner.trial.acquire().await?;
+        let kept = insert_comment(&mut connection, self.inner.run, comment).await;
+        drop_if_failed(connection, &kept);
+        kept
     }
 
     /// Keeps an answer. On disk when this returns.
@@ -74,44 +40,10 @@ impl Store {
     /// When the disk or database failed.
     pub async fn keep_answer(&self, answer: &Answer) -> Result<Kept, StoreError> {
         let _turn = self.turn().await;
-        let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
-
-        let done = sqlx::query(
-            "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns, device, sequence,
-                 client_millis, waited_ms, waited_by, late)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
-        )
-        .bind(answer.key.to_string())
-        .bind(answer.session.to_string())
-        .bind(answer.segment.map(|segment| segment.to_string()))
-        .bind(&answer.question)
-        .bind(&value)
-        .bind(self.inner.run)
-        .bind(answer.stamp.wall.to_string())
-        .bind(nanoseconds(answer.stamp.at))
-        .bind(answer.origin.device.map(|device| device.to_string()))
-        .bind(answer.origin.sequence)
-        .bind(answer.origin.client_millis)
-        .bind(answer.origin.waited_millis)
-        .bind(answer.origin.waited_by.map(WaitClock::name))
-        .bind(answer.late)
-        .execute(&self.inner.trial)
-        .await?;
-
-        if done.rows_affected() == 1 {
-            return Ok(Kept::New);
-        }
-
-        // Sent again, or another answer under the same key?
-        let kept: (String, Option<String>, String, String) =
-            sqlx::query_as("SELECT session, segment, question, value FROM answers WHERE key = ?")
-                .bind(answer.key.to_string())
-                .fetch_one(&self.inner.trial)
-                .await?;
-
-        let segment = answer.segment.map(|segment| segment.to_string());
-        let same = kept == (answer.session.to_string(), segment, answer.question.clone(), value);
-        Ok(if same { Kept::Before } else { Kept::KeyTaken })
+        let mut connection = self.inner.trial.acquire().await?;
+        let kept = insert_answer(&mut connection, self.inner.run, answer).await;
+        drop_if_failed(connection, &kept);
+        kept
     }
 
     /// Notes how much of a session a surgeon's device holds, at `stamp`.
@@ -135,6 +67,96 @@ impl Store {
 
         Ok(())
     }
+}
+
+async fn insert_comment(connection: &mut SqliteConnection, run: i64, comment: &Comment) -> Result<Kept, StoreError> {
+    let wall = comment.stamp.wall.to_string();
+    let (kind, text) = said_columns(&comment.said);
+
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query(
+        "INSERT INTO comments (key, session, segment, run, wall, monotonic_ns, device, sequence,
+             client_millis, waited_ms, waited_by, late, frame, frame_run, kind, text)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
+    )
+    .bind(comment.key.to_string())
+    .bind(comment.session.to_string())
+    .bind(comment.segment.map(|segment| segment.to_string()))
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(comment.stamp.at))
+    .bind(comment.origin.device.map(|device| device.to_string()))
+    .bind(comment.origin.sequence)
+    .bind(comment.origin.client_millis)
+    .bind(comment.origin.waited_millis)
+    .bind(comment.origin.waited_by.map(WaitClock::name))
+    .bind(comment.late)
+    .bind(comment.frame.map(u64::cast_signed))
+    .bind(comment.frame_run)
+    .bind(kind)
+    .bind(text)
+    .execute(&mut *transaction)
+    .await?;
+
+    if done.rows_affected() == 1 {
+        chain::append(&mut transaction, "comment", &comment.key.to_string(), &wall).await?;
+        transaction.commit().await?;
+        return Ok(Kept::New);
+    }
+
+    // Sent again, or another comment under the same key?
+    let row = sqlx::query("SELECT session, kind, text FROM comments WHERE key = ?")
+        .bind(comment.key.to_string())
+        .fetch_one(&mut *transaction)
+        .await?;
+
+    let same = parsed::<SessionId>(&row, "session")? == comment.session && said(&row)? == comment.said;
+    Ok(if same { Kept::Before } else { Kept::KeyTaken })
+}
+
+async fn insert_answer(connection: &mut SqliteConnection, run: i64, answer: &Answer) -> Result<Kept, StoreError> {
+    let wall = answer.stamp.wall.to_string();
+    let value = serde_json::to_string(&answer.value).map_err(|error| StoreError::Damaged(error.to_string()))?;
+
+    let mut transaction = begin(connection).await?;
+    let done = sqlx::query(
+        "INSERT INTO answers (key, session, segment, question, value, run, wall, monotonic_ns, device, sequence,
+             client_millis, waited_ms, waited_by, late)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING",
+    )
+    .bind(answer.key.to_string())
+    .bind(answer.session.to_string())
+    .bind(answer.segment.map(|segment| segment.to_string()))
+    .bind(&answer.question)
+    .bind(&value)
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(answer.stamp.at))
+    .bind(answer.origin.device.map(|device| device.to_string()))
+    .bind(answer.origin.sequence)
+    .bind(answer.origin.client_millis)
+    .bind(answer.origin.waited_millis)
+    .bind(answer.origin.waited_by.map(WaitClock::name))
+    .bind(answer.late)
+    .execute(&mut *transaction)
+    .await?;
+
+    if done.rows_affected() == 1 {
+        chain::append(&mut transaction, "answer", &answer.key.to_string(), &wall).await?;
+        transaction.commit().await?;
+        return Ok(Kept::New);
+    }
+
+    // Sent again, or another answer under the same key?
+    let kept: (String, Option<String>, String, String) =
+        sqlx::query_as("SELECT session, segment, question, value FROM answers WHERE key = ?")
+            .bind(answer.key.to_string())
+            .fetch_one(&mut *transaction)
+            .await?;
+
+    let segment = answer.segment.map(|segment| segment.to_string());
+    let same = kept == (answer.session.to_string(), segment, answer.question.clone(), value);
+    Ok(if same { Kept::Before } else { Kept::KeyTaken })
 }
 
 impl Reader {

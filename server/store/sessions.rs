@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
-use sqlx::{Connection, Row};
+use sqlx::Row;
 
-use super::values::{drop_if_failed, nanoseconds, parsed, stamp};
+use super::chain;
+use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
 use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
@@ -132,7 +133,8 @@ async fn insert_session(
     new: &NewSession,
     created: &Event,
 ) -> Result<(), StoreError> {
-    let mut transaction = connection.begin().await?;
+    let wall = new.stamp.wall.to_string();
+    let mut transaction = begin(connection).await?;
     sqlx::query(
         "INSERT INTO sessions (session, run, wall, monotonic_ns, participant, protocol, protocol_toml,
          protocol_sha256, practice, algorithm, seed, set_index, commitment)
@@ -140,7 +142,7 @@ async fn insert_session(
     )
     .bind(new.session.to_string())
     .bind(run)
-    .bind(new.stamp.wall.to_string())
+    .bind(&wall)
     .bind(nanoseconds(new.stamp.at))
     .bind(&new.participant)
     .bind(&new.protocol)
@@ -164,6 +166,7 @@ async fn insert_session(
             .await?;
     }
 
+    chain::append(&mut transaction, "session", &new.session.to_string(), &wall).await?;
     insert_event(&mut transaction, run, new.session, created).await?;
     Ok(transaction.commit().await?)
 }
@@ -174,7 +177,7 @@ async fn insert_events(
     session: SessionId,
     events: &[Event],
 ) -> Result<(), StoreError> {
-    let mut transaction = connection.begin().await?;
+    let mut transaction = begin(connection).await?;
     for event in events {
         insert_event(&mut transaction, run, session, event).await?;
     }
@@ -187,11 +190,12 @@ async fn insert_event(
     session: SessionId,
     event: &Event,
 ) -> Result<(), StoreError> {
+    let wall = event.wall.to_string();
     let payload = serde_json::to_string(&event.kind).map_err(|error| StoreError::Damaged(error.to_string()))?;
 
     // A commit that the disk reported as failed may have reached it all the same: the same event again is the same
     // event, and another one of its number is still refused.
-    sqlx::query(
+    let done = sqlx::query(
         "INSERT INTO events (session, number, run, wall, monotonic_ns, role, kind, payload)
          SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE NOT EXISTS (
              SELECT 1 FROM events
@@ -200,13 +204,17 @@ async fn insert_event(
     .bind(session.to_string())
     .bind(event.number)
     .bind(run)
-    .bind(event.wall.to_string())
+    .bind(&wall)
     .bind(nanoseconds(event.at))
     .bind(event.by.name())
     .bind(event.kind.name())
     .bind(payload)
-    .execute(connection)
+    .execute(&mut *connection)
     .await?;
+
+    if done.rows_affected() == 1 {
+        chain::append(connection, "event", &format!("{session}/{}", event.number), &wall).await?;
+    }
 
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Telemetry into SQLite: in batches, on a connection of its own, so that it delays nothing and
 //! nothing waits for it. What belongs to no setting of a session is forgotten after a while.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -10,9 +10,11 @@ use sqlx::sqlite::SqliteConnection;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, timeout_at};
 
-use super::values::{drop_if_failed, nanoseconds};
+use super::chain;
+use super::values::{begin, drop_if_failed, nanoseconds};
 use super::{Store, StoreError};
 use crate::autofocus::PolicyName;
+use crate::clock::Moment;
 use crate::control::{Hold, StepRecord};
 use crate::ids::SegmentId;
 use crate::lens::FocalPower;
@@ -50,9 +52,12 @@ pub async fn run_writer(store: Store, mut receiver: Receiver<StepRecord>) {
                 Err(error) => tracing::warn!("old telemetry could not be forgotten: {error}; it is tried again"),
             }
 
+            writer.seal(&store).await;
             checkpoint(&store).await;
         }
     }
+
+    writer.seal(&store).await;
 }
 
 #[derive(Default)]
@@ -60,6 +65,10 @@ struct Writer {
     waiting: Vec<StepRecord>,
     failing: bool,
     names: Names,
+    /// Segments with steps that are written and not yet chained.
+    unsealed: BTreeSet<SegmentId>,
+    /// When the latest of them was exposed.
+    latest: Moment,
 }
 
 impl Writer {
@@ -87,6 +96,8 @@ impl Writer {
         match self.write(store).await {
             Ok(()) => {
                 counts.written.fetch_add(self.waiting.len() as u64, Ordering::Relaxed);
+                self.unsealed.extend(self.waiting.iter().filter_map(|record| record.segment));
+                self.latest = self.waiting.iter().map(|record| record.exposed_at).fold(self.latest, Moment::max);
                 self.waiting.clear();
                 if std::mem::take(&mut self.failing) {
                     tracing::info!("telemetry is being written again");
@@ -104,6 +115,17 @@ impl Writer {
                 self.waiting.drain(..too_many);
                 counts.lost.fetch_add(too_many as u64, Ordering::Relaxed);
             }
+        }
+    }
+
+    /// Chains what was written since the last time.
+    async fn seal(&mut self, store: &Store) {
+        if self.unsealed.is_empty() {
+            return;
+        }
+        match store.seal_telemetry(&self.unsealed, self.latest).await {
+            Ok(()) => self.unsealed.clear(),
+            Err(error) => tracing::warn!("telemetry could not be chained: {error}; it is tried again"),
         }
     }
 
@@ -158,6 +180,38 @@ impl Store {
 
         Ok(up_to)
     }
+}
+
+impl Store {
+    /// Chains the steps of these segments that are not chained yet, the latest of them exposed at `latest`.
+    async fn seal_telemetry(&self, segments: &BTreeSet<SegmentId>, latest: Moment) -> Result<(), StoreError> {
+        let started = self.inner.started;
+        let wall = started.wall.saturating_add(latest.since(started.at)).unwrap_or(started.wall).to_string();
+
+        let _turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let sealed = seal(&mut connection, segments, &wall).await;
+        drop_if_failed(connection, &sealed);
+        sealed
+    }
+}
+
+async fn seal(
+    connection: &mut SqliteConnection,
+    segments: &BTreeSet<SegmentId>,
+    wall: &str,
+) -> Result<(), StoreError> {
+    let mut transaction = begin(connection).await?;
+    let mut sessions: BTreeSet<String> = BTreeSet::new();
+    for segment in segments {
+        let session = sqlx::query_scalar("SELECT session FROM segments WHERE segment = ?").bind(segment.to_string());
+        sessions.extend(session.fetch_optional(&mut *transaction).await?);
+    }
+
+    for session in sessions {
+        chain::seal(&mut transaction, &session, wall, false).await?;
+    }
+    Ok(transaction.commit().await?)
 }
 
 async fn insert(

@@ -1,10 +1,9 @@
 //! Values as the database keeps them.
 
 use jiff::Timestamp;
-use sqlx::Row;
-use sqlx::Sqlite;
 use sqlx::pool::PoolConnection;
-use sqlx::sqlite::SqliteRow;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::{Connection, Row, Sqlite, Transaction};
 
 use super::{Stamp, StoreError};
 use crate::clock::Moment;
@@ -31,6 +30,11 @@ where
 {
     let text: String = row.try_get(column)?;
     text.parse().map_err(|error| StoreError::Damaged(format!("column {column}, '{text}': {error}")))
+}
+
+/// Begins a transaction that may write from its beginning, so that nobody writes between what it reads and what it writes.
+pub(super) async fn begin(connection: &mut SqliteConnection) -> Result<Transaction<'_, Sqlite>, StoreError> {
+    Ok(connection.begin_with("BEGIN IMMEDIATE").await?)
 }
 
 /// Ends `connection` where its transaction failed; the pool then makes another. A full disk can

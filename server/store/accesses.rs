@@ -1,0 +1,175 @@
+//! Who looked at the evidence: each access is a record of its own, and is chained.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+
+use super::chain::{self, Head};
+use super::schema::DATABASE;
+use super::values::{drop_if_failed, nanoseconds};
+use super::{Reader, Store, StoreError};
+use crate::clock::Clock;
+use crate::ids::SessionId;
+use crate::trial::role::Role;
+
+/// What somebody did that shows them evidence, or copies it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Access {
+    /// Came in by a role's link.
+    Entered,
+    /// Looked at the focal path of a session, which may tell the policies.
+    PathViewed(SessionId),
+    /// Asked for an export of a session.
+    Exported {
+        /// The session.
+        session: SessionId,
+        /// Whether with the policies.
+        unblinded: bool,
+    },
+    /// Copied the database, policies included.
+    BackedUp,
+    /// Put a backup in the place of a database.
+    Restored {
+        /// The head of that database, if it had one.
+        replaced: Option<Head>,
+    },
+}
+
+impl Access {
+    const fn name(&self) -> &'static str {
+        match self {
+            Self::Entered => "entered",
+            Self::PathViewed(_) => "path-viewed",
+            Self::Exported { .. } => "exported",
+            Self::BackedUp => "backed-up",
+            Self::Restored { .. } => "restored",
+        }
+    }
+
+    const fn session(&self) -> Option<SessionId> {
+        match self {
+            Self::PathViewed(session) | Self::Exported { session, .. } => Some(*session),
+            _ => None,
+        }
+    }
+
+    fn detail(&self) -> Option<String> {
+        match self {
+            Self::Exported { unblinded, .. } => Some(if *unblinded { "unblinded" } else { "blinded" }.to_owned()),
+            Self::Restored { replaced: Some(head) } => Some(format!("replaced {head}")),
+            _ => None,
+        }
+    }
+}
+
+/// Records what somebody does with a database.
+#[derive(Clone)]
+pub struct Recorder {
+    way: Way,
+    reader: Reader,
+    /// Whose it is; none on the command line.
+    role: Option<Role>,
+    clock: Arc<dyn Clock>,
+}
+
+#[derive(Clone)]
+enum Way {
+    /// Within the server.
+    Server(Store),
+    /// From the command line, beside a server or without one.
+    CommandLine(SqlitePool),
+}
+
+impl Recorder {
+    /// What `role` does within the server.
+    #[must_use]
+    pub fn of_server(store: &Store, role: Role, clock: Arc<dyn Clock>) -> Self {
+        Self { way: Way::Server(store.clone()), reader: store.reader().clone(), role: Some(role), clock }
+    }
+
+    /// What is done from the command line with the database of data folder `folder`, whether or not a server has it open.
+    ///
+    /// # Errors
+    /// When there is none, it is not of this version, or it cannot be written.
+    pub async fn open(folder: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
+        Self::open_file(&folder.join(DATABASE), clock).await
+    }
+
+    pub(super) async fn open_file(file: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
+        let reader = Reader::open_checked(file).await?;
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5))
+            .pragma("wal_autocheckpoint", "0")
+            .synchronous(SqliteSynchronous::Full);
+        let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
+        Ok(Self { way: Way::CommandLine(pool), reader, role: None, clock })
+    }
+
+    /// For reading.
+    #[must_use]
+    pub const fn reader(&self) -> &Reader {
+        &self.reader
+    }
+
+    /// Records `access`. On disk when this returns, with the chain's head then.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn record(&self, access: &Access) -> Result<Head, StoreError> {
+        let (pool, run, _turn) = match &self.way {
+            Way::Server(store) => (&store.inner.trial, Some(store.run()), Some(store.turn().await)),
+            Way::CommandLine(pool) => (pool, None, None),
+        };
+
+        let mut connection = pool.acquire().await?;
+        let recorded = self.record_on(&mut connection, run, access).await;
+        drop_if_failed(connection, &recorded);
+        recorded
+    }
+
+    /// Ends its connections where it has its own.
+    pub async fn close(&self) {
+        if let Way::CommandLine(pool) = &self.way {
+            self.reader.close().await;
+            pool.close().await;
+        }
+    }
+
+    async fn record_on(
+        &self,
+        connection: &mut SqliteConnection,
+        run: Option<i64>,
+        access: &Access,
+    ) -> Result<Head, StoreError> {
+        let mut transaction = super::values::begin(connection).await?;
+        let wall = self.clock.wall().to_string();
+        let session = access.session().map(|session| session.to_string());
+
+        // What an export is to prove is chained before it is read.
+        if let Access::Exported { session, .. } = access {
+            chain::seal(&mut transaction, &session.to_string(), &wall, false).await?;
+        }
+
+        let done = sqlx::query(
+            "INSERT INTO accesses (run, wall, monotonic_ns, role, kind, session, detail) VALUES (?, ?, ?, ?, ?, ?, ?)",
+        )
+        .bind(run)
+        .bind(&wall)
+        .bind(run.map(|_| nanoseconds(self.clock.now())))
+        .bind(self.role.map_or("command-line", Role::name))
+        .bind(access.name())
+        .bind(session)
+        .bind(access.detail())
+        .execute(&mut *transaction)
+        .await?;
+
+        let number = done.last_insert_rowid().to_string();
+        let head = chain::append(&mut transaction, "access", &number, &wall).await?;
+        transaction.commit().await?;
+        Ok(head)
+    }
+}

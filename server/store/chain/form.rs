@@ -1,0 +1,183 @@
+//! What is hashed, byte for byte. `docs/evidence.md` describes the same for readers; a test computes it from there.
+
+use std::fmt;
+use std::str::FromStr;
+
+use sha2::{Digest, Sha256};
+
+/// The hash before the first row.
+pub const GENESIS: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+
+/// Hexadecimal digits of a hash that are shown to people: 128 bits, which nobody can meet on purpose.
+const SHOWN: usize = 32;
+
+/// Fewest digits of a hash that say which one is meant.
+const FEWEST: usize = 16;
+
+/// A hash over a list of fields, each as a netstring: its length in bytes, a colon, its bytes, a comma. So no two lists
+/// have the same bytes.
+#[derive(Clone)]
+pub struct Fields(Sha256);
+
+impl Fields {
+    /// A list that begins with `domain`, which says what is hashed.
+    pub fn of(domain: &str) -> Self {
+        Self(Sha256::new()).and(domain)
+    }
+
+    /// The same list with `field` at its end.
+    pub fn and(mut self, field: &str) -> Self {
+        self.add(field);
+        self
+    }
+
+    /// Adds `field` at the end.
+    pub fn add(&mut self, field: &str) {
+        self.0.update(field.len().to_string());
+        self.0.update(b":");
+        self.0.update(field);
+        self.0.update(b",");
+    }
+
+    /// The SHA-256, in hexadecimal.
+    pub fn hex(self) -> String {
+        hex::encode(self.0.finalize())
+    }
+}
+
+/// The hash of what of a record can be withheld or erased. Without the salt nobody can try what it may have been.
+pub fn sealed<'a>(salt: &str, fields: impl IntoIterator<Item = &'a str>) -> String {
+    let mut list = begin_sealed(salt);
+    for field in fields {
+        list.add(field);
+    }
+    list.hex()
+}
+
+/// The same, begun.
+pub fn begin_sealed(salt: &str) -> Fields {
+    Fields::of("parfocal-sealed-1").and(salt)
+}
+
+/// The hash of a record: its kind, its open columns by name, and the hash of its sealed ones.
+pub fn content<'a>(kind: &str, columns: impl IntoIterator<Item = (&'a str, &'a str)>, sealed: &str) -> String {
+    let mut list = Fields::of("parfocal-record-1").and(kind);
+    for (name, value) in columns {
+        list.add(name);
+        list.add(value);
+    }
+    list.and(sealed).hex()
+}
+
+/// What a row of the chain says of its record, its place in the chain aside.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// When the row was written, by the wall clock.
+    pub wall: String,
+    /// Kind of the record.
+    pub kind: String,
+    /// The record's key within its kind.
+    pub key: String,
+    /// The record's session; empty where it has none.
+    pub session: String,
+    /// Number of the row among those of its session, from 1.
+    pub place: Option<i64>,
+    /// Whether the record was there before the chain was.
+    pub adopted: bool,
+    /// Random: keeps the row from being guessed where it is shown as a hash alone.
+    pub salt: String,
+    /// Hash of the record's sealed columns; empty where its kind has none.
+    pub sealed: String,
+    /// Hash of the record.
+    pub content: String,
+}
+
+impl Entry {
+    /// Its hash, which stands for it where the row is another session's.
+    pub fn hash(&self) -> String {
+        let place = self.place.map_or_else(String::new, |place| place.to_string());
+        Fields::of("parfocal-entry-1")
+            .and(&self.salt)
+            .and(&self.wall)
+            .and(&self.kind)
+            .and(&self.key)
+            .and(&self.session)
+            .and(&place)
+            .and(if self.adopted { "true" } else { "false" })
+            .and(&self.sealed)
+            .and(&self.content)
+            .hex()
+    }
+}
+
+/// The hash of row `number`, which holds the entry of hash `entry` and follows the row of hash `previous`.
+pub fn link(number: i64, previous: &str, entry: &str) -> String {
+    Fields::of("parfocal-chain-1").and(&number.to_string()).and(previous).and(entry).hex()
+}
+
+/// The latest row of a chain. Whoever knows it can tell whether anything before it was changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Head {
+    /// Its number.
+    pub number: i64,
+    /// Its hash, or the beginning of it where a person gave it: hexadecimal.
+    pub hash: String,
+}
+
+impl Head {
+    /// The head of a chain without a row.
+    pub fn none() -> Self {
+        Self { number: 0, hash: GENESIS.to_owned() }
+    }
+
+    /// Whether it stands for the row `number` with this hash.
+    #[must_use]
+    pub fn is(&self, number: i64, hash: &str) -> bool {
+        self.number == number && hash.starts_with(&self.hash)
+    }
+}
+
+impl fmt::Display for Head {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.number, self.hash.get(..SHOWN).unwrap_or(&self.hash))
+    }
+}
+
+impl FromStr for Head {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("'{text}' is no head; give NUMBER:HASH as it was printed, such as 1234:9f86d081884c7d65");
+        let (number, hash) = text.trim().split_once(':').ok_or_else(wrong)?;
+        let number = number.parse().ok().filter(|&number: &i64| number >= 0).ok_or_else(wrong)?;
+        let hash = hash.to_ascii_lowercase();
+        let long_enough = (FEWEST..=GENESIS.len()).contains(&hash.len());
+        if !long_enough || !hash.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+            return Err(wrong());
+        }
+        Ok(Self { number, hash })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_is_hashed_as_netstrings() {
+        // printf '1:a,0:,4:\xc3\xa9\xc3\xa9,' | sha256sum
+        let expected = "ba2e3028a89e02ecfa949c6f1fd9bc9355290f9834c02fd26db19abacbf2e99c";
+        assert_eq!(Fields::of("a").and("").and("éé").hex(), expected);
+    }
+
+    #[test]
+    fn a_head_is_read_as_it_is_shown_and_anything_else_is_refused() {
+        let head = Head { number: 12, hash: "ab".repeat(32) };
+        let read: Head = head.to_string().parse().unwrap();
+        assert!(read.is(12, &head.hash));
+        assert!(!read.is(13, &head.hash) && !read.is(12, &"ac".repeat(32)));
+        for wrong in ["", "12", "12:", "12:abc", "x:9f86d081884c7d65", "12:9f86d081884c7d6g", "-1:9f86d081884c7d65"] {
+            assert!(wrong.parse::<Head>().unwrap_err().contains("NUMBER:HASH"), "{wrong}");
+        }
+    }
+}

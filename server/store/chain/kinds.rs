@@ -1,0 +1,175 @@
+//! The kinds of records that the chain has rows for: where each is kept, and which of its columns are hashed.
+
+/// A kind of record.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its name.
+    pub name: &'static str,
+    /// Its table in exports.
+    pub table: &'static str,
+    /// Columns that an export always tells.
+    pub open: &'static [&'static str],
+    /// Columns that can be withheld or erased: hashed with a salt of their own.
+    pub sealed: &'static [&'static str],
+    /// Gives `chain_key`, `chain_session`, `chain_order` and every column as exports have it.
+    pub select: &'static str,
+    /// Picks one record by its key, which has as many parts, divided by slashes, as there are parameters.
+    pub one: &'static str,
+    /// The order in which records are kept.
+    pub order: &'static str,
+}
+
+const RUN: Kind = Kind {
+    name: "run",
+    table: "runs",
+    open: &["run", "wall", "monotonic_ns", "version", "camera", "lens", "calibration", "blur"],
+    sealed: &["weights", "seed"],
+    select: "SELECT CAST(run AS TEXT) AS chain_key, NULL AS chain_session, run AS chain_order, * FROM runs",
+    one: "run = ?",
+    order: "run",
+};
+
+const PARTICIPANT: Kind = Kind {
+    name: "participant",
+    table: "participants",
+    open: &["code", "wall"],
+    sealed: &[],
+    select: "SELECT code AS chain_key, NULL AS chain_session, 0 AS chain_order, * FROM participants",
+    one: "code = ?",
+    order: "wall, code",
+};
+
+const SESSION: Kind = Kind {
+    name: "session",
+    table: "sessions",
+    open: &[
+        "session",
+        "participant",
+        "protocol",
+        "protocol_sha256",
+        "practice",
+        "algorithm",
+        "commitment",
+        "wall",
+        "run",
+        "monotonic_ns",
+        "segments",
+    ],
+    sealed: &[],
+    select: "SELECT session AS chain_key, session AS chain_session, rowid AS chain_order, session, participant, protocol,
+         protocol_sha256, iif(practice, 'true', 'false') AS practice, algorithm, commitment, wall, run, monotonic_ns,
+         (SELECT group_concat(segment, ',') FROM (
+             SELECT segment FROM segments AS g WHERE g.session = sessions.session ORDER BY setting)) AS segments
+         FROM sessions",
+    one: "session = ?",
+    order: "rowid",
+};
+
+// Two columns tell the kind of an event. Where they differ, neither is believed.
+const EVENT: Kind = Kind {
+    name: "event",
+    table: "events",
+    open: &["session", "number", "wall", "run", "monotonic_ns", "role", "kind", "segment", "inspected_ms", "emergency"],
+    sealed: &["reason"],
+    select: "SELECT session || '/' || number AS chain_key, session AS chain_session, number AS chain_order, session,
+         number, wall, run, monotonic_ns, role, iif(kind IS payload ->> 'kind', kind, 'unclear') AS kind,
+         payload ->> 'segment' AS segment, payload ->> 'inspected_ms' AS inspected_ms,
+         CASE payload ->> 'emergency' WHEN 1 THEN 'true' WHEN 0 THEN 'false' END AS emergency,
+         payload ->> 'reason' AS reason FROM events",
+    one: "session = ? AND number = ?",
+    order: "(SELECT s.rowid FROM sessions AS s WHERE s.session = events.session), events.number",
+};
+
+const COMMENT: Kind = Kind {
+    name: "comment",
+    table: "comments",
+    open: &[
+        "key",
+        "session",
+        "segment",
+        "kind",
+        "frame",
+        "frame_run",
+        "wall",
+        "run",
+        "monotonic_ns",
+        "client_millis",
+        "waited_ms",
+        "waited_by",
+        "device",
+        "sequence",
+        "late",
+    ],
+    sealed: &["text"],
+    select: "SELECT key AS chain_key, session AS chain_session, number AS chain_order, key, session, segment, kind,
+         iif(frame < 0, format('%u', frame), frame) AS frame, frame_run, wall, run, monotonic_ns, client_millis,
+         iif(waited_ms >= 0, waited_ms, NULL) AS waited_ms,
+         iif(waited_ms >= 0, coalesce(waited_by, 'wall-clock'), NULL) AS waited_by, device, sequence,
+         iif(late, 'true', 'false') AS late, text FROM comments",
+    one: "key = ?",
+    order: "number",
+};
+
+const ANSWER: Kind = Kind {
+    name: "answer",
+    table: "answers",
+    open: &[
+        "key",
+        "session",
+        "segment",
+        "question",
+        "wall",
+        "run",
+        "monotonic_ns",
+        "client_millis",
+        "waited_ms",
+        "waited_by",
+        "device",
+        "sequence",
+        "late",
+    ],
+    sealed: &["given_value"],
+    select: "SELECT key AS chain_key, session AS chain_session, number AS chain_order, key, session, segment, question,
+         wall, run, monotonic_ns, client_millis, iif(waited_ms >= 0, waited_ms, NULL) AS waited_ms,
+         iif(waited_ms >= 0, coalesce(waited_by, 'wall-clock'), NULL) AS waited_by, device, sequence,
+         iif(late, 'true', 'false') AS late, value AS given_value FROM answers",
+    one: "key = ?",
+    order: "number",
+};
+
+const DEVICE: Kind = Kind {
+    name: "device",
+    table: "devices",
+    open: &["number", "wall", "run", "monotonic_ns", "device", "working", "message"],
+    sealed: &[],
+    select: "SELECT CAST(number AS TEXT) AS chain_key, NULL AS chain_session, number AS chain_order, number, wall, run,
+         monotonic_ns, device, iif(working, 'true', 'false') AS working, message FROM device_events",
+    one: "number = ?",
+    order: "number",
+};
+
+const ACCESS: Kind = Kind {
+    name: "access",
+    table: "accesses",
+    open: &["number", "wall", "run", "monotonic_ns", "role", "kind", "session", "detail"],
+    sealed: &[],
+    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, * FROM accesses",
+    one: "number = ?",
+    order: "number",
+};
+
+/// Every kind but telemetry, which is sealed in blocks.
+pub const KINDS: [Kind; 8] = [RUN, PARTICIPANT, SESSION, EVENT, COMMENT, ANSWER, DEVICE, ACCESS];
+
+/// The kind called `name`.
+pub fn kind(name: &str) -> Option<&'static Kind> {
+    static ALL: [Kind; 8] = KINDS;
+    ALL.iter().find(|kind| kind.name == name)
+}
+
+/// A block of telemetry: steps of a segment that follow one another. Its key is `SEGMENT/FIRST/LAST`, counted from 1
+/// within the segment.
+pub const TELEMETRY: &str = "telemetry";
+
+/// The kind of an event whose reason may name a policy.
+pub const UNBLINDED: &str = "unblinded";
