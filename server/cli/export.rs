@@ -1,12 +1,14 @@
 //! `parfocal export`: a session's data as a folder, while the server runs or not.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 
 use super::output::{Failure, print};
+use crate::clock::SystemClock;
 use crate::ids::SessionId;
-use crate::store::Reader;
+use crate::store::Recorder;
 use crate::store::export::export;
 
 /// Arguments of `parfocal export`.
@@ -38,12 +40,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 async fn write(arguments: &Arguments) -> Result<(), Failure> {
-    let reader = Reader::open(&arguments.data_dir).await?;
-    let summary = export(&reader, arguments.session, &arguments.out, arguments.unblinded).await?;
+    let recorder = Recorder::open(&arguments.data_dir, Arc::new(SystemClock)).await?;
+    let summary = export(&recorder, arguments.session, &arguments.out, arguments.unblinded).await?;
+    recorder.close().await;
     if arguments.json {
         return print(&(serde_json::to_string(&summary)? + "\n"));
     }
     let kind = if summary.unblinded { "unblinded" } else { "blinded" };
     let practice = if summary.practice { ", practice" } else { "" };
-    print(&format!("{} files ({kind}{practice}) in {}\n", summary.files.len(), summary.folder.display()))
+    let folder = summary.folder.display();
+    print(&format!("{} files ({kind}{practice}) in {folder}\nchain {}\n", summary.files.len(), summary.head))
 }

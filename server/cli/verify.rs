@@ -1,17 +1,21 @@
-//! `parfocal verify`: whether a trial's export is whole, unchanged and true to its commitment.
+//! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged and true to its commitments.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::output::{Failure, print};
-use crate::store::export::verify::{Check, Verdict, verify};
+use crate::store::export::verify::{Check, Verdict, is_export, verify};
+use crate::store::{Head, verify_database};
 
 /// Arguments of `parfocal verify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Folder that `parfocal export` wrote.
-    dir: PathBuf,
+    /// Folder that `parfocal export` wrote, a server's data folder, or a database file such as a backup.
+    path: PathBuf,
+    /// A head of the chain that was printed, mailed or published: checks that the history up to it is the same.
+    #[arg(long, value_name = "NUMBER:HASH")]
+    head: Option<Head>,
     /// Print the verdicts as JSON.
     #[arg(long)]
     json: bool,
@@ -22,19 +26,29 @@ pub struct Arguments {
 /// # Errors
 /// When one failed.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if !arguments.dir.is_dir() {
-        let folder = arguments.dir.display();
-        return Err(format!("{folder} is not a folder; give one that `parfocal export` wrote").into());
+    let path = &arguments.path;
+    if !path.exists() {
+        return Err(format!("{} does not exist; give an export, a data folder or a database", path.display()).into());
     }
 
-    let checks = verify(&arguments.dir);
+    let (what, checks) = if is_export(path) {
+        ("export", verify(path, arguments.head.as_ref()))
+    } else {
+        ("database", of_database(path, arguments.head.clone())?)
+    };
+
     print(&if arguments.json { serde_json::to_string(&checks)? + "\n" } else { checks.iter().map(line).collect() })?;
 
     let failed = checks.iter().filter(|check| matches!(check.verdict, Verdict::Failed(_))).count();
     if failed == 0 {
         return Ok(());
     }
-    Err(format!("{failed} of {} checks failed: do not rely on this export", checks.len()).into())
+    Err(format!("{failed} of {} checks failed: do not rely on this {what}", checks.len()).into())
+}
+
+fn of_database(path: &Path, head: Option<Head>) -> Result<Vec<Check>, Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    Ok(runtime.block_on(verify_database(path, head))?)
 }
 
 fn line(check: &Check) -> String {

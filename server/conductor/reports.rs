@@ -1,5 +1,7 @@
 //! What the operator's and researcher's pages read: participants, protocols, sessions, one session in detail.
 
+use std::sync::Arc;
+
 use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -8,7 +10,7 @@ use super::course::Course;
 use super::{ConductError, Conductor, ProtocolSummary};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
-use crate::store::{DeviceEvent, Participant, Reader, SessionLine, standings};
+use crate::store::{DeviceEvent, Participant, Reader, Recorder, SessionLine, standings};
 use crate::trial::answers::sus_score;
 use crate::trial::event::EventKind;
 use crate::trial::grace::Outstanding;
@@ -101,6 +103,12 @@ impl Conductor {
     #[must_use]
     pub fn reader(&self) -> &Reader {
         self.shared.store.reader()
+    }
+
+    /// For recording what `role` looks at.
+    #[must_use]
+    pub fn recorder(&self, role: Role) -> Recorder {
+        Recorder::of_server(&self.shared.store, role, Arc::clone(&self.shared.clock))
     }
 
     /// The participants, by code.

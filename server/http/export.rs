@@ -15,6 +15,7 @@ use super::error::{Error, ErrorBody};
 use super::roles::Researcher;
 use crate::ids::SessionId;
 use crate::store::export::{Export, ExportError, TABLES, TEXTS_IN_CSV, Table, ZipStream, folder_name};
+use crate::trial::role::Role;
 
 impl From<ExportError> for Error {
     fn from(error: ExportError) -> Self {
@@ -22,7 +23,9 @@ impl From<ExportError> for Error {
         match error {
             ExportError::NoSession { .. } => Self::NotFound(text),
             ExportError::StillBlinded(_) => Self::Conflict(text),
-            ExportError::Exists(_) | ExportError::Unwritable { .. } | ExportError::Store(_) => Self::Storage(text),
+            ExportError::Exists(_) | ExportError::Busy | ExportError::Unwritable { .. } | ExportError::Store(_) => {
+                Self::Storage(text)
+            }
         }
     }
 }
@@ -48,7 +51,7 @@ async fn zip(
     Query(query): Query<ExportQuery>,
 ) -> Result<impl IntoResponse, Error> {
     let name = folder_name(session, query.unblinded);
-    let export = Export::prepare(app.conductor.reader(), session, query.unblinded).await?;
+    let export = Export::prepare(&app.conductor.recorder(Role::Researcher), session, query.unblinded).await?;
     let (zip, bytes) = ZipStream::new(name.clone());
 
     // On a thread of its own: compressing would hold up the streams.

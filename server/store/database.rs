@@ -18,7 +18,7 @@ use crate::autofocus::{BlurRate, PolicyName};
 use crate::clock::Moment;
 use crate::files::make_private;
 
-use super::chain::{self, Head};
+use super::chain;
 use super::counts::Counts;
 use super::schema::{DATABASE, MIGRATOR};
 use super::values::{begin, drop_if_failed, nanoseconds};
@@ -140,14 +140,6 @@ impl Store {
         &self.inner.telemetry_counts
     }
 
-    /// The latest row of the chain.
-    ///
-    /// # Errors
-    /// When the database failed.
-    pub async fn head(&self) -> Result<Head, StoreError> {
-        chain::head(&mut *self.inner.reader.pool().acquire().await?).await
-    }
-
     /// Closes the database; what was acknowledged is on disk with or without it.
     pub async fn close(&self) {
         self.inner.reader.close().await;
@@ -249,7 +241,11 @@ async fn seal_what_was_left(connection: &mut SqliteConnection, wall: &str) -> Re
     Ok(())
 }
 
-async fn insert_device_event(connection: &mut SqliteConnection, run: i64, event: &DeviceEvent) -> Result<(), StoreError> {
+async fn insert_device_event(
+    connection: &mut SqliteConnection,
+    run: i64,
+    event: &DeviceEvent,
+) -> Result<(), StoreError> {
     let wall = event.wall.to_string();
     let mut transaction = begin(connection).await?;
     let done = sqlx::query(

@@ -5,7 +5,8 @@ use futures_util::TryStreamExt;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow, Row as _};
 
-use super::export::{PolicyStepRow, RunRow, TelemetryRow, WeightsRow};
+use super::chain::Entry;
+use super::export::{AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, TelemetryRow, WeightsRow};
 use super::values::parsed;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
@@ -68,6 +69,42 @@ impl Reader {
         self.hand_out(session, sql, take).await
     }
 
+    /// Who looked at `session`.
+    pub(super) async fn export_accesses(&self, session: SessionId) -> Result<Vec<AccessRow>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM accesses WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(access_row).collect()
+    }
+
+    /// Hands every row of the chain to `take`, whole.
+    pub(super) async fn export_chain<E: From<StoreError>>(
+        &self,
+        mut take: impl AsyncFnMut(ChainRow) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT chain.*, chain_salts.salt AS sealed_salt FROM chain LEFT JOIN chain_salts USING (number)
+             ORDER BY number";
+        let mut rows = sqlx::query(sql).fetch(self.pool());
+        while let Some(row) = rows.try_next().await.map_err(StoreError::from)? {
+            take(chain_row(&row)?).await?;
+        }
+        Ok(())
+    }
+
+    /// Hands the salts to `take` that a blinded export of `session` withholds, those of the server's starts aside.
+    pub(super) async fn export_chain_salts<E: From<StoreError>>(
+        &self,
+        session: SessionId,
+        take: impl AsyncFnMut(ChainSaltRow) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sql = "SELECT number, chain_salts.salt FROM chain_salts JOIN chain USING (number)
+             WHERE chain.session = ?1 AND (chain.kind = 'telemetry' OR chain.kind = 'event' AND chain.key IN (
+                 SELECT session || '/' || number FROM events WHERE session = ?1 AND kind = 'unblinded'))
+             ORDER BY number";
+        self.hand_out(session, sql, take).await
+    }
+
     /// Hands the rows of `sql`, whose one parameter is `session`, to `take`.
     async fn hand_out<R, E>(
         &self,
@@ -97,5 +134,49 @@ fn run_row(row: &SqliteRow) -> Result<RunRow, StoreError> {
         lens: row.try_get("lens")?,
         calibration: row.try_get("calibration")?,
         blur: row.try_get("blur")?,
+    })
+}
+
+fn access_row(row: &SqliteRow) -> Result<AccessRow, StoreError> {
+    Ok(AccessRow {
+        number: row.try_get("number")?,
+        wall: parsed(row, "wall")?,
+        run: row.try_get("run")?,
+        monotonic_ns: row.try_get("monotonic_ns")?,
+        role: row.try_get("role")?,
+        kind: row.try_get("kind")?,
+        session: parsed(row, "session")?,
+        detail: row.try_get("detail")?,
+    })
+}
+
+fn chain_row(row: &SqliteRow) -> Result<ChainRow, StoreError> {
+    let session: Option<String> = row.try_get("session")?;
+    let entry = Entry {
+        wall: row.try_get("wall")?,
+        kind: row.try_get("kind")?,
+        key: row.try_get("key")?,
+        session: session.unwrap_or_default(),
+        place: row.try_get("place")?,
+        adopted: row.try_get("adopted")?,
+        salt: row.try_get("salt")?,
+        sealed: row.try_get("sealed")?,
+        content: row.try_get("content")?,
+    };
+
+    Ok(ChainRow {
+        number: row.try_get("number")?,
+        entry: entry.hash(),
+        hash: row.try_get("hash")?,
+        wall: Some(entry.wall),
+        kind: Some(entry.kind),
+        key: Some(entry.key),
+        session: Some(entry.session),
+        place: entry.place,
+        adopted: Some(entry.adopted),
+        salt: Some(entry.salt),
+        sealed: Some(entry.sealed),
+        sealed_salt: row.try_get("sealed_salt")?,
+        content: Some(entry.content),
     })
 }

@@ -6,7 +6,7 @@
 //! and go.
 
 mod accesses;
-pub mod chain;
+mod chain;
 mod counts;
 mod database;
 pub mod device_log;
@@ -21,6 +21,7 @@ mod sessions;
 mod sets;
 pub mod telemetry;
 mod values;
+mod verify;
 
 pub use accesses::{Access, Recorder};
 pub use chain::Head;
@@ -32,3 +33,4 @@ pub use remarks::Kept;
 pub use rows::*;
 pub use schema::MIGRATOR;
 pub use sessions::{NewSession, StoredSession};
+pub use verify::verify_database;

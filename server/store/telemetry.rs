@@ -196,11 +196,7 @@ impl Store {
     }
 }
 
-async fn seal(
-    connection: &mut SqliteConnection,
-    segments: &BTreeSet<SegmentId>,
-    wall: &str,
-) -> Result<(), StoreError> {
+async fn seal(connection: &mut SqliteConnection, segments: &BTreeSet<SegmentId>, wall: &str) -> Result<(), StoreError> {
     let mut transaction = begin(connection).await?;
     let mut sessions: BTreeSet<String> = BTreeSet::new();
     for segment in segments {

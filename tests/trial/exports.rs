@@ -11,7 +11,7 @@ use parfocal::control::{Hold, StepRecord};
 use parfocal::ids::SessionId;
 use parfocal::store::export::verify::{Check, Verdict, verify};
 use parfocal::store::export::{Export, ExportError, ZipStream, export};
-use parfocal::store::{DeviceEvent, Reader, telemetry};
+use parfocal::store::{DeviceEvent, Reader, Recorder, telemetry};
 use parfocal::trial::action::Action;
 use parfocal::trial::role::Role;
 use serde_json::Value;
@@ -53,6 +53,11 @@ fn files(folder: &Path) -> BTreeSet<String> {
     std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
 }
 
+/// Whether `file` differs between two exports, as each is recorded.
+fn tells_of_the_export(file: &str) -> bool {
+    ["SHA256SUMS", "datapackage.json", "accesses.csv", "chain.csv", "session.json"].contains(&file)
+}
+
 pub fn failed(checks: &[Check]) -> Vec<&str> {
     checks.iter().filter(|check| matches!(check.verdict, Verdict::Failed(_))).map(|check| check.name).collect()
 }
@@ -62,7 +67,7 @@ async fn a_blinded_export_holds_everything_but_the_policies() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    let summary = export(trial.store.reader(), session, &out, false).await.unwrap();
+    let summary = export(&trial.recorder(), session, &out, false).await.unwrap();
     assert_eq!(files(&out), summary.files.iter().cloned().collect());
 
     // What the policies were told of the optic.
@@ -118,7 +123,7 @@ async fn a_blinded_export_tells_no_hold_for_the_policys_sake() {
     drop(sender);
     writer.await.unwrap();
     let out = data.path().join("export");
-    export(trial.store.reader(), session, &out, false).await.unwrap();
+    export(&trial.recorder(), session, &out, false).await.unwrap();
     let held: Vec<_> = rows(&out, "telemetry").iter().map(|row| row["held"] == "true").collect();
     assert_eq!(held, [false, false, false, false, false, true, true, true]);
 }
@@ -129,7 +134,7 @@ async fn every_file_has_its_checksum_and_every_column_its_description() {
     let (trial, session) = with_session(data.path()).await;
     trial.unblind(session).await;
     let out = data.path().join("export");
-    export(trial.store.reader(), session, &out, true).await.unwrap();
+    export(&trial.recorder(), session, &out, true).await.unwrap();
 
     let sums = std::fs::read_to_string(out.join("SHA256SUMS")).unwrap();
     let listed: BTreeMap<&str, &str> =
@@ -160,18 +165,18 @@ async fn every_file_has_its_checksum_and_every_column_its_description() {
 async fn an_unblinded_export_adds_the_policies_and_changes_nothing_else() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
-    let refused = export(trial.store.reader(), session, &data.path().join("early"), true).await.unwrap_err();
+    let refused = export(&trial.recorder(), session, &data.path().join("early"), true).await.unwrap_err();
     assert!(matches!(refused, ExportError::StillBlinded(_)), "{refused}");
     assert!(!data.path().join("early").exists());
 
     trial.unblind(session).await;
     let blinded = data.path().join("blinded");
     let unblinded = data.path().join("unblinded");
-    export(trial.store.reader(), session, &blinded, false).await.unwrap();
-    export(trial.store.reader(), session, &unblinded, true).await.unwrap();
+    export(&trial.recorder(), session, &blinded, false).await.unwrap();
+    export(&trial.recorder(), session, &unblinded, true).await.unwrap();
     let more: Vec<String> = files(&unblinded).difference(&files(&blinded)).cloned().collect();
-    assert_eq!(more, ["allocation.csv", "allocation.json", "policy_steps.csv", "weights.csv"]);
-    for file in files(&blinded).iter().filter(|file| !matches!(file.as_str(), "SHA256SUMS" | "datapackage.json")) {
+    assert_eq!(more, ["allocation.csv", "allocation.json", "chain_salts.csv", "policy_steps.csv", "weights.csv"]);
+    for file in files(&blinded).iter().filter(|file| !tells_of_the_export(file)) {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
         assert!(read(&blinded) == read(&unblinded), "{file}");
         // The reason for unblinding names a policy, and is the unblinded export's alone.
@@ -194,14 +199,14 @@ async fn an_export_never_overwrites_and_a_session_that_is_not_there_is_named() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     // As the command does it while the server runs.
-    let reader = Reader::open(data.path()).await.unwrap();
+    let recorder = Recorder::open(data.path(), trial.clock.clone()).await.unwrap();
     let out = data.path().join("a/new/export");
-    export(&reader, session, &out, false).await.unwrap();
-    let again = export(&reader, session, &out, false).await.unwrap_err();
+    export(&recorder, session, &out, false).await.unwrap();
+    let again = export(&recorder, session, &out, false).await.unwrap_err();
     assert!(matches!(again, ExportError::Exists(_)), "{again}");
     assert_eq!(files(&data.path().join("a/new")).len(), 1, "nothing half-written is left beside it");
     let nobody = "00000000-0000-4000-8000-000000000000".parse().unwrap();
-    let unknown = export(&reader, nobody, &data.path().join("x"), false).await.unwrap_err().to_string();
+    let unknown = export(&recorder, nobody, &data.path().join("x"), false).await.unwrap_err().to_string();
     assert!(unknown.contains(&session.to_string()), "{unknown}");
     drop(trial);
 }
@@ -221,10 +226,10 @@ async fn an_export_of_a_session_under_way_is_of_one_moment() {
     assert_eq!(snapshot.events(session).await.unwrap().len(), 5, "created, started, three of the first setting");
     let one = data.path().join("one");
     let other = data.path().join("other");
-    export(&snapshot, session, &one, false).await.unwrap();
+    export(&trial.recorder(), session, &one, false).await.unwrap();
     assert_eq!(rows(&one, "comments").len(), 3, "each export takes a moment of its own");
-    export(&now, session, &other, false).await.unwrap();
-    assert_eq!(failed(&verify(&other)), [""; 0]);
+    export(&trial.recorder(), session, &other, false).await.unwrap();
+    assert_eq!(failed(&verify(&other, None)), [""; 0]);
 }
 
 #[tokio::test]
@@ -232,15 +237,15 @@ async fn the_pages_zip_is_the_commands_folder() {
     let data = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(data.path()).await;
     let out = data.path().join("export");
-    export(trial.store.reader(), session, &out, false).await.unwrap();
+    export(&trial.recorder(), session, &out, false).await.unwrap();
     let (zip, bytes) = ZipStream::new(format!("parfocal-{session}"));
-    let prepared = Export::prepare(trial.conductor.reader(), session, false).await.unwrap();
+    let prepared = Export::prepare(&trial.recorder(), session, false).await.unwrap();
     let (written, bytes) = tokio::join!(prepared.into_zip(zip), bytes.try_collect::<Vec<_>>());
     written.unwrap();
     let archive = bytes.unwrap().concat();
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(archive)).unwrap();
     assert_eq!(archive.len(), files(&out).len());
-    for file in files(&out) {
+    for file in files(&out).into_iter().filter(|file| !tells_of_the_export(file)) {
         let mut content = Vec::new();
         archive.by_name(&format!("parfocal-{session}/{file}")).unwrap().read_to_end(&mut content).unwrap();
         assert!(content == std::fs::read(out.join(&file)).unwrap(), "{file}");
@@ -257,7 +262,7 @@ async fn no_text_of_an_export_runs_as_a_formula_and_none_is_lost() {
         trial.say(text).await;
     }
     let out = data.path().join("export");
-    export(trial.store.reader(), session, &out, false).await.unwrap();
+    export(&trial.recorder(), session, &out, false).await.unwrap();
 
     let cells: Vec<_> = rows(&out, "comments").into_iter().map(|row| row["text"].clone()).collect();
     let expected = ["'=1+1", "'-3 dioptres too far", "'@once", "'\t=tab", "''=quoted", "sharp = good", "'quoted'"];
@@ -266,14 +271,14 @@ async fn no_text_of_an_export_runs_as_a_formula_and_none_is_lost() {
     let told: Vec<_> = told["comments"].as_array().unwrap().iter().map(|comment| &comment["text"]).collect();
     assert_eq!(told, said, "JSON has it as it was said");
     assert!(json(&out, "datapackage.json")["description"].as_str().unwrap().contains("apostrophe"));
-    assert_eq!(failed(&verify(&out)), [""; 0]);
+    assert_eq!(failed(&verify(&out, None)), [""; 0]);
 
     // As earlier versions wrote it: only the checksums tell of it.
     let comments = std::fs::read_to_string(out.join("comments.csv")).unwrap();
     std::fs::write(out.join("comments.csv"), comments.replace("'=1+1", "=1+1")).unwrap();
-    assert_eq!(failed(&verify(&out)), ["checksums"]);
+    assert_eq!(failed(&verify(&out, None)), ["checksums"]);
     std::fs::write(out.join("comments.csv"), comments.replace("'=1+1", "1+1")).unwrap();
-    assert_eq!(failed(&verify(&out)), ["checksums", "copies"]);
+    assert_eq!(failed(&verify(&out, None)), ["checksums", "copies"]);
 }
 
 #[tokio::test]
@@ -285,7 +290,7 @@ async fn an_emergency_unblinding_is_flagged_in_the_export() {
     trial.unblind(session).await;
     trial.conductor.act(Role::Operator, session, Action::Abort { reason: "adverse event".to_owned() }).await.unwrap();
     let out = data.path().join("export");
-    export(trial.store.reader(), session, &out, false).await.unwrap();
+    export(&trial.recorder(), session, &out, false).await.unwrap();
     let row = &rows(&out, "sessions")[0];
     assert_eq!((row["unblinded"].as_str(), row["status"].as_str()), ("while-under-way", "aborted"));
     assert_eq!(json(&out, "datapackage.json")["parfocal"]["unblinded"], "while-under-way");
@@ -326,7 +331,7 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
     assert_eq!(log, expected);
 
     let out = data.path().join("export");
-    export(trial.store.reader(), session, &out, false).await.unwrap();
+    export(&trial.recorder(), session, &out, false).await.unwrap();
     let devices = rows(&out, "devices");
     let devices: Vec<_> = devices.iter().map(|row| (row["working"].as_str(), row["message"].as_str())).collect();
     let expected = [
@@ -336,5 +341,5 @@ async fn what_befalls_the_devices_stands_in_the_log_and_in_the_export() {
     ];
 
     assert_eq!(devices, expected, "with the state in which the session began, and nothing after its end");
-    assert_eq!(failed(&verify(&out)), [""; 0]);
+    assert_eq!(failed(&verify(&out, None)), [""; 0]);
 }

@@ -12,7 +12,7 @@ use parfocal::conductor::{ConductError, Conductor, Library, Parts};
 use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot};
 use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal::lens::{FocalPower, LensHealth};
-use parfocal::store::{Run, Store};
+use parfocal::store::{Recorder, Run, Store};
 use parfocal::trial::action::Action;
 use parfocal::trial::phase::Phase;
 use parfocal::trial::question::{AnswerValue, QuestionKind};
@@ -88,6 +88,11 @@ impl Trial {
 
     pub fn key(&mut self) -> IdempotencyKey {
         IdempotencyKey(Uuid::from_u64_pair(self.keys.next_u64(), self.keys.next_u64()))
+    }
+
+    /// As the researcher's page exports.
+    pub fn recorder(&self) -> Recorder {
+        self.conductor.recorder(Role::Researcher)
     }
 
     pub fn view(&self) -> SurgeonView {

@@ -132,7 +132,8 @@ impl Walk {
             return self.block(entry, salt).map(Some);
         }
 
-        let kind = kind(&entry.kind).ok_or_else(|| format!("chain: row {number} has the unknown kind {}", entry.kind))?;
+        let kind =
+            kind(&entry.kind).ok_or_else(|| format!("chain: row {number} has the unknown kind {}", entry.kind))?;
         let key = (kind.name, entry.key.clone());
         let named = format!("{}: {} {}", kind.table, kind.name, entry.key);
         let record = self

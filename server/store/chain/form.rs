@@ -147,7 +147,8 @@ impl FromStr for Head {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("'{text}' is no head; give NUMBER:HASH as it was printed, such as 1234:9f86d081884c7d65");
+        let wrong =
+            || format!("'{text}' is no head; give NUMBER:HASH as it was printed, such as 1234:9f86d081884c7d65");
         let (number, hash) = text.trim().split_once(':').ok_or_else(wrong)?;
         let number = number.parse().ok().filter(|&number: &i64| number >= 0).ok_or_else(wrong)?;
         let hash = hash.to_ascii_lowercase();

@@ -56,7 +56,8 @@ const SESSION: Kind = Kind {
         "segments",
     ],
     sealed: &[],
-    select: "SELECT session AS chain_key, session AS chain_session, rowid AS chain_order, session, participant, protocol,
+    select:
+        "SELECT session AS chain_key, session AS chain_session, rowid AS chain_order, session, participant, protocol,
          protocol_sha256, iif(practice, 'true', 'false') AS practice, algorithm, commitment, wall, run, monotonic_ns,
          (SELECT group_concat(segment, ',') FROM (
              SELECT segment FROM segments AS g WHERE g.session = sessions.session ORDER BY setting)) AS segments

@@ -141,10 +141,7 @@ pub async fn seal(
 }
 
 /// The segments of `session` with steps that have no block: each with its steps and how many of them have one.
-pub async fn unsealed(
-    connection: &mut SqliteConnection,
-    session: &str,
-) -> Result<Vec<(String, i64, i64)>, StoreError> {
+pub async fn unsealed(connection: &mut SqliteConnection, session: &str) -> Result<Vec<(String, i64, i64)>, StoreError> {
     let blocks = sqlx::query_scalar("SELECT key FROM chain WHERE session = ? AND kind = ?");
     let blocks: Vec<String> = blocks.bind(session).bind(TELEMETRY).fetch_all(&mut *connection).await?;
     let blocks: Vec<Block> = blocks.iter().filter_map(|key| Block::of(key)).collect();

@@ -1,20 +1,23 @@
 //! The blinded part of an export. What it holds has no field for a policy, the order, the seed, or
 //! a reason that may name them.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Map, Value, json};
 
 use super::ExportError;
-use super::description::{AnswerRow, CommentRow, DeviceRow, EventRow, SegmentRow, SessionRow};
+use super::description::{AnswerRow, ChainRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow};
 use super::folder::Folder;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
-use crate::store::{Answer, Comment, DeviceEvent, Reader, RunClocks, SessionLine, StoreError, standings};
+use crate::store::{Answer, Comment, DeviceEvent, Head, Reader, RunClocks, SessionLine, StoreError, standings};
 use crate::trial::answers::sus_score;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
+use crate::trial::phase::SessionStatus;
 use crate::trial::protocol::Protocol;
 use crate::trial::question::{AnswerValue, QuestionKind};
 use crate::trial::remark::WaitClock;
@@ -29,6 +32,7 @@ const ABOUT: &str = "Exported by parfocal. Wall times are UTC; monotonic times a
 pub struct Blinded {
     line: SessionLine,
     run: i64,
+    monotonic_ns: i64,
     protocol_toml: String,
     protocol_sha256: String,
     /// `None` where this version cannot read it; then questions stand without their text.
@@ -59,6 +63,7 @@ impl Blinded {
         Ok(Self {
             line,
             run: stored.run,
+            monotonic_ns: nanoseconds(stored.made.stamp.at),
             grace: stored.grace(&clocks),
             clocks,
             protocol: stored.protocol().ok(),
@@ -85,16 +90,25 @@ impl Blinded {
     /// Writes all its files but the description.
     pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
         let mut copies = Map::new();
-        copy(folder, &mut copies, &reader.export_runs(self.session()).await?).await?;
+        let runs = reader.export_runs(self.session()).await?;
+        let devices = reader.device_events(self.session()).await?;
+        let own = self.own_rows(&runs, &devices);
+
+        copy(folder, &mut copies, &runs).await?;
         copy(folder, &mut copies, &[self.session_row()]).await?;
         copy(folder, &mut copies, &self.segment_rows()).await?;
         copy(folder, &mut copies, &self.comment_rows()).await?;
         copy(folder, &mut copies, &self.answer_rows()).await?;
         copy(folder, &mut copies, &self.event_rows()).await?;
-        copy(folder, &mut copies, &device_rows(reader.device_events(self.session()).await?)).await?;
+        copy(folder, &mut copies, &device_rows(devices)).await?;
+        copy(folder, &mut copies, &reader.export_accesses(self.session()).await?).await?;
         folder.json("session.json", &Value::Object(copies)).await?;
 
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
+
+        let mut chain = folder.begin()?;
+        reader.export_chain(async |row| chain.row(&own.told_of(row)).await).await?;
+        chain.end().await?;
 
         let mut telemetry = folder.begin()?;
         reader.export_telemetry(self.session(), async |row| telemetry.row(&row).await).await?;
@@ -102,7 +116,7 @@ impl Blinded {
     }
 
     /// The description of the whole, without its tables.
-    pub fn package(&self, unblinded: bool) -> Value {
+    pub fn package(&self, unblinded: bool, head: &Head) -> Value {
         let name = super::folder::folder_name(self.session(), unblinded);
         json!({
             "profile": "tabular-data-package",
@@ -115,8 +129,26 @@ impl Blinded {
                 "practice": self.line.practice,
                 "blinded": !unblinded,
                 "unblinded": self.unblinded(),
+                "chain": { "number": head.number, "hash": head.hash },
             },
         })
+    }
+
+    /// Which rows of the chain the export tells whole.
+    fn own_rows(&self, runs: &[RunRow], devices: &[(i64, i64, DeviceEvent)]) -> OwnRows {
+        let unblinding = |(_, event): &&(i64, Event)| matches!(event.kind, EventKind::Unblinded { .. });
+        let key = |(_, event): &(i64, Event)| format!("{}/{}", self.session(), event.number);
+        OwnRows {
+            session: self.session().to_string(),
+            runs: runs.iter().map(|row| row.run.to_string()).collect(),
+            devices: devices.iter().map(|(number, ..)| number.to_string()).collect(),
+            unblindings: self.events.iter().filter(unblinding).map(key).collect(),
+        }
+    }
+
+    /// Whether the session has not ended.
+    pub fn under_way(&self) -> bool {
+        self.line.status == SessionStatus::UnderWay
     }
 
     const fn unblinded(&self) -> &'static str {
@@ -143,6 +175,7 @@ impl Blinded {
             commitment: self.commitment.clone(),
             wall: line.created,
             run: self.run,
+            monotonic_ns: self.monotonic_ns,
             status: line.status,
             settings: line.settings,
             finished_settings: line.finished_settings,
@@ -224,6 +257,7 @@ impl Blinded {
                 revision: standing.revision,
                 counts: standing.counts,
                 value: serde_json::to_string(&standing.value).ok(),
+                given_value: serde_json::to_string(&answer.value).ok(),
                 sus_score,
                 wall: answer.stamp.wall,
                 run: *run,
@@ -267,6 +301,34 @@ impl Blinded {
         };
 
         self.events.iter().map(row).collect()
+    }
+}
+
+/// The rows of the chain that are about a session.
+struct OwnRows {
+    session: String,
+    runs: BTreeSet<String>,
+    devices: BTreeSet<String>,
+    /// Its unblinding, whose reason may name a policy.
+    unblindings: BTreeSet<String>,
+}
+
+impl OwnRows {
+    /// What a blinded export tells of `row`.
+    fn told_of(&self, row: ChainRow) -> ChainRow {
+        let kind = row.kind.as_deref().unwrap_or_default();
+        let key = row.key.as_deref().unwrap_or_default();
+        let own = match kind {
+            "run" => self.runs.contains(key),
+            "device" => self.devices.contains(key),
+            _ => row.session.as_ref() == Some(&self.session),
+        };
+
+        if !own {
+            return ChainRow { number: row.number, entry: row.entry, hash: row.hash, ..ChainRow::default() };
+        }
+        let withheld = matches!(kind, "run" | "telemetry") || kind == "event" && self.unblindings.contains(key);
+        ChainRow { sealed_salt: row.sealed_salt.filter(|_| !withheld), ..row }
     }
 }
 

@@ -85,6 +85,7 @@ table! {
         settings: i64 = means("Settings in all"),
         finished_settings: i64 = means("Settings inspected to the end"),
         comments: i64 = means("Comments kept"),
+        monotonic_ns: i64 = MONOTONIC.since(4),
         unblinded: &'static str =
             means("no; after-end; or while-under-way, which is emergency unblinding"),
         counts_until: Option<Timestamp> = means(
@@ -175,6 +176,10 @@ table! {
              1..5 (sus), 0 for an item still open; as it stood after this revision; of a late answer, \
              as it was given",
         ),
+        given_value: Option<String> = means(
+            "JSON: what was given this time, before items of a questionnaire given earlier were joined to it",
+        )
+        .since(4),
         sus_score: Option<f64> = means("System Usability Scale score, 0..100").in_unit("points"),
         wall: Timestamp = WALL,
         run: i64 = RUN,
@@ -247,6 +252,67 @@ table! {
         device: String = means("camera or lens"),
         working: bool = means("Whether it worked from then on"),
         message: String = means("What it said of itself, or what was changed"),
+    }
+}
+
+table! {
+    name: "accesses",
+    description: "Who looked at the session's focal path or exported the session, this export included",
+    key: [number],
+    row:
+    /// A look at the evidence.
+    #[derive(Debug, Clone)]
+    AccessRow {
+        number: i64 = means("Order of the record in the database").since(4),
+        wall: Timestamp = WALL.since(4),
+        run: Option<i64> =
+            means("Start of the server that recorded it; empty for the command line").since(4),
+        monotonic_ns: Option<i64> = MONOTONIC.since(4),
+        role: String = means("Who: researcher, or command-line").since(4),
+        kind: String = means("path-viewed or exported").since(4),
+        session: SessionId = SESSION.since(4),
+        detail: Option<String> = means("Of an export: blinded or unblinded").since(4),
+    }
+}
+
+table! {
+    name: "chain",
+    description:
+        "The chain of all records of the database up to this export, in order: of the rows that are not \
+         about this session only number, entry and hash; docs/evidence.md says what is hashed",
+    key: [number],
+    row:
+    /// A row of the chain.
+    #[derive(Debug, Clone, Default)]
+    ChainRow {
+        number: i64 = means("Order of the row, from 1, without gaps").since(4),
+        entry: String = means("SHA-256 of the columns from wall to content").since(4),
+        hash: String = means("SHA-256 of number, the hash of the row before, and entry").since(4),
+        wall: Option<String> = means("When it was written, by the server's wall clock").in_unit("UTC").since(4),
+        kind: Option<String> =
+            means("Kind of the record: run, session, event, comment, answer, device, access or telemetry").since(4),
+        key: Option<String> = means("The record's key").since(4),
+        session: Option<String> = means("The record's session; empty for runs and devices").since(4),
+        place: Option<i64> = means("Order of the row among those of the session, from 1").since(4),
+        adopted: Option<bool> = means("Whether it was recorded before there was a chain").since(4),
+        salt: Option<String> = means("Random; keeps entry from being guessed").since(4),
+        sealed: Option<String> = means("SHA-256 of the record's sealed columns, with sealed_salt").since(4),
+        sealed_salt: Option<String> =
+            means("Random; empty where the sealed columns are withheld; see chain_salts.csv").since(4),
+        content: Option<String> = means("SHA-256 of the record").since(4),
+    }
+}
+
+table! {
+    name: "chain_salts",
+    description: "The salts of sealed columns that are told only after unblinding",
+    key: [number],
+    row:
+    /// The salt of a row's sealed columns.
+    #[derive(Debug, Clone, sqlx::FromRow)]
+    ChainSaltRow {
+        number: i64 = means("The row of chain.csv").since(4),
+        salt: String = means("Random").since(4),
     }
 }
 
@@ -336,7 +402,7 @@ table! {
 }
 
 /// Every table that an export may have.
-pub const ALL: [Table; 11] = [
+pub const ALL: [Table; 14] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -344,10 +410,13 @@ pub const ALL: [Table; 11] = [
     AnswerRow::TABLE,
     EventRow::TABLE,
     DeviceRow::TABLE,
+    AccessRow::TABLE,
+    ChainRow::TABLE,
     TelemetryRow::TABLE,
     AllocationRow::TABLE,
     WeightsRow::TABLE,
     PolicyStepRow::TABLE,
+    ChainSaltRow::TABLE,
 ];
 
 #[cfg(test)]

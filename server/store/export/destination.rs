@@ -82,6 +82,15 @@ impl Destination {
     }
 }
 
+/// Checks that `out` is new or empty.
+pub fn check_new(out: &Path) -> Result<(), ExportError> {
+    let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
+    if out.is_dir() && std::fs::read_dir(out).map_err(unwritable)?.next().is_some() || out.is_file() {
+        return Err(ExportError::Exists(out.to_owned()));
+    }
+    Ok(())
+}
+
 /// A folder being written: beside its place and under another name until it is whole.
 pub struct NewFolder {
     out: PathBuf,
@@ -93,9 +102,7 @@ impl NewFolder {
     /// A folder that is to be `out`, which must be new or empty.
     pub fn beside(out: &Path) -> Result<Self, ExportError> {
         let unwritable = |error| ExportError::Unwritable { path: out.to_owned(), error };
-        if out.is_dir() && std::fs::read_dir(out).map_err(unwritable)?.next().is_some() || out.is_file() {
-            return Err(ExportError::Exists(out.to_owned()));
-        }
+        check_new(out)?;
         let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         std::fs::create_dir_all(parent).map_err(unwritable)?;
         let temporary = tempfile::Builder::new().prefix(".parfocal-export-").tempdir_in(parent).map_err(unwritable)?;

@@ -22,6 +22,9 @@ pub enum ExportError {
     /// The folder to write holds something.
     #[error("{} exists and is not empty; choose a new folder", .0.display())]
     Exists(PathBuf),
+    /// Something else was recorded each time that the export was about to be read.
+    #[error("the session is being written to without a pause; try again")]
+    Busy,
     /// A file could not be written.
     #[error("cannot write {}: {error}", .path.display())]
     Unwritable {

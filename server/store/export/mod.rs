@@ -15,7 +15,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 pub use self::description::ALL as TABLES;
-pub(super) use self::description::{PolicyStepRow, RunRow, TelemetryRow, WeightsRow};
+pub(super) use self::description::{
+    AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, TelemetryRow, WeightsRow,
+};
 pub use self::destination::ZipStream;
 pub use self::error::ExportError;
 pub use self::table::{Column, TEXTS_IN_CSV, Table, Type};
@@ -24,8 +26,11 @@ use self::blinded::Blinded;
 use self::folder::Folder;
 pub use self::folder::folder_name;
 use self::unblinded::Unblinded;
-use super::{Reader, StoreError};
+use super::{Access, Head, Reader, Recorder, StoreError};
 use crate::ids::SessionId;
+
+/// How often an export is recorded anew because something else was recorded in the same moment.
+const ATTEMPTS: usize = 50;
 
 /// What was exported.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -40,6 +45,8 @@ pub struct Summary {
     pub practice: bool,
     /// Its files.
     pub files: Vec<String>,
+    /// The chain's head then.
+    pub head: String,
 }
 
 /// An export about to be written: a session as it stands at one moment.
@@ -47,25 +54,51 @@ pub struct Export {
     session: SessionId,
     /// The database at that moment.
     snapshot: Reader,
+    /// The chain's latest row then, which is this export's own record.
+    head: Head,
     blinded: Blinded,
     telling: Option<Unblinded>,
 }
 
 impl Export {
-    /// Reads what is exported of `session`, all but its telemetry.
+    /// Records that `session` is exported, and reads what is exported of it, all but its telemetry.
     ///
     /// # Errors
     /// When there is no such session, or it is asked for unblinded before it was.
-    pub async fn prepare(reader: &Reader, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
-        // A session may be under way: what is said meanwhile is in all of the files or in none.
-        let snapshot = reader.snapshot().await?;
-        match read(&snapshot, session, unblinded).await {
-            Ok((blinded, telling)) => Ok(Self { session, snapshot, blinded, telling }),
-            Err(error) => {
-                snapshot.close().await;
-                Err(error)
+    pub async fn prepare(recorder: &Recorder, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
+        // A refused export is not recorded.
+        read(recorder.reader(), session, unblinded).await?;
+
+        // The export ends with its own record, so that nobody can take away what came before it. Where something else
+        // was recorded in between, it is recorded again.
+        for _ in 0..ATTEMPTS {
+            let head = recorder.record(&Access::Exported { session, unblinded }).await?;
+            // A session may be under way: what is said meanwhile is in all of the files or in none.
+            let snapshot = recorder.reader().snapshot().await?;
+            match Self::of(&snapshot, head, session, unblinded).await {
+                Ok(Some(export)) => return Ok(export),
+                Ok(None) => snapshot.close().await,
+                Err(error) => {
+                    snapshot.close().await;
+                    return Err(error);
+                }
             }
         }
+        Err(ExportError::Busy)
+    }
+
+    /// The export as `snapshot` has it, unless something came after the row `head`.
+    async fn of(
+        snapshot: &Reader,
+        head: Head,
+        session: SessionId,
+        unblinded: bool,
+    ) -> Result<Option<Self>, ExportError> {
+        let (blinded, telling) = read(snapshot, session, unblinded).await?;
+        if snapshot.head().await? != head || !blinded.under_way() && snapshot.has_unsealed(session).await? {
+            return Ok(None);
+        }
+        Ok(Some(Self { session, snapshot: snapshot.clone(), head, blinded, telling }))
     }
 
     /// Writes the folder `out`, which must be new or empty. It appears whole or not at all.
@@ -85,6 +118,7 @@ impl Export {
             unblinded: self.telling.is_some(),
             practice: self.blinded.practice(),
             files: outcome?,
+            head: self.head.to_string(),
         })
     }
 
@@ -104,7 +138,7 @@ impl Export {
         if let Some(telling) = &self.telling {
             telling.write(&self.snapshot, &mut folder).await?;
         }
-        folder.describe(&self.blinded.package(self.telling.is_some())).await?;
+        folder.describe(&self.blinded.package(self.telling.is_some(), &self.head)).await?;
         folder.finish().await
     }
 }
@@ -134,8 +168,15 @@ async fn read(
 /// # Errors
 /// When there is no such session, it is asked for unblinded before it was, or `out` cannot be
 /// written.
-pub async fn export(reader: &Reader, session: SessionId, out: &Path, unblinded: bool) -> Result<Summary, ExportError> {
-    Export::prepare(reader, session, unblinded).await?.into_folder(out).await
+pub async fn export(
+    recorder: &Recorder,
+    session: SessionId,
+    out: &Path,
+    unblinded: bool,
+) -> Result<Summary, ExportError> {
+    // What cannot be written is not recorded.
+    destination::check_new(out)?;
+    Export::prepare(recorder, session, unblinded).await?.into_folder(out).await
 }
 
 async fn known_sessions(reader: &Reader) -> Result<String, StoreError> {

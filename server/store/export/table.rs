@@ -39,9 +39,9 @@ pub struct Column {
     pub since: u64,
 }
 
-/// The format of exports that this version writes. The third tells what the policies knew of the
+/// The format of exports that this version writes. The fourth has the chain. The third tells what the policies knew of the
 /// optic, the second what was said late and on which device; the first did not name itself.
-pub const FORMAT: u64 = 3;
+pub const FORMAT: u64 = 4;
 
 /// A table without its rows.
 #[derive(Debug, Clone, Copy)]
@@ -215,6 +215,11 @@ impl Table {
         self.columns.iter().map(|column| column.name)
     }
 
+    /// The first format of exports that has it.
+    pub fn since(&self) -> u64 {
+        self.columns.iter().map(|column| column.since).min().unwrap_or(1)
+    }
+
     /// The columns that it had in exports of format `format`.
     pub fn columns_of(&self, format: u64) -> impl Iterator<Item = &'static Column> {
         self.columns.iter().filter(move |column| column.since <= format)
@@ -257,6 +262,15 @@ impl Column {
         }
     }
 
+    /// What a cell of the CSV files says.
+    #[must_use]
+    pub fn read(&self, csv: &str) -> String {
+        match csv.strip_prefix('\'') {
+            Some(text) if self.kind == Type::String && is_formula(text) => text.to_owned(),
+            _ => csv.to_owned(),
+        }
+    }
+
     /// Whether a CSV file that has `csv` in this column tells of `cell`. Earlier versions left
     /// texts as they were.
     #[must_use]
@@ -291,9 +305,11 @@ mod tests {
         let text = column(Type::String);
         for formula in ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1+1", "'=1", "''-"] {
             assert_eq!(text.csv(&json!(formula)), format!("'{formula}"));
+            assert_eq!(text.read(&format!("'{formula}")), formula);
         }
         for harmless in ["", "sharp = good", "'quoted'", "1-2", " =1", "\"=1\""] {
             assert_eq!(text.csv(&json!(harmless)), harmless);
+            assert_eq!(text.read(harmless), harmless);
         }
     }
 

@@ -48,6 +48,10 @@ impl Unblinded {
         reader.export_policy_steps(self.made.session, async |row| steps.row(&row).await).await?;
         steps.end().await?;
 
+        let mut salts = folder.begin()?;
+        reader.export_chain_salts(self.made.session, async |row| salts.row(&row).await).await?;
+        salts.end().await?;
+
         folder.json("allocation.json", &self.json()).await
     }
 

@@ -2,6 +2,7 @@
 //! server.
 
 mod allocation;
+mod chain;
 mod files;
 mod verdict;
 
@@ -14,12 +15,14 @@ use sha2::{Digest, Sha256};
 
 pub use verdict::Verdict;
 
+use crate::store::Head;
 use crate::store::export::description::{
-    ALL, AnswerRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow,
+    ALL, AccessRow, AnswerRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow,
 };
 use crate::store::export::folder::SUMS;
 use crate::store::export::table::{FORMAT, Row, Table};
 use allocation::{commitment, schedule};
+use chain::chain;
 use files::{cells, csv, json, session_cell, text};
 use verdict::Outcome;
 
@@ -33,9 +36,16 @@ pub struct Check {
     pub verdict: Verdict,
 }
 
-/// Checks the export in `folder`: every check, in order.
+/// Whether `path` is meant to be an export.
 #[must_use]
-pub fn verify(folder: &Path) -> Vec<Check> {
+pub fn is_export(path: &Path) -> bool {
+    [SUMS, "datapackage.json", "sessions.csv"].iter().any(|file| path.join(file).exists())
+}
+
+/// Checks the export in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether the chain
+/// is the one that had it.
+#[must_use]
+pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     let check =
         |name, outcome: Result<Verdict, String>| Check { name, verdict: outcome.unwrap_or_else(Verdict::Failed) };
     vec![
@@ -48,7 +58,16 @@ pub fn verify(folder: &Path) -> Vec<Check> {
         check("protocol", protocol(folder)),
         check("commitment", commitment(folder)),
         check("schedule", schedule(folder)),
+        check("chain", chained(folder, expected)),
     ]
+}
+
+/// Exports have the chain since their fourth format.
+fn chained(folder: &Path, expected: Option<&Head>) -> Outcome {
+    match format(folder)? {
+        ..4 => Ok(Verdict::NotChecked("an earlier version wrote the export, without a chain".to_owned())),
+        _ => chain(folder, expected),
+    }
 }
 
 fn checksums(folder: &Path) -> Outcome {
@@ -81,7 +100,8 @@ fn columns(folder: &Path) -> Outcome {
     let mut rows = 0;
     for table in ALL {
         let file = table.file();
-        if !folder.join(&file).exists() && UNBLINDED.contains(&file.as_str()) {
+        let withheld = !folder.join(&file).exists() && UNBLINDED.iter().any(|(name, _)| *name == file);
+        if withheld || table.since() > format {
             continue;
         }
 
@@ -166,11 +186,17 @@ fn numbered(folder: &Path, file: &str) -> Result<usize, String> {
     }
 }
 
-/// Files that an unblinded export has, and a blinded one must not have.
-const UNBLINDED: [&str; 4] = ["allocation.csv", "allocation.json", "weights.csv", "policy_steps.csv"];
+/// Files that an unblinded export has, and a blinded one must not have, each since which format.
+const UNBLINDED: [(&str, u64); 5] = [
+    ("allocation.csv", 1),
+    ("allocation.json", 1),
+    ("weights.csv", 1),
+    ("policy_steps.csv", 1),
+    ("chain_salts.csv", 4),
+];
 
 /// Tables that session.json repeats.
-const COPIED: [Table; 7] = [
+const COPIED: [Table; 8] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -178,20 +204,22 @@ const COPIED: [Table; 7] = [
     AnswerRow::TABLE,
     EventRow::TABLE,
     DeviceRow::TABLE,
+    AccessRow::TABLE,
 ];
 
 fn copies(folder: &Path) -> Outcome {
     let package = json(folder, "datapackage.json")?;
     let blinded =
         package["parfocal"]["blinded"].as_bool().ok_or("datapackage.json does not say whether it is blinded")?;
-    if let Some(file) = UNBLINDED.into_iter().find(|file| folder.join(file).exists() == blinded) {
+    let format = format(folder)?;
+    let mut files = UNBLINDED.into_iter().filter(|(_, since)| *since <= format).map(|(file, _)| file);
+    if let Some(file) = files.find(|file| folder.join(file).exists() == blinded) {
         let (is, has) = if blinded { ("", "there") } else { ("un", "missing") };
         return Err(format!("datapackage.json says that the export is {is}blinded, and {file} is {has}"));
     }
 
     let session = json(folder, "session.json")?;
-    let format = format(folder)?;
-    for table in COPIED {
+    for table in COPIED.iter().filter(|table| table.since() <= format) {
         let file = table.file();
         let differs = || format!("session.json and {file} disagree");
         let objects = session[table.name].as_array().ok_or_else(differs)?;

@@ -1,0 +1,23 @@
+//! What readers ask of the chain.
+
+use super::append::head;
+use super::form::Head;
+use super::telemetry::unsealed;
+use crate::ids::SessionId;
+use crate::store::{Reader, StoreError};
+
+impl Reader {
+    /// The latest row of the chain.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn head(&self) -> Result<Head, StoreError> {
+        head(&mut *self.pool().acquire().await?).await
+    }
+
+    /// Whether `session` has steps of telemetry that are not chained.
+    pub(in crate::store) async fn has_unsealed(&self, session: SessionId) -> Result<bool, StoreError> {
+        let mut connection = self.pool().acquire().await?;
+        Ok(!unsealed(&mut connection, &session.to_string()).await?.is_empty())
+    }
+}

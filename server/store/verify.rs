@@ -1,0 +1,189 @@
+//! Verification of a database, whether or not a server has it open: nothing is written.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+use super::chain::check::{BlockToCheck, Found, FoundRow, Walk};
+use super::chain::{Entry, Head, all, hashes, unsealed};
+use super::export::verify::{Check, Verdict};
+use super::{Reader, StoreError};
+use crate::ids::SessionId;
+use crate::trial::commitment::Allocation;
+
+/// Checks the database of data folder `path`, or the database file `path`: every check, in order. With `expected`, a head
+/// known from elsewhere, also whether the chain is the one that had it.
+///
+/// # Errors
+/// When there is no database, or it is of another version.
+pub async fn verify_database(path: &Path, expected: Option<Head>) -> Result<Vec<Check>, StoreError> {
+    let reader = if path.is_dir() { Reader::open(path).await? } else { Reader::open_checked(path).await? };
+    let snapshot = reader.snapshot().await?;
+    let checks = checks(&snapshot, expected).await;
+    snapshot.close().await;
+    reader.close().await;
+    Ok(checks)
+}
+
+/// Checks what `snapshot`, which has one connection, reads.
+pub(super) async fn checks(snapshot: &Reader, expected: Option<Head>) -> Vec<Check> {
+    let check = |name, outcome: Result<String, Wrong>| Check {
+        name,
+        verdict: outcome.map_or_else(|wrong| Verdict::Failed(wrong.to_string()), Verdict::Passed),
+    };
+
+    vec![
+        check("database", whole(snapshot).await),
+        check("chain", chain(snapshot, expected).await),
+        check("commitments", commitments(snapshot).await),
+    ]
+}
+
+/// What is wrong.
+#[derive(Debug, thiserror::Error)]
+enum Wrong {
+    /// With what was found.
+    #[error("{0}")]
+    Found(String),
+    /// With the database itself.
+    #[error("{0}")]
+    Database(#[from] StoreError),
+}
+
+impl From<String> for Wrong {
+    fn from(found: String) -> Self {
+        Self::Found(found)
+    }
+}
+
+impl From<sqlx::Error> for Wrong {
+    fn from(error: sqlx::Error) -> Self {
+        Self::Database(error.into())
+    }
+}
+
+/// Whether the file is whole by the database's own checks.
+async fn whole(snapshot: &Reader) -> Result<String, Wrong> {
+    let said: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check(1)").fetch_all(snapshot.pool()).await?;
+    if said != ["ok"] {
+        return Err(format!("the file is damaged: {}", said.join("; ")).into());
+    }
+    if let Some(row) = sqlx::query("PRAGMA foreign_key_check").fetch_optional(snapshot.pool()).await? {
+        let table: String = row.try_get(0)?;
+        let of: String = row.try_get(2)?;
+        return Err(format!("{table}: a row belongs to a row of {of} that is not there").into());
+    }
+    Ok("the file is whole".to_owned())
+}
+
+async fn chain(snapshot: &Reader, expected: Option<Head>) -> Result<String, Wrong> {
+    const PAGE: i64 = 4096;
+
+    let mut connection = snapshot.pool().acquire().await?;
+    let mut walk = Walk::new(all(&mut connection).await?, expected);
+    let mut after = i64::MIN;
+    loop {
+        let page = sqlx::query(
+            "SELECT chain.*, chain_salts.salt AS sealed_salt FROM chain LEFT JOIN chain_salts USING (number)
+             WHERE number > ? ORDER BY number LIMIT ?",
+        );
+        let rows = page.bind(after).bind(PAGE).fetch_all(&mut *connection).await?;
+        let Some(last) = rows.last() else { break };
+        after = last.try_get("number")?;
+
+        for row in &rows {
+            if let Some(block) = walk.row(&found(row)?)? {
+                check_block(&mut connection, &block).await?;
+            }
+        }
+    }
+
+    let waiting = unchained(&mut connection, &walk).await?;
+    let mut said = walk.end()?;
+    if waiting > 0 {
+        said += &format!("; the latest {waiting} steps of telemetry are not chained yet");
+    }
+    Ok(said)
+}
+
+fn found(row: &SqliteRow) -> Result<FoundRow, StoreError> {
+    let text = |column: &str| row.try_get::<Option<String>, _>(column).map(Option::unwrap_or_default);
+    let entry = Entry {
+        wall: text("wall")?,
+        kind: text("kind")?,
+        key: text("key")?,
+        session: text("session")?,
+        place: row.try_get("place")?,
+        adopted: row.try_get("adopted")?,
+        salt: text("salt")?,
+        sealed: text("sealed")?,
+        content: text("content")?,
+    };
+
+    Ok(FoundRow {
+        number: row.try_get::<i64, _>("number")?.to_string(),
+        previous: Some(text("previous")?),
+        entry: Found::Whole(entry, row.try_get("sealed_salt")?),
+        hash: text("hash")?,
+    })
+}
+
+async fn check_block(connection: &mut SqliteConnection, block: &BlockToCheck) -> Result<(), Wrong> {
+    let salt = block.sealed_salt.as_deref();
+    let salt = salt.ok_or_else(|| format!("telemetry: the salt of block {} is missing", block.entry.key))?;
+    let hashes = hashes(connection, &block.block, salt).await?;
+    Ok(block.check(hashes.steps, &hashes.open, Some(&hashes.sealed))?)
+}
+
+/// How many steps of telemetry have no block yet. Only the latest run may have such: the next start of the server chains
+/// what a killed one did not come to chain.
+async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64, Wrong> {
+    let sessions = sqlx::query_as(
+        "SELECT session, session IN (SELECT session FROM events WHERE run = (SELECT max(run) FROM events))
+         FROM sessions ORDER BY rowid",
+    );
+    let sessions: Vec<(String, bool)> = sessions.fetch_all(&mut *connection).await?;
+
+    let mut waiting = 0;
+    for (session, latest) in sessions {
+        for (segment, steps, _) in unsealed(connection, &session).await? {
+            let more = steps - walk.steps(&segment);
+            if !latest {
+                return Err(format!("telemetry: {more} steps of segment {segment} were inserted at its end").into());
+            }
+            waiting += more;
+        }
+    }
+    Ok(waiting)
+}
+
+/// Whether each session has the protocol and the order that it was made with.
+async fn commitments(snapshot: &Reader) -> Result<String, Wrong> {
+    let sessions = sqlx::query_scalar("SELECT session FROM sessions ORDER BY rowid");
+    let sessions: Vec<String> = sessions.fetch_all(snapshot.pool()).await?;
+    for session in &sessions {
+        let named = |what: &str| format!("sessions: session {session}: {what}");
+        let id: SessionId = session.parse().map_err(|_| named("its id is none"))?;
+        let stored = snapshot.session(id).await?.ok_or_else(|| named("it is not there"))?;
+
+        let protocol_sha256: [u8; 32] = Sha256::digest(&stored.made.protocol_toml).into();
+        if hex::encode(protocol_sha256) != stored.made.protocol_sha256 {
+            return Err(named("its protocol was changed since it was made").into());
+        }
+
+        let allocation = Allocation {
+            session: id,
+            algorithm: stored.made.algorithm,
+            seed: stored.made.seed,
+            index: stored.made.set_index,
+            protocol_sha256,
+            schedule: stored.made.segments.into_iter().map(|(_, policy)| policy).collect(),
+        };
+        if allocation.commitment() != stored.made.commitment {
+            return Err(named("its seed, place, policies or order were changed since it was made").into());
+        }
+    }
+    Ok(format!("the orders of {} sessions are those committed to when they were made", sessions.len()))
+}
