@@ -1,6 +1,7 @@
 //! The command line: one file a command; wires the rooms together.
 
 mod announce;
+mod backup;
 mod calibrate;
 mod evaluate;
 mod export;
@@ -9,6 +10,7 @@ mod interrupt;
 mod lens;
 mod output;
 mod policies;
+mod restore;
 mod scan;
 mod serve;
 mod train;
@@ -31,6 +33,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Copy the database, verified, while the server runs or not.
+    Backup(backup::Arguments),
     /// Calibrate a sensor: take its dark and white references, or import its maker's tables.
     Calibrate(calibrate::Arguments),
     /// Write a session's data as a folder of CSV and JSON.
@@ -43,6 +47,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// List the autofocus policies and whether each can run.
     Policies(policies::Arguments),
+    /// Put a backup in the place of the database, and keep what was there.
+    Restore(restore::Arguments),
     /// Record, import and check focal-time scans.
     Scan(scan::Arguments),
     /// Start the server: the live view, the control loop and the trial.
@@ -50,7 +56,7 @@ enum Command {
     Serve(serve::Arguments),
     /// Train a learned policy, or compare trainings.
     Train(train::Arguments),
-    /// Check that an export is complete, unchanged, and matches its commitment.
+    /// Check that an export, a data folder or a backup is complete, unchanged, and matches its commitments.
     Verify(verify::Arguments),
 }
 
@@ -72,12 +78,14 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Failure> {
     match command {
+        Command::Backup(arguments) => backup::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Lens(arguments) => lens::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
+        Command::Restore(arguments) => restore::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),

@@ -136,6 +136,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let registry = registry(arguments)?;
 
     let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
+    tracing::info!("the chain of records is at {}", store.reader().head().await?);
     let keys = Keys::load_or_create(&arguments.data_dir)?;
     let mut seeded = seeded(arguments)?;
     let library = protocols(arguments, &registry)?;
@@ -210,6 +211,9 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     let last_words = async {
         let _ = tokio::join!(writer, ending.record_the_rest());
+        if let Ok(head) = store.reader().head().await {
+            tracing::info!("the chain of records ends at {head}");
+        }
         store.close().await;
     };
     let _ = timeout(GRACE, last_words).await;

@@ -32,6 +32,7 @@ const CODE_HINT: &str = "2 to 16 capital letters, digits and dashes, such as S-0
 #[template(path = "operator.html")]
 struct Page {
     nonce: String,
+    chain: String,
     /// Whether this browser is let in as the researcher too.
     researcher: bool,
     surgeon_link: String,
@@ -59,6 +60,7 @@ async fn page(
     let researcher = roles.choose(Some(Role::Researcher)).is_ok();
     let page = Page {
         nonce,
+        chain: super::researcher::chain_words(&app).await,
         researcher,
         surgeon_link,
         loopback_only: app.loopback_only,

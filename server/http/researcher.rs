@@ -9,19 +9,19 @@ use axum::http::StatusCode;
 use axum::response::Html;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
-use super::roles::Researcher;
+use super::roles::{Researcher, Roles};
 use super::security::Nonce;
 use crate::autofocus::PolicyName;
 use crate::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
 use crate::ids::SessionId;
-use crate::store::SessionLine;
+use crate::store::{Access, SessionLine};
 use crate::trial::action::Action;
 use crate::trial::phase::SessionStatus;
 use crate::trial::question::AnswerValue;
@@ -54,6 +54,7 @@ pub(super) fn local(at: &Timestamp, format: &str) -> String {
 #[derive(Template)]
 #[template(path = "researcher.html")]
 struct ListPage {
+    chain: String,
     sessions: Vec<SessionLine>,
     practice: Vec<SessionLine>,
 }
@@ -64,13 +65,15 @@ struct ListPage {
 async fn list_page(_: Researcher, State(app): State<AppState>) -> Result<Html<String>, Error> {
     let lines = app.conductor.sessions(true).await?;
     let (practice, sessions) = lines.into_iter().partition(|line| line.practice);
-    ListPage { sessions, practice }.render().map(Html).map_err(|_| Error::Internal)
+    let chain = chain_words(&app).await;
+    ListPage { chain, sessions, practice }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 #[derive(Template)]
 #[template(path = "session.html")]
 struct SessionPage {
     nonce: String,
+    chain: String,
     detail: SessionDetail,
     /// Questions after a setting, each with its answer in every setting: those answered by a number.
     questions: Vec<QuestionRow>,
@@ -95,11 +98,11 @@ impl QuestionRow {
 }
 
 impl SessionPage {
-    fn new(nonce: String, detail: SessionDetail) -> Self {
+    fn new(nonce: String, chain: String, detail: SessionDetail) -> Self {
         let (asked, closing): (Vec<_>, _) = detail.answers.iter().cloned().partition(|answer| answer.setting.is_some());
         let all = questions(&asked, detail.settings_detail.len());
         let (written, questions) = all.into_iter().partition(|question| question.written);
-        Self { nonce, detail, questions, written, closing }
+        Self { nonce, chain, detail, questions, written, closing }
     }
 
     /// The policy of `setting`, once the session was unblinded.
@@ -163,7 +166,8 @@ async fn session_page(
         error => error.into(),
     })?;
 
-    SessionPage::new(nonce, detail).render().map(Html).map_err(|_| Error::Internal)
+    let chain = chain_words(&app).await;
+    SessionPage::new(nonce, chain, detail).render().map(Html).map_err(|_| Error::Internal)
 }
 
 /// The sessions, newest first, practice included and marked.
@@ -185,7 +189,20 @@ async fn session(
     Ok(Json(app.conductor.session_detail(id).await?))
 }
 
-/// One session over time. Its focal path may tell policies apart even before unblinding.
+/// One session over time without its focal path.
+#[utoipa::path(get, path = "/api/researcher/sessions/{session}/course", tag = "researcher",
+    params(("session" = SessionId, Path)), responses(
+    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
+async fn course(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+) -> Result<Json<Timeline>, Error> {
+    let timeline = app.conductor.timeline(id, POINTS).await?;
+    Ok(Json(Timeline { points: Vec::new(), ..timeline }))
+}
+
+/// One session over time. Its focal path may tell policies apart even before unblinding: that it was looked at is recorded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
@@ -194,7 +211,35 @@ async fn timeline(
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
 ) -> Result<Json<Timeline>, Error> {
-    Ok(Json(app.conductor.timeline(id, POINTS).await?))
+    let timeline = app.conductor.timeline(id, POINTS).await?;
+    app.conductor.recorder(Role::Researcher).record(&Access::PathViewed(id)).await.map_err(ConductError::from)?;
+    Ok(Json(timeline))
+}
+
+/// The latest row of the chain of records.
+#[derive(Debug, Serialize, ToSchema)]
+struct ChainHead {
+    /// Its number, from 1.
+    number: i64,
+    /// Its hash: SHA-256, hexadecimal.
+    hash: String,
+    /// Both as they stand on the pages, for `parfocal verify --head`.
+    head: String,
+}
+
+/// The head of the chain: whoever notes it can prove later that nothing recorded before it was changed.
+#[utoipa::path(get, path = "/api/chain/head", tag = "researcher", responses(
+    (status = 200, body = ChainHead),
+    (status = 403, description = "For operator and researcher", body = ErrorBody)))]
+async fn chain_head(roles: Roles, State(app): State<AppState>) -> Result<Json<ChainHead>, Error> {
+    roles.choose(Some(Role::Operator)).or_else(|_| roles.choose(Some(Role::Researcher)))?;
+    let head = app.conductor.reader().head().await.map_err(ConductError::from)?;
+    Ok(Json(ChainHead { number: head.number, head: head.to_string(), hash: head.hash }))
+}
+
+/// The chain's head as the pages show it. A page opens without it, too.
+pub(super) async fn chain_words(app: &AppState) -> String {
+    app.conductor.reader().head().await.map_or_else(|error| format!("cannot be read: {error}"), |head| head.to_string())
 }
 
 /// Why policies are to be told.
@@ -234,6 +279,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(session_page))
         .routes(routes!(list))
         .routes(routes!(session))
+        .routes(routes!(course))
         .routes(routes!(timeline))
+        .routes(routes!(chain_head))
         .routes(routes!(unblind))
 }

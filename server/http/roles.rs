@@ -18,6 +18,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::error::{Error, role_name};
 use super::keys::{Keys, ROLES};
 use super::{App, AppState};
+use crate::store::Access;
 use crate::trial::role::Role;
 
 /// A cookie outlives a study day, not a study.
@@ -137,7 +138,13 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
         app.keys.token(role)
     );
 
-    tracing::info!(role = role_name(role), "a browser was let in");
+    // The door opens on a full disk, too: the log then tells of it alone.
+    match app.conductor.recorder(role).record(&Access::Entered).await {
+        Ok(_) => tracing::info!(role = role_name(role), "a browser was let in"),
+        Err(error) => {
+            tracing::error!(role = role_name(role), "a browser was let in and could not be recorded: {error}")
+        }
+    }
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Redirect::to(home(role))))
 }
 

@@ -6,6 +6,7 @@
 //! and go.
 
 mod accesses;
+pub mod backup;
 mod chain;
 mod counts;
 mod database;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
-use sqlx::{Row, migrate::Migrate};
+use sqlx::{Connection as _, Row, migrate::Migrate};
 
 use super::schema::{DATABASE, MIGRATOR};
 use super::values::moment;
@@ -82,6 +82,22 @@ impl Reader {
 
     pub(super) const fn pool(&self) -> &SqlitePool {
         &self.pool
+    }
+
+    /// Copies the database as it is now into `file`, which must be empty or not there.
+    pub(super) async fn copy_to(&self, file: &Path) -> Result<(), StoreError> {
+        let file = file.to_str().ok_or_else(|| StoreError::Disk("the file's name is not UTF-8".to_owned()))?;
+        sqlx::query("VACUUM INTO ?").bind(file).execute(&self.pool).await?;
+        Ok(())
+    }
+
+    /// Moves all of the log of the database `file` into it, as far as no other program has it open.
+    pub(super) async fn fold_log(file: &Path) -> Result<(), StoreError> {
+        let options = SqliteConnectOptions::new().filename(file).busy_timeout(Duration::from_secs(1));
+        let mut connection = sqlx::SqliteConnection::connect_with(&options).await?;
+        let folded = sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)").execute(&mut connection).await;
+        connection.close().await?;
+        Ok(folded.map(|_| ())?)
     }
 
     /// Ends its connections.

@@ -30,8 +30,8 @@ async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
         failures
     };
 
-    assert_eq!(change("comments.csv", "🔬", "!"), ["checksums", "copies"]);
-    assert_eq!(change("telemetry.csv", "0.35", "abc"), ["checksums", "columns"]);
+    assert_eq!(change("comments.csv", "🔬", "!"), ["checksums", "copies", "chain"]);
+    assert_eq!(change("telemetry.csv", "0.35", "abc"), ["checksums", "columns", "chain"]);
     assert_eq!(change("protocol.toml", "120", "121"), ["checksums", "protocol", "commitment"]);
 
     let schedule = json(&out, "allocation.json")["schedule"].clone();
@@ -44,7 +44,7 @@ async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
     assert_eq!(change("allocation.json", &seed, &"0".repeat(64)), ["checksums", "commitment", "schedule"]);
 
     let third = std::fs::read_to_string(out.join("events.csv")).unwrap().lines().nth(3).unwrap().to_owned() + "\n";
-    assert_eq!(change("events.csv", &third, ""), ["checksums", "events", "copies"]);
+    assert_eq!(change("events.csv", &third, ""), ["checksums", "events", "copies", "chain"]);
 
     std::fs::write(out.join("more.txt"), "").unwrap();
     assert_eq!(failed(&verify(&out, None)), ["checksums"]);
@@ -113,21 +113,21 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     assert_eq!(found(&|| drawn("allocation.json")), ["commitment", "schedule"]);
     assert_eq!(
         found(&|| ["allocation.json", "sessions.csv", "session.json"].into_iter().for_each(drawn)),
-        ["commitment", "schedule"]
+        ["commitment", "schedule", "chain"]
     );
 
     // What was said.
     let answers: String =
         read("answers.csv").lines().filter(|line| !line.starts_with("3,")).map(|l| l.to_owned() + "\n").collect();
-    assert_eq!(found(&|| write("answers.csv", answers.clone())), ["said", "copies"]);
+    assert_eq!(found(&|| write("answers.csv", answers.clone())), ["said", "copies", "chain"]);
 
     let comments = read("comments.csv");
     let all_but_the_last = comments[..=comments.rfind("\n6,").unwrap()].to_owned();
-    assert_eq!(found(&|| write("comments.csv", all_but_the_last.clone())), ["said", "copies"]);
+    assert_eq!(found(&|| write("comments.csv", all_but_the_last.clone())), ["said", "copies", "chain"]);
 
-    assert_eq!(found(&|| write("comments.csv", read("comments.csv").replace('🔬', "!"))), ["copies"]);
+    assert_eq!(found(&|| write("comments.csv", read("comments.csv").replace('🔬', "!"))), ["copies", "chain"]);
     assert_eq!(found(&|| remove("session.json")), ["copies"]);
-    assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "copies"]);
+    assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "copies", "chain"]);
 
     // An answer that counts though it came too late.
     let late = read("answers.csv").replacen(",false,false\n", ",true,false\n", 1);
@@ -138,12 +138,12 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     let (number, rest) =
         event.split_once(',').map(|(session, rest)| (session, rest.split_once(',').unwrap().1)).unwrap();
     let unnumbered = read("events.csv") + &format!("{number},,{rest}\n");
-    assert_eq!(found(&|| write("events.csv", unnumbered.clone())), ["events", "copies"]);
+    assert_eq!(found(&|| write("events.csv", unnumbered.clone())), ["events", "copies", "chain"]);
 
     // A setting that never was.
     let steps =
         read("policy_steps.csv") + &read("policy_steps.csv").lines().nth(1).unwrap().replacen('1', "9", 1) + "\n";
-    assert_eq!(found(&|| write("policy_steps.csv", steps.clone())), ["references"]);
+    assert_eq!(found(&|| write("policy_steps.csv", steps.clone())), ["references", "chain"]);
 }
 
 /// Made by the program as it was before exports had a format's number.

@@ -15,6 +15,11 @@ impl Reader {
         head(&mut *self.pool().acquire().await?).await
     }
 
+    /// The hashes of the chain's rows, in order.
+    pub(in crate::store) async fn hashes(&self) -> Result<Vec<String>, StoreError> {
+        Ok(sqlx::query_scalar("SELECT hash FROM chain ORDER BY number").fetch_all(self.pool()).await?)
+    }
+
     /// Whether `session` has steps of telemetry that are not chained.
     pub(in crate::store) async fn has_unsealed(&self, session: SessionId) -> Result<bool, StoreError> {
         let mut connection = self.pool().acquire().await?;

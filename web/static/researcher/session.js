@@ -25,9 +25,14 @@ let lines = [];
 /** @type {number | null} */
 let chosen = null;
 
+function withFocalPath() {
+  return get("/api/researcher/sessions/{session}/timeline", { session });
+}
+
 async function load() {
   try {
-    timeline = await get("/api/researcher/sessions/{session}/timeline", { session });
+    // That the focal path is looked at is recorded, so only where it is shown.
+    timeline = withPath ? await withFocalPath() : await get("/api/researcher/sessions/{session}/course", { session });
     if (unblinded) {
       const detail = await get("/api/researcher/sessions/{session}", { session });
       policies = detail.unblinding?.policies ?? [];
@@ -141,10 +146,15 @@ async function unblind() {
   });
 }
 
-byId("show-path").onclick = () => {
-  withPath = true;
-  byId("show-path").hidden = true;
-  draw();
+byId("show-path").onclick = async () => {
+  try {
+    timeline = await withFocalPath();
+    withPath = true;
+    byId("show-path").hidden = true;
+    draw();
+  } catch (error) {
+    setText(byId("timeline-trouble"), inWords(error));
+  }
 };
 
 // A session that is unblinded already has no such button.

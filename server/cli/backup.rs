@@ -1,0 +1,37 @@
+//! `parfocal backup`: a verified copy of the database, while the server runs or not.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use clap::Args;
+
+use super::output::{Failure, print};
+use crate::clock::SystemClock;
+use crate::store::backup;
+
+/// Arguments of `parfocal backup`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// File to write: a new one.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Folder of the server's database.
+    #[arg(long, value_name = "DIR", default_value = "data")]
+    data_dir: PathBuf,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Writes the backup.
+///
+/// # Errors
+/// When the file exists or cannot be written, there is no database, or the copy does not verify.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let made = runtime.block_on(backup::backup(&arguments.data_dir, &arguments.out, Arc::new(SystemClock)))?;
+    if arguments.json {
+        return print(&(serde_json::to_string(&made)? + "\n"));
+    }
+    print(&format!("{}: {} bytes, verified\nchain {}\n", made.file.display(), made.bytes, made.head))
+}
