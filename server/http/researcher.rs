@@ -228,7 +228,7 @@ struct ChainHead {
 }
 
 /// The head of the chain: whoever notes it can prove later that nothing recorded before it was changed.
-#[utoipa::path(get, path = "/api/chain/head", tag = "researcher", responses(
+#[utoipa::path(get, path = "/api/chain/head", tag = "service", responses(
     (status = 200, body = ChainHead),
     (status = 403, description = "For operator and researcher", body = ErrorBody)))]
 async fn chain_head(roles: Roles, State(app): State<AppState>) -> Result<Json<ChainHead>, Error> {

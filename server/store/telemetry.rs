@@ -5,7 +5,6 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use sqlx::Connection;
 use sqlx::sqlite::SqliteConnection;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, timeout_at};
@@ -142,7 +141,7 @@ impl Writer {
     }
 
     async fn write_on(&mut self, connection: &mut SqliteConnection, run: i64) -> Result<(), StoreError> {
-        let mut transaction = connection.begin().await?;
+        let mut transaction = begin(connection).await?;
         for record in &self.waiting {
             let segment = self.names.segment(&mut transaction, record.segment).await?;
             let policy = self.names.policy(&mut transaction, record.policy.as_ref()).await?;

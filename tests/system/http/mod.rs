@@ -2,6 +2,7 @@
 
 mod blinding;
 mod crowd;
+mod evidence;
 mod failing_disk;
 mod finality;
 mod live;

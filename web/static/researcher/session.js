@@ -32,7 +32,9 @@ function withFocalPath() {
 async function load() {
   try {
     // That the focal path is looked at is recorded, so only where it is shown.
-    timeline = withPath ? await withFocalPath() : await get("/api/researcher/sessions/{session}/course", { session });
+    timeline = withPath
+      ? await withFocalPath()
+      : await get("/api/researcher/sessions/{session}/course", { session });
     if (unblinded) {
       const detail = await get("/api/researcher/sessions/{session}", { session });
       policies = detail.unblinding?.policies ?? [];
