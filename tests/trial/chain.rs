@@ -80,7 +80,11 @@ const TAMPERED: [(&str, &str); 47] = [
     ("UPDATE sessions SET monotonic_ns = 1", "sessions: session"),
     ("UPDATE sessions SET commitment = 'x'", "sessions: session"),
     ("DELETE FROM sessions", "sessions: session"),
-    ("UPDATE segments SET setting = 8 - setting WHERE setting > 1 AND setting <> 4", "sessions: session"),
+    (
+        "UPDATE segments SET setting = 100 WHERE setting = 2; UPDATE segments SET setting = 2 WHERE setting = 3;
+         UPDATE segments SET setting = 3 WHERE setting = 100",
+        "sessions: session",
+    ),
     ("DELETE FROM segments WHERE setting = 6", "sessions: session"),
     ("UPDATE events SET wall = '2020-01-01T00:00:00Z' WHERE number = 3", "/3 was changed"),
     ("UPDATE events SET role = 'operator' WHERE number = 4", "/4 was changed"),
@@ -220,6 +224,7 @@ async fn a_database_of_a_version_without_a_chain_is_adopted_once() {
     export(&trial.recorder(), session, &out, true).await.unwrap();
     assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
     trial.store.close().await;
+    drop(trial);
 
     // What is put beside the chain is not adopted at the next start.
     let pool = crate::storage::raw(folder.path()).await;
@@ -232,7 +237,7 @@ async fn a_database_of_a_version_without_a_chain_is_adopted_once() {
 }
 
 /// What verification says of the export in `out` with `file` changed by `change`.
-fn with_changed(out: &Path, file: &str, change: impl Fn(&str) -> String) -> Result<String, String> {
+fn with_changed(out: &Path, file: &str, change: impl FnOnce(&str) -> String) -> Result<String, String> {
     let path = out.join(file);
     let before = std::fs::read_to_string(&path).unwrap();
     let changed = change(&before);
