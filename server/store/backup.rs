@@ -1,6 +1,7 @@
 //! Backups of a database: made while a server writes, verified before they get their name, and put back.
 
-use std::fs::File;
+use std::fs::{DirBuilder, File};
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ use super::schema::DATABASE;
 use super::verify::checks;
 use super::{Access, Head, Reader, Recorder, StoreError};
 use crate::clock::Clock;
-use crate::files::sync_folder_of;
+use crate::files::{make_private, sync_folder_of};
 
 /// Why nothing was backed up or restored.
 #[derive(Debug, thiserror::Error)]
@@ -132,12 +133,13 @@ pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<
 /// # Errors
 /// When a server has the folder, the backup does not verify, or a file cannot be written. Then nothing was changed.
 pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
-    std::fs::create_dir_all(folder).map_err(BackupError::file(folder))?;
+    DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(BackupError::file(folder))?;
     let _lock = lock(folder)?;
     let database = folder.join(DATABASE);
 
     let copy = temporary_beside(&database)?;
     std::fs::copy(file, copy.path()).map_err(BackupError::file(file))?;
+    make_private(copy.path()).map_err(BackupError::file(copy.path()))?;
     let head = verified(copy.path(), &file.display().to_string()).await?;
 
     let there = database.exists();
