@@ -81,6 +81,8 @@ const ALONE: i32 = libc::SCHED_RESET_ON_FORK;
 const PREFERRED: i32 = -10;
 /// Niceness of work that the loop must not wait for.
 const BEHIND: i32 = 5;
+/// Niceness of work that those must not wait for either.
+const FURTHER_BEHIND: i32 = 10;
 /// Niceness of work that nobody waits for.
 const LAST: i32 = 19;
 
@@ -119,6 +121,11 @@ pub fn prefer() {
 /// rights.
 pub fn lower() {
     nice(BEHIND);
+}
+
+/// Puts the calling thread behind those that called [`lower`].
+pub fn lower_further() {
+    nice(FURTHER_BEHIND);
 }
 
 /// Puts `thread`, one of this process, at the real-time priority of `place`; returns whether that is

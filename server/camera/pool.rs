@@ -6,8 +6,9 @@ use std::sync::Arc;
 use super::CameraError;
 use crate::imaging::MosaicFrame;
 
-/// Mosaics remembered; the control loop, the imaging thread and a few viewers hold one each.
-const MOST: usize = 8;
+/// Mosaics remembered. At most nine are held at a time: the camera fills one, and each of control loop,
+/// imaging thread and the threads of the two larger sizes works on one while its slot holds the next.
+const MOST: usize = 9;
 
 /// Frames of one size, handed out shared and taken back when the last other holder drops them.
 #[derive(Debug)]

@@ -25,7 +25,7 @@ use crate::conductor::{Conductor, Library, Parts};
 use crate::control::{self, Command, ControlLoop, Drive, Rig, Settings};
 use crate::http::keys::Keys;
 use crate::http::{self, App};
-use crate::imaging::{Calibration, Reconstructor};
+use crate::imaging::{Calibration, Developer, Reconstructor, Size};
 use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
 use crate::store::{self, Store, device_log, telemetry};
 use crate::{lens, live, priority};
@@ -141,9 +141,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let mut seeded = seeded(arguments)?;
     let library = protocols(arguments, &registry)?;
 
-    let reconstructor = Reconstructor::new(&calibration);
-    let mut rig = rig(arguments, &clock, reconstructor.clone(), registry.clone(), seeded.random())?;
-    calibration::check_camera(&calibration, rig.camera.mosaic_size())?;
+    let developer = Developer::new(&calibration);
+    let mut rig = rig(arguments, &clock, developer.reconstructor().clone(), registry.clone(), seeded.random())?;
+    let mosaics = rig.camera.mosaic_size();
+    calibration::check_camera(&calibration, mosaics)?;
     let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
 
@@ -153,7 +154,9 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let writer = tokio::spawn(telemetry::run_writer(store.clone(), records));
     tokio::spawn(device_log::record(store.clone(), Arc::clone(&clock), control.status.clone()));
 
-    let (live, imaging) = live::start(control.clone(), reconstructor)?;
+    // A colour picture has one size.
+    let largest = if mosaics.is_some() { Size::Full } else { Size::Cell };
+    let (live, imaging) = live::start(control.clone(), &developer, largest)?;
 
     let conductor = Conductor::open(Parts {
         store: store.clone(),

@@ -14,12 +14,13 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::roles::Roles;
 use super::shutdown::ended;
+use crate::imaging::Size;
 
 const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
 const FIRST_PART: &[u8] = b"--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
 const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\r\n";
 
-/// The live picture as motion JPEG, without end.
+/// The live picture as motion JPEG, one pixel a mosaic cell, without end.
 #[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
     (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
@@ -29,7 +30,7 @@ async fn mjpeg(State(app): State<AppState>, _: Roles) -> impl IntoResponse {
 
 fn parts(app: AppState) -> impl Stream<Item = Bytes> {
     let mut shutdown = app.shutdown.clone();
-    let watcher = app.live.watch();
+    let watcher = app.live.watch(Size::Cell);
 
     let frames = stream::unfold((app, watcher), async |(app, mut watcher)| {
         let frame = watcher.next().await?;

@@ -31,6 +31,34 @@ impl Size {
         }
     }
 
+    /// Its name, as on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cell => "cell",
+            Self::Half => "half",
+            Self::Full => "full",
+        }
+    }
+
+    /// The next smaller size; the smallest itself.
+    #[must_use]
+    pub const fn smaller(self) -> Self {
+        match self {
+            Self::Cell | Self::Half => Self::Cell,
+            Self::Full => Self::Half,
+        }
+    }
+
+    /// The next larger size; the largest itself.
+    #[must_use]
+    pub const fn larger(self) -> Self {
+        match self {
+            Self::Cell => Self::Half,
+            Self::Half | Self::Full => Self::Full,
+        }
+    }
+
     /// Width and height of the picture of `mosaic`, in pixels.
     #[must_use]
     pub const fn of(self, mosaic: &MosaicFrame) -> (usize, usize) {

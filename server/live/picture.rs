@@ -10,24 +10,27 @@ use crate::control::Hold;
 use crate::imaging::{ContentArea, PatchArea};
 use crate::lens::FocalPower;
 
-/// A picture and its data. Lengths in pixels of this picture.
+/// A picture and its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Frame's number.
     pub number: u64,
     /// End of the exposure.
     pub exposed_at: Moment,
-    /// Width.
+    /// Width in pixels.
     pub width: usize,
-    /// Height.
+    /// Height in pixels.
     pub height: usize,
+    /// Pixels along each side of a mosaic cell; 1 for a colour picture, of which each pixel counts as a
+    /// cell.
+    pub per_cell: usize,
     /// The colour picture as JPEG.
     pub jpeg: Bytes,
     /// Whether its colours are estimated from bands that hold no red.
     pub estimated: bool,
-    /// The patch's place.
+    /// The patch's place, in cells.
     pub patch: PatchArea,
-    /// The content area in use at that time.
+    /// The content area in use at that time, in cells.
     pub content_area: Option<ContentArea>,
 }
 

@@ -1,19 +1,20 @@
-//! The imaging thread: takes the loop's latest frame, makes the picture, and looks for the content area.
+//! The imaging thread: takes the loop's latest frame, makes the picture at the size of the cells, hands the
+//! frame on to the larger sizes, and looks for the content area.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use bytes::Bytes;
 use tokio::sync::watch;
 
 use super::area::AreaWatch;
-use super::{Counts, EncodedFrame, Insight, LiveHandle, Picture};
-use crate::camera::FrameImage;
+use super::larger::Larger;
+use super::outlet::Outlet;
+use super::studio::Studio;
+use super::{Counts, LiveHandle};
 use crate::control::{Command, ControlHandle, ControlledFrame};
-use crate::imaging::{GrayImage, JpegEncoder, JpegError, Reconstructor, RgbImage, content_area, rgb_to_gray};
+use crate::imaging::{Developer, Size, content_area};
 
 /// Interval of the search for the content area, frames: it moves as slowly as a hand lets an eyepiece
 /// slip.
@@ -22,17 +23,33 @@ const DETECT_EVERY: u64 = 10;
 /// Longest wait for a frame before checking whether more will come.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Starts the thread; it ends when the loop closes its slot.
+/// Starts the thread, and one for each larger size up to `largest`; they end when the loop closes its slot.
 ///
 /// # Errors
 /// When the system cannot make a thread or an encoder.
-pub fn start(control: ControlHandle, reconstructor: Reconstructor) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
-    let (sender, frames) = watch::channel(None);
+pub fn start(
+    control: ControlHandle,
+    developer: &Developer,
+    largest: Size,
+) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
     let counts = Arc::new(Counts::default());
-    let handle = LiveHandle { frames, counts: Arc::clone(&counts) };
+    let outlet = |size| {
+        let (sender, frames) = watch::channel(None);
+        (Outlet::new(size, sender, Arc::clone(&counts)), frames)
+    };
 
-    let studio = Studio::new(reconstructor).map_err(std::io::Error::other)?;
-    let worker = Worker { control, sender, counts, studio, areas: AreaWatch::default(), looked: None };
+    let (cells, latest) = outlet(Size::Cell);
+    let mut frames = vec![latest];
+    let mut larger = Vec::new();
+    for size in Size::ALL.into_iter().filter(|size| (Size::Half..=largest).contains(size)) {
+        let (outlet, latest) = outlet(size);
+        frames.push(latest);
+        larger.push(Larger::start(developer.clone(), size, outlet)?);
+    }
+
+    let studio = Studio::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
+    let handle = LiveHandle { frames: frames.into(), counts: Arc::clone(&counts) };
+    let worker = Worker { control, outlet: cells, counts, studio, larger, areas: AreaWatch::default(), looked: None };
     let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || worker.run())?;
 
     Ok((handle, thread))
@@ -40,9 +57,10 @@ pub fn start(control: ControlHandle, reconstructor: Reconstructor) -> std::io::R
 
 struct Worker {
     control: ControlHandle,
-    sender: watch::Sender<Option<Arc<EncodedFrame>>>,
+    outlet: Outlet,
     counts: Arc<Counts>,
     studio: Studio,
+    larger: Vec<Larger>,
     areas: AreaWatch,
     /// The frame in which the content area was last looked for.
     looked: Option<u64>,
@@ -62,107 +80,35 @@ impl Worker {
     }
 
     fn turn(&mut self, frame: ControlledFrame) {
-        self.counts.latency.observe(f64::from(frame.record.latency_micros) / 1e6);
-        let watched = self.counts.viewers() > 0;
+        self.counts.latency().observe(f64::from(frame.record.latency_micros) / 1e6);
+        let watched = self.outlet.is_watched();
 
         // By distance: where frames come faster than they are shown, those of a round number may never be
         // seen here.
-        let detect = self.looked.is_none_or(|looked| frame.frame.number.abs_diff(looked) >= DETECT_EVERY);
-        if !watched && !detect {
-            return;
+        let number = frame.frame.number;
+        let detect = self.looked.is_none_or(|looked| number.abs_diff(looked) >= DETECT_EVERY);
+
+        let image = frame.frame.image.clone();
+        if watched || detect {
+            self.studio.develop(&image);
         }
 
-        let number = frame.frame.number;
-        let image = frame.frame.image.clone();
-        self.studio.develop(&image);
-
+        // The picture leaves first: its viewers wait neither for a larger size nor for the detection.
         if watched {
-            match self.studio.encode(&image) {
-                Ok(jpeg) => self.publish(frame, &image, jpeg),
+            match self.studio.encode(frame.clone()) {
+                Ok(frame) => self.outlet.publish(frame),
                 Err(error) => tracing::error!(%error, "a picture could not be encoded"),
             }
         }
+        for larger in &self.larger {
+            larger.offer(&frame);
+        }
 
-        // Detection comes after the picture has left: nobody waits for it.
         if detect {
             self.looked = Some(number);
             if let Some(news) = self.areas.see(content_area::detect(self.studio.gray(&image))) {
                 self.control.send(Command::ContentArea(news));
             }
         }
-    }
-
-    fn publish(&self, controlled: ControlledFrame, image: &FrameImage, jpeg: Bytes) {
-        self.counts.encoded.fetch_add(1, Ordering::Relaxed);
-        self.counts.jpeg_bytes.fetch_add(jpeg.len() as u64, Ordering::Relaxed);
-
-        let (width, height) = size(image);
-        let ControlledFrame { frame, patch, content_area, record, belief } = controlled;
-
-        self.sender.send_replace(Some(Arc::new(EncodedFrame {
-            picture: Picture {
-                number: frame.number,
-                exposed_at: frame.exposed_at,
-                width,
-                height,
-                jpeg,
-                estimated: matches!(image, FrameImage::Mosaic(_)),
-                patch,
-                content_area,
-            },
-            insight: Insight {
-                asked: record.asked,
-                measured: record.measured,
-                metric: record.metric,
-                held: record.held,
-                belief,
-            },
-        })));
-    }
-}
-
-/// Size of the picture made from `image`.
-fn size(image: &FrameImage) -> (usize, usize) {
-    match image {
-        FrameImage::Mosaic(mosaic) => (mosaic.band_width(), mosaic.band_height()),
-        FrameImage::Rgb(rgb) => (rgb.width, rgb.height),
-    }
-}
-
-/// Makes pictures, reusing its memory for each.
-struct Studio {
-    reconstructor: Reconstructor,
-    encoder: JpegEncoder,
-    rgb: RgbImage,
-    gray: GrayImage,
-}
-
-impl Studio {
-    fn new(reconstructor: Reconstructor) -> Result<Self, JpegError> {
-        let encoder = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY)?;
-        Ok(Self { reconstructor, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
-    }
-
-    /// Makes colour and gray from a mosaic; leaves a colour picture as it is.
-    fn develop(&mut self, image: &FrameImage) {
-        if let FrameImage::Mosaic(mosaic) = image {
-            self.reconstructor.reconstruct(mosaic, &mut self.rgb, &mut self.gray);
-        }
-    }
-
-    /// JPEG of `image`, which must be the one developed last.
-    fn encode(&mut self, image: &FrameImage) -> Result<Bytes, JpegError> {
-        match image {
-            FrameImage::Mosaic(_) => self.encoder.encode(&self.rgb),
-            FrameImage::Rgb(rgb) => self.encoder.encode(rgb),
-        }
-    }
-
-    /// Gray picture of `image`, which must be the one developed last.
-    fn gray(&mut self, image: &FrameImage) -> &GrayImage {
-        if let FrameImage::Rgb(rgb) = image {
-            rgb_to_gray(rgb, &mut self.gray);
-        }
-        &self.gray
     }
 }

@@ -8,6 +8,7 @@
 //! it is hidden gets no frames.
 
 mod audience;
+mod link;
 mod operator;
 mod surgeon;
 
@@ -20,7 +21,7 @@ use axum::response::Response;
 use bytes::{BufMut, Bytes, BytesMut};
 use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::time::{Instant, MissedTickBehavior, interval, timeout, timeout_at};
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -28,10 +29,13 @@ use super::AppState;
 use super::error::Error;
 use super::roles::Roles;
 use super::shutdown::ended;
+use crate::clock::Moment;
 use crate::control::ControlStatus;
+use crate::imaging::Size;
 use crate::live::{EncodedFrame, Watcher};
 use crate::trial::role::Role;
 use audience::Audience;
+use link::Link;
 use operator::ForOperator;
 use surgeon::ForSurgeon;
 
@@ -59,6 +63,8 @@ enum Said {
     Drawn { frame: u64 },
     /// Whether the page can be seen.
     Visible { visible: bool },
+    /// The whole picture, parts outside the view included, covers so many pixels of the screen from left to right.
+    Screen { width: u32 },
 }
 
 /// A text message to a page.
@@ -104,13 +110,27 @@ async fn attend<A: Audience>(mut socket: WebSocket, app: AppState) {
 /// The page has left.
 struct Left;
 
+/// A frame on its way.
+struct InFlight {
+    number: u64,
+    sent_at: Moment,
+}
+
 /// The connection to one page: what is known of it, and what it must still be sent.
 struct Desk<A: Audience> {
     app: AppState,
     /// Set while the page can be seen.
     watcher: Option<Watcher>,
     /// The frame sent and not yet drawn.
-    in_flight: Option<u64>,
+    in_flight: Option<InFlight>,
+    /// The last frame sent: those of a larger size take longer, and none may follow a later one.
+    last: u64,
+    /// Width in cells of the last frame sent, and pixels of the screen that it covers; none before they are known.
+    cells: Option<usize>,
+    screen: Option<u32>,
+    link: Link,
+    /// When a frame of a larger size must have come.
+    due: Instant,
     sessions: watch::Receiver<Option<Arc<A::Session>>>,
     statuses: watch::Receiver<Arc<ControlStatus>>,
     /// The last status sent, so that only changes are sent.
@@ -134,8 +154,13 @@ impl<A: Audience> Desk<A> {
         statuses.mark_changed();
 
         Self {
-            watcher: Some(app.live.watch()),
+            watcher: Some(app.live.watch(Size::Cell)),
             in_flight: None,
+            last: 0,
+            cells: None,
+            screen: None,
+            link: Link::new(app.live.largest(), app.clock.now()),
+            due: Instant::now() + link::PATIENCE,
             sessions,
             statuses,
             told: None,
@@ -162,7 +187,11 @@ impl<A: Audience> Desk<A> {
                 },
                 Ok(()) = self.sessions.changed() => self.session(),
                 Ok(()) = self.statuses.changed() => self.status(),
-                frame = next_frame(&mut self.watcher), if self.in_flight.is_none() => self.frame(frame.as_deref()),
+                next = next_frame(&mut self.watcher, self.due), if self.in_flight.is_none() => match next {
+                    Next::Frame(frame) => self.frame(&frame),
+                    Next::Ended => { self.watcher = None; None }
+                    Next::Missed => { self.link.missed(self.app.clock.now()); self.follow_link(); None }
+                },
                 _ = self.heartbeat.tick() => self.beat()?,
             };
 
@@ -182,17 +211,46 @@ impl<A: Audience> Desk<A> {
         };
 
         match serde_json::from_str(text) {
-            Ok(Said::Drawn { frame }) if self.in_flight == Some(frame) => self.in_flight = None,
-            Ok(Said::Drawn { .. }) => {}
+            Ok(Said::Drawn { frame }) => self.drawn(frame),
             Ok(Said::Visible { visible: false }) => self.watcher = None,
             Ok(Said::Visible { visible: true }) => {
                 self.in_flight = None;
-                self.watcher.get_or_insert_with(|| self.app.live.watch());
+                self.due = Instant::now() + link::PATIENCE;
+                self.watcher.get_or_insert_with(|| self.app.live.watch(self.link.size()));
+            }
+            Ok(Said::Screen { width }) => {
+                self.screen = Some(width);
+                self.look_at_screen();
             }
             Err(_) => return Ok(Some(close(close_code::POLICY, "this is no message of a page"))),
         }
 
         Ok(None)
+    }
+
+    /// The page has drawn `frame`, and gets the next.
+    fn drawn(&mut self, frame: u64) {
+        let Some(sent) = self.in_flight.take_if(|sent| sent.number == frame) else { return };
+        let now = self.app.clock.now();
+        self.link.drawn(now, now.since(sent.sent_at));
+        self.due = Instant::now() + link::PATIENCE;
+        self.follow_link();
+    }
+
+    fn look_at_screen(&mut self) {
+        if let Some((width, cells)) = self.screen.zip(self.cells) {
+            self.link.screen(width, cells);
+            self.follow_link();
+        }
+    }
+
+    /// Joins the viewers of the size that suits the page now.
+    fn follow_link(&mut self) {
+        let size = self.link.size();
+        if let Some(watcher) = self.watcher.as_mut().filter(|watcher| watcher.size() != size) {
+            *watcher = self.app.live.watch(size);
+            self.due = Instant::now() + link::PATIENCE;
+        }
     }
 
     fn session(&mut self) -> Option<Message> {
@@ -213,18 +271,26 @@ impl<A: Audience> Desk<A> {
         message
     }
 
-    fn frame(&mut self, frame: Option<&EncodedFrame>) -> Option<Message> {
-        let Some(frame) = frame else {
-            self.watcher = None;
+    fn frame(&mut self, frame: &EncodedFrame) -> Option<Message> {
+        let picture = &frame.picture;
+        if picture.number <= self.last {
             return None;
-        };
+        }
 
-        let age = self.app.clock.now().since(frame.picture.exposed_at);
-        let message = pack(&A::header(frame, tenth_millis(age), &self.app), &frame.picture.jpeg)?;
+        let now = self.app.clock.now();
+        let age = now.since(picture.exposed_at);
+        let message = pack(&A::header(frame, tenth_millis(age), &self.app), &picture.jpeg)?;
 
-        self.in_flight = Some(frame.picture.number);
+        self.last = picture.number;
+        self.in_flight = Some(InFlight { number: picture.number, sent_at: now });
         self.app.metrics.frames_sent.inc();
         self.app.metrics.bytes_sent.inc_by(message.len() as u64);
+
+        let cells = Some(picture.width / picture.per_cell);
+        if self.cells != cells {
+            self.cells = cells;
+            self.look_at_screen();
+        }
         Some(Message::Binary(message))
     }
 
@@ -239,11 +305,28 @@ impl<A: Audience> Desk<A> {
     }
 }
 
-/// Waits for the next frame of a visible page; waits forever for a hidden one.
-async fn next_frame(watcher: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
-    match watcher {
-        Some(watcher) => watcher.next().await,
-        None => std::future::pending().await,
+/// What comes of waiting for a frame.
+enum Next {
+    Frame(Arc<EncodedFrame>),
+    /// None of this size came in time.
+    Missed,
+    /// None will come any more.
+    Ended,
+}
+
+/// Waits for the next frame of a visible page; waits forever for a hidden one. One of a larger size must come
+/// until `due`.
+async fn next_frame(watcher: &mut Option<Watcher>, due: Instant) -> Next {
+    let Some(watcher) = watcher else { return std::future::pending().await };
+    let next = match watcher.size() {
+        Size::Cell => Ok(watcher.next().await),
+        Size::Half | Size::Full => timeout_at(due, watcher.next()).await,
+    };
+
+    match next {
+        Ok(Some(frame)) => Next::Frame(frame),
+        Ok(None) => Next::Ended,
+        Err(_) => Next::Missed,
     }
 }
 

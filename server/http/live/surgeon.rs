@@ -26,20 +26,22 @@ pub(super) struct SurgeonFrame {
     run: i64,
     /// Milliseconds from the end of the exposure to sending; in whole hundreds for who must not know the policy.
     age: f64,
-    /// Width in pixels.
+    /// Width of the picture in pixels.
     width: usize,
-    /// Height in pixels.
+    /// Height of the picture in pixels.
     height: usize,
+    /// Pixels of the picture along each side of a mosaic cell: 1, 2 or 4.
+    per_cell: usize,
     /// Whether the colours are estimated from bands that hold no red.
     estimated: bool,
-    /// Where the focus is looked for.
+    /// Where the focus is looked for, in cells.
     #[schema(value_type = Object)]
     patch: PatchArea,
-    /// The bright circle, if one is seen.
+    /// The bright circle, in cells, if one is seen.
     area: Option<Circle>,
 }
 
-/// A circle in pixels of the picture.
+/// A circle in mosaic cells.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub(super) struct Circle {
     x: f64,
@@ -56,6 +58,7 @@ impl SurgeonFrame {
             age,
             width: picture.width,
             height: picture.height,
+            per_cell: picture.per_cell,
             estimated: picture.estimated,
             patch: picture.patch,
             area: picture.content_area.map(|area| Circle { x: area.x, y: area.y, radius: area.radius }),

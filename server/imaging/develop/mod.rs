@@ -55,6 +55,12 @@ impl Developer {
         }
     }
 
+    /// What makes pictures of one value a cell, by the same calibration.
+    #[must_use]
+    pub const fn reconstructor(&self) -> &Reconstructor {
+        &self.reconstructor
+    }
+
     /// Makes the picture of `mosaic` at `size` into `rgb` (sRGB), and the gray picture of its cells
     /// (0..=255) into `gray`; resizes both as needed.
     ///
@@ -62,6 +68,10 @@ impl Developer {
     /// sample counts as at most twice as bright as white. References per pixel apply to mosaics of
     /// their own size, as for [`Reconstructor::reconstruct`].
     pub fn develop(&mut self, mosaic: &MosaicFrame, size: Size, rgb: &mut RgbImage, gray: &mut GrayImage) {
+        if size == Size::Cell {
+            return self.reconstructor.reconstruct(mosaic, rgb, gray);
+        }
+
         (rgb.width, rgb.height) = size.of(mosaic);
         rgb.data.resize(3 * rgb.width * rgb.height, 0);
 

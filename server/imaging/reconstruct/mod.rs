@@ -7,6 +7,8 @@ mod mix;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use multiversion::multiversion;
 
 use super::calibration::{BANDS, Calibration};
@@ -26,8 +28,9 @@ use mix::Mix;
 #[derive(Debug, Clone)]
 pub struct Reconstructor {
     of_counts: Mixes,
-    /// For references per pixel: the balance, and the mixes for the balanced samples.
-    of_balanced: Option<(PixelBalance, Mixes)>,
+    /// For references per pixel: the balance, which clones share for it is large, and the mixes for the
+    /// balanced samples.
+    of_balanced: Option<(Arc<PixelBalance>, Mixes)>,
     encoder: Encoder,
     lines: Lines,
 }
@@ -68,7 +71,7 @@ impl Reconstructor {
     pub fn new(calibration: &Calibration) -> Self {
         let weights = weights(calibration);
         let mixes = |dark, white| Mixes::new(weights, dark, white);
-        let balanced = |balance| (balance, mixes(&[balance::DARK; BANDS], &[balance::WHITE; BANDS]));
+        let balanced = |balance| (Arc::new(balance), mixes(&[balance::DARK; BANDS], &[balance::WHITE; BANDS]));
 
         Self {
             of_counts: mixes(&calibration.dark.band_means(), &calibration.white.band_means()),
@@ -111,7 +114,7 @@ impl Reconstructor {
 
     /// The balance by references per pixel, where there are some and they are of the size of `mosaic`.
     pub(super) fn pixel_balance(&self, mosaic: &MosaicFrame) -> Option<&PixelBalance> {
-        self.of_balanced.as_ref().map(|(balance, _)| balance).filter(|balance| balance.fits(mosaic))
+        self.of_balanced.as_ref().map(|(balance, _)| balance.as_ref()).filter(|balance| balance.fits(mosaic))
     }
 
     /// The encoding of linear colours.
@@ -190,7 +193,7 @@ fn rows_of_counts(
 
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn rows_of_balanced(
-    (balance, mixes): &(PixelBalance, Mixes),
+    (balance, mixes): &(Arc<PixelBalance>, Mixes),
     mosaic: &MosaicFrame,
     first: usize,
     encoder: &Encoder,

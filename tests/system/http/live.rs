@@ -199,7 +199,7 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
     let server = Server::start();
     let mut surgeon = Page::open(&server, "surgeon").await;
     let frame = surgeon.frame().await;
-    assert_eq!(frame.fields(), ["age", "area", "estimated", "frame", "height", "patch", "run", "width"]);
+    assert_eq!(frame.fields(), ["age", "area", "estimated", "frame", "height", "patch", "per_cell", "run", "width"]);
     assert!(frame.header["age"].as_f64().unwrap() % 100.0 == 0.0, "finer, it would hold the policy's own time");
     surgeon.sent_so_far().await;
     let told = surgeon.told();

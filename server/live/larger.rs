@@ -1,0 +1,98 @@
+//! The thread that makes the pictures of one larger size, while someone looks at them. It takes the latest
+//! frame whenever it is done with one, so neither the smallest size nor the loop waits for it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::outlet::Outlet;
+use super::studio::Studio;
+use crate::clock::Moment;
+use crate::control::{ControlledFrame, LatestSlot};
+use crate::imaging::{Developer, Size};
+
+/// Longest wait for a frame before checking whether more will come.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Exposures of two pictures at [`Size::Full`] lie at least so far apart: 25 a second. Made as fast as one
+/// thread can, they would keep a core busy for little, and their rate would depend on what else the
+/// machine does, such as asking a policy.
+const FULL_INTERVAL: Duration = Duration::from_millis(38);
+
+/// A larger size's thread; ends when dropped.
+pub(super) struct Larger {
+    slot: Arc<LatestSlot<ControlledFrame>>,
+    outlet: Outlet,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Larger {
+    /// Starts the thread for `size`, whose pictures leave by `outlet`.
+    ///
+    /// # Errors
+    /// When the system cannot make a thread or an encoder.
+    pub(super) fn start(developer: Developer, size: Size, outlet: Outlet) -> std::io::Result<Self> {
+        let slot = Arc::<LatestSlot<ControlledFrame>>::default();
+        let studio = Studio::new(developer, size).map_err(std::io::Error::other)?;
+        let worker = Worker { slot: Arc::clone(&slot), outlet: outlet.clone(), studio, last: None };
+
+        let name = format!("imaging-{}", size.name());
+        let thread = std::thread::Builder::new().name(name).spawn(move || worker.run())?;
+        Ok(Self { slot, outlet, thread: Some(thread) })
+    }
+
+    /// Hands `frame` over if someone looks; never waits.
+    pub(super) fn offer(&self, frame: &ControlledFrame) {
+        if self.outlet.is_watched() {
+            self.slot.put(frame.clone());
+        }
+    }
+}
+
+impl Drop for Larger {
+    fn drop(&mut self) {
+        self.slot.close();
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+struct Worker {
+    slot: Arc<LatestSlot<ControlledFrame>>,
+    outlet: Outlet,
+    studio: Studio,
+    /// Exposure of the last frame made.
+    last: Option<Moment>,
+}
+
+impl Worker {
+    fn run(mut self) {
+        crate::priority::lower_further();
+        while !self.slot.is_closed() {
+            let Some(frame) = self.slot.take(PATIENCE) else { continue };
+            if !self.is_due(&frame) {
+                continue;
+            }
+
+            // One bad picture must not end the live view.
+            if catch_unwind(AssertUnwindSafe(|| self.make(frame))).is_err() {
+                tracing::error!("a larger picture could not be made; going on with the next");
+            }
+        }
+    }
+
+    fn is_due(&self, frame: &ControlledFrame) -> bool {
+        let exposed = frame.frame.exposed_at;
+        let early = |last| self.studio.size() == Size::Full && exposed.since(last) < FULL_INTERVAL;
+        !self.last.is_some_and(early)
+    }
+
+    fn make(&mut self, frame: ControlledFrame) {
+        self.last = Some(frame.frame.exposed_at);
+        self.studio.develop(&frame.frame.image);
+        match self.studio.encode(frame) {
+            Ok(frame) => self.outlet.publish(frame),
+            Err(error) => tracing::error!(%error, "a larger picture could not be encoded"),
+        }
+    }
+}

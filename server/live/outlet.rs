@@ -1,0 +1,37 @@
+//! Where the pictures of one size leave for their viewers.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use tokio::sync::watch;
+
+use super::{Counts, EncodedFrame};
+use crate::imaging::Size;
+
+/// The sending end of a size's pictures.
+#[derive(Clone)]
+pub(super) struct Outlet {
+    size: Size,
+    sender: watch::Sender<Option<Arc<EncodedFrame>>>,
+    counts: Arc<Counts>,
+}
+
+impl Outlet {
+    /// The outlet of `size`, which counts in `counts`.
+    pub(super) const fn new(size: Size, sender: watch::Sender<Option<Arc<EncodedFrame>>>, counts: Arc<Counts>) -> Self {
+        Self { size, sender, counts }
+    }
+
+    /// Whether someone looks at this size.
+    pub(super) fn is_watched(&self) -> bool {
+        self.counts.of(self.size).viewers.load(Ordering::Relaxed) > 0
+    }
+
+    /// Hands `frame` to all viewers.
+    pub(super) fn publish(&self, frame: EncodedFrame) {
+        let counts = self.counts.of(self.size);
+        counts.encoded.fetch_add(1, Ordering::Relaxed);
+        counts.jpeg_bytes.fetch_add(frame.picture.jpeg.len() as u64, Ordering::Relaxed);
+        self.sender.send_replace(Some(Arc::new(frame)));
+    }
+}
