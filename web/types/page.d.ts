@@ -88,6 +88,8 @@ declare global {
       age: number;
       width: number;
       height: number;
+      /** Pixels of the picture along each side of a mosaic cell; patch and area are in cells. */
+      per_cell: number;
       estimated: boolean;
       patch: Patch;
       area: Circle | null;

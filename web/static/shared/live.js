@@ -5,6 +5,9 @@ import { Reconnection } from "./reconnection.js";
 
 const LOOK_MS = 1000;
 
+/** How long the server may learn later how large the picture is on the screen: while it is pinched, it changes. */
+const SCREEN_MS = 150;
+
 /**
  * What a page hears. A picture is to be drawn before `frame` returns.
  *
@@ -22,6 +25,10 @@ export class Live {
   /** @type {WebSocket | null} */
   #socket = null;
   #reconnection = new Reconnection();
+  /** Screen pixels that the picture covers. @type {number | null} */
+  #screen = null;
+  /** Whether the server will be told soon. */
+  #screenWaits = false;
 
   /** @param {"surgeon" | "operator" | "researcher"} role */
   constructor(role) {
@@ -40,6 +47,23 @@ export class Live {
   /** @param {Listener} listener */
   listen(listener) {
     this.#listeners.push(listener);
+  }
+
+  /**
+   * The whole picture covers `width` pixels of the screen from left to right: the server sends pictures
+   * of a size to suit.
+   *
+   * @param {number} width
+   */
+  tellScreen(width) {
+    if (width === this.#screen) return;
+    this.#screen = width;
+    if (this.#screenWaits) return;
+    this.#screenWaits = true;
+    setTimeout(() => {
+      this.#screenWaits = false;
+      this.#sendScreen();
+    }, SCREEN_MS);
   }
 
   #isSilent() {
@@ -71,6 +95,7 @@ export class Live {
       if (socket !== this.#socket) return;
       this.#reconnection.opened();
       this.#tellVisibility();
+      this.#sendScreen();
       this.#tellConnection(true);
     };
     socket.onmessage = ({ data }) => {
@@ -117,6 +142,10 @@ export class Live {
 
   #tellVisibility() {
     if (this.#socket) send(this.#socket, { type: "visible", visible: !document.hidden });
+  }
+
+  #sendScreen() {
+    if (this.#socket && this.#screen !== null) send(this.#socket, { type: "screen", width: this.#screen });
   }
 
   /** @param {boolean} open */

@@ -1,5 +1,5 @@
-// What is drawn on the picture. `scale` is screen pixels per picture pixel, `line` a line's width
-// in screen pixels.
+// What is drawn on the picture. `scale` is screen pixels per mosaic cell, `line` a line's width in
+// screen pixels.
 
 import { contextOf } from "./canvas.js";
 import { markDetail } from "./peaking.js";
@@ -10,7 +10,7 @@ const AREA_COLOUR = "#ffffff";
 /** Wider pictures are searched for detail at this width, to stay cheap. */
 const PEAKING_WIDTH = 640;
 
-/** Pixels at the edge of the content area that are not searched: the edge itself is sharp. */
+/** Cells at the edge of the content area that are not searched: the edge itself is sharp. */
 const PEAKING_MARGIN = 8;
 
 /**
@@ -85,20 +85,23 @@ export class Peaking {
   #marks = contextOf(document.createElement("canvas"));
 
   /**
-   * Searches a new picture; `area`, if there is one, is the circle outside which there is nothing
-   * to see.
+   * Searches a new picture of `cells`, always at the size of the cells: what counts as sharp does not
+   * depend on the size that the server sends. `area`, if there is one, is the circle outside which there
+   * is nothing to see.
    *
    * @param {ImageBitmap} bitmap
+   * @param {import("./fit.js").Extent} cells
    * @param {Stream.Circle | null} area
    */
-  look(bitmap, area) {
-    const scale = Math.min(1, PEAKING_WIDTH / bitmap.width);
-    const width = Math.round(bitmap.width * scale);
-    const height = Math.round(bitmap.height * scale);
+  look(bitmap, cells, area) {
+    const scale = Math.min(1, PEAKING_WIDTH / cells.width);
+    const width = Math.round(cells.width * scale);
+    const height = Math.round(cells.height * scale);
     for (const { canvas } of [this.#reader, this.#marks]) {
       if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     }
 
+    this.#reader.imageSmoothingQuality = "high";
     this.#reader.drawImage(bitmap, 0, 0, width, height);
     const { data } = this.#reader.getImageData(0, 0, width, height);
     const marks = this.#marks.createImageData(width, height);

@@ -2,8 +2,11 @@
 
 import { makeCanvas, onResize, pixelsPerCss } from "./canvas.js";
 import { make, setText } from "./dom.js";
+import { Fit } from "./fit.js";
+import { Framing } from "./framing.js";
 import { Live } from "./live.js";
 import { drawContentArea, drawPatch, Peaking } from "./overlay.js";
+import { followZooming } from "./zooming.js";
 
 /** @typedef {"patch" | "content-area" | "peaking"} Overlay */
 
@@ -26,6 +29,9 @@ export class Viewer {
     { className: "viewer-colour", hidden: true },
     "Estimated colours: the camera measures no red light.",
   );
+  #unzoom = make("button", { type: "button", className: "viewer-unzoom", hidden: true });
+  #fit = new Fit({ glides: !matchMedia("(prefers-reduced-motion: reduce)").matches });
+  #framing = new Framing();
   /** @type {Set<string>} */
   #shown = new Set();
   #peaking = new Peaking();
@@ -41,8 +47,30 @@ export class Viewer {
     this.#element = element;
     this.#picture.canvas.setAttribute("role", "img");
     this.#picture.canvas.setAttribute("aria-label", "Live view");
-    element.append(this.#picture.canvas, this.#overlay.canvas, this.#colour, this.#stale, this.#heard);
-    onResize(this.#overlay.canvas, () => this.#drawOverlays());
+    element.append(
+      this.#picture.canvas,
+      this.#overlay.canvas,
+      this.#colour,
+      this.#unzoom,
+      this.#stale,
+      this.#heard,
+    );
+    element.tabIndex = 0;
+    element.setAttribute("role", "group");
+    element.setAttribute("aria-label", "Live view. Plus and minus zoom, zero shows everything.");
+
+    onResize(this.#overlay.canvas, () => {
+      const { canvas } = this.#overlay;
+      const box = { width: canvas.clientWidth, height: canvas.clientHeight };
+      this.#framing.resize(box, pixelsPerCss(canvas));
+      this.#place();
+    });
+    followZooming(element, this.#framing, () => this.#place());
+    this.#unzoom.onclick = () => {
+      this.#framing.reset();
+      this.#place();
+      element.focus({ preventScroll: true });
+    };
 
     this.live = new Live(role);
     this.live.listen({
@@ -85,17 +113,42 @@ export class Viewer {
 
   /** @param {Stream.Frame} frame */
   #show({ header, bitmap, receivedAt }) {
+    // The picture's size in pixels may change from one to the next; its place on the page does not.
     const { canvas } = this.#picture;
-    if (canvas.width !== header.width || canvas.height !== header.height) {
-      Object.assign(canvas, { width: header.width, height: header.height });
-    }
-    this.#picture.drawImage(bitmap, 0, 0, header.width, header.height);
+    const { width, height } = bitmap;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    this.#picture.drawImage(bitmap, 0, 0);
     this.#last = { header, receivedAt };
 
-    if (this.#shown.has("peaking")) this.#peaking.look(bitmap, header.area);
-    this.#drawOverlays();
+    const cells = cellsOf(header);
+    this.#framing.show(cells, this.#fit.see(cells, header.area, receivedAt));
+    if (this.#shown.has("peaking")) this.#peaking.look(bitmap, cells, header.area);
+    this.#place();
+
     this.#colour.hidden = !header.estimated;
     if (!this.#stale.hidden) this.#tellAge();
+  }
+
+  /** Puts the picture where it is to stand, and all that depends on it. */
+  #place() {
+    if (!this.#last) return;
+    const { left, top, scale } = this.#framing.place;
+    const { width, height } = cellsOf(this.#last.header);
+    Object.assign(this.#picture.canvas.style, {
+      left: `${left}px`,
+      top: `${top}px`,
+      width: `${width * scale}px`,
+      height: `${height * scale}px`,
+    });
+
+    const { zoom } = this.#framing;
+    const isZoomed = zoom > 1.005;
+    if (isZoomed) setText(this.#unzoom, `${zoom.toFixed(1)}× · Show everything`);
+    this.#unzoom.hidden = !isZoomed;
+    this.#element.classList.toggle("viewer-is-zoomed", isZoomed);
+
+    this.live.tellScreen(this.#framing.screenWidth);
+    this.#drawOverlays();
   }
 
   #drawOverlays() {
@@ -103,19 +156,21 @@ export class Viewer {
     const { width, height } = context.canvas;
     context.resetTransform();
     context.clearRect(0, 0, width, height);
-    if (!this.#last) return;
+    if (!this.#last || this.#shown.size === 0) return;
 
-    // The picture keeps its shape within the element; the overlay lies on the picture.
     const { header } = this.#last;
-    const scale = Math.min(width / header.width, height / header.height);
-    context.translate((width - header.width * scale) / 2, (height - header.height * scale) / 2);
+    const density = pixelsPerCss(context.canvas);
+    const { left, top, scale } = this.#framing.place;
+    const pixels = scale * density;
+    const line = 1.5 * density;
+    context.translate(left * density, top * density);
 
-    const line = 1.5 * pixelsPerCss(context.canvas);
     if (this.#shown.has("peaking")) {
-      this.#peaking.draw(context, header.width * scale, header.height * scale);
+      const cells = cellsOf(header);
+      this.#peaking.draw(context, cells.width * pixels, cells.height * pixels);
     }
-    if (this.#shown.has("content-area") && header.area) drawContentArea(context, header.area, scale, line);
-    if (this.#shown.has("patch")) drawPatch(context, header.patch, scale, line);
+    if (this.#shown.has("content-area") && header.area) drawContentArea(context, header.area, pixels, line);
+    if (this.#shown.has("patch")) drawPatch(context, header.patch, pixels, line);
   }
 
   #tellAge() {
@@ -130,6 +185,15 @@ export class Viewer {
     this.#stale.hidden = !isStale;
     if (isStale) setText(this.#stale, staleText(age, this.#connected));
   }
+}
+
+/**
+ * A picture's extent in mosaic cells, in which places on it are told.
+ *
+ * @param {Stream.Header} header
+ */
+function cellsOf({ width, height, per_cell: perCell }) {
+  return { width: width / perCell, height: height / perCell };
 }
 
 /**

@@ -26,5 +26,6 @@ export function showPanel(content) {
   panel.scrollTop = 0;
 
   const heading = panel.querySelector("h2");
-  if (heading && document.activeElement === document.body) heading.focus();
+  const active = document.activeElement;
+  if (heading && (active === document.body || active === byId("view"))) heading.focus();
 }

@@ -1,0 +1,131 @@
+// The part of the picture that the view is fitted to: the bright circle, not the dark sides of the
+// sensor. It stays where it is while the circle trembles or is lost for a while, whatever the focus does.
+
+/** @typedef {{ width: number, height: number }} Extent */
+/** @typedef {{ x: number, y: number, width: number, height: number }} Region */
+
+/** Shown around the circle, in parts of its radius. */
+const MARGIN = 0.03;
+
+/** The circle is fitted anew once it has moved or grown by more than this part of its radius ... */
+const MOVED = 0.08;
+/** ... to a place that later pictures agree on, to this part of the radius, ... */
+const AGREED = 0.04;
+/** ... for so long. */
+const LASTING_MS = 1000;
+
+/** The view then glides there: after so long, 63 % of the way is left behind. */
+const GLIDE_MS = 150;
+/** Cells by which a glide may be off when it ends. */
+const THERE = 0.25;
+
+/** Follows the bright circle. Lengths in mosaic cells, from the picture's upper left corner. */
+export class Fit {
+  #glides;
+  /** @type {Extent | null} */
+  #cells = null;
+  /** @type {Stream.Circle | null} */
+  #circle = null;
+  /** A circle elsewhere, and since when it has been seen. @type {{ circle: Stream.Circle, since: number } | null} */
+  #doubted = null;
+  /** @type {Region} */
+  #target = { x: 0, y: 0, width: 1, height: 1 };
+  #region = this.#target;
+  #seenAt = 0;
+
+  /** @param {{ glides: boolean }} options whether the view may glide; else it jumps */
+  constructor({ glides }) {
+    this.#glides = glides;
+  }
+
+  /**
+   * Takes in a picture of `cells`, with its circle, if one is seen, at `now` (milliseconds); gives the
+   * part to show.
+   *
+   * @param {Extent} cells
+   * @param {Stream.Circle | null} circle
+   * @param {number} now
+   * @returns {Region}
+   */
+  see(cells, circle, now) {
+    if (this.#cells?.width !== cells.width || this.#cells.height !== cells.height) {
+      this.#cells = cells;
+      this.#doubted = null;
+      this.#fitTo(circle);
+      this.#region = this.#target;
+    } else if (circle && this.#hasMovedTo(circle, now)) {
+      this.#fitTo(circle);
+    }
+
+    this.#glide(now - this.#seenAt);
+    this.#seenAt = now;
+    return this.#region;
+  }
+
+  /**
+   * Whether the circle stands elsewhere by now.
+   *
+   * @param {Stream.Circle} circle
+   * @param {number} now
+   */
+  #hasMovedTo(circle, now) {
+    if (this.#circle && distance(this.#circle, circle) <= MOVED * this.#circle.radius) {
+      this.#doubted = null;
+      return false;
+    }
+
+    const agreed = this.#doubted && distance(this.#doubted.circle, circle) <= AGREED * circle.radius;
+    if (!this.#doubted || !agreed) this.#doubted = { circle, since: now };
+    return now - this.#doubted.since >= LASTING_MS;
+  }
+
+  /** @param {Stream.Circle | null} circle */
+  #fitTo(circle) {
+    this.#circle = circle;
+    this.#doubted = null;
+    if (this.#cells) this.#target = around(circle, this.#cells);
+  }
+
+  /** @param {number} ms since the last picture */
+  #glide(ms) {
+    const left = this.#glides ? Math.exp(-ms / GLIDE_MS) : 0;
+    const toward = (/** @type {number} */ from, /** @type {number} */ to) => to + (from - to) * left;
+    const [from, to] = [this.#region, this.#target];
+    const region = {
+      x: toward(from.x, to.x),
+      y: toward(from.y, to.y),
+      width: toward(from.width, to.width),
+      height: toward(from.height, to.height),
+    };
+
+    const off = Math.abs(region.x - to.x) + Math.abs(region.y - to.y) + Math.abs(region.width - to.width);
+    this.#region = off < THERE ? to : region;
+  }
+}
+
+/**
+ * The part of a picture that holds `circle`; all of it where there is none.
+ *
+ * @param {Stream.Circle | null} circle
+ * @param {Extent} cells
+ * @returns {Region}
+ */
+function around(circle, cells) {
+  const whole = { x: 0, y: 0, ...cells };
+  if (!circle) return whole;
+
+  const reach = circle.radius * (1 + MARGIN);
+  const x = Math.max(0, circle.x - reach);
+  const y = Math.max(0, circle.y - reach);
+  const width = Math.min(cells.width, circle.x + reach) - x;
+  const height = Math.min(cells.height, circle.y + reach) - y;
+  return width > 0 && height > 0 ? { x, y, width, height } : whole;
+}
+
+/**
+ * @param {Stream.Circle} a
+ * @param {Stream.Circle} b
+ */
+function distance(a, b) {
+  return Math.max(Math.hypot(a.x - b.x, a.y - b.y), Math.abs(a.radius - b.radius));
+}

@@ -1,0 +1,74 @@
+// Brings what is done on an element, by fingers, mouse, wheel or keys, to the framing of its picture.
+
+import { Gestures } from "./gestures.js";
+
+/** A key zooms by this factor, and moves by this part of the box. */
+const KEY_ZOOM = 1.25;
+const KEY_MOVE = 0.1;
+
+/** What a CSS pixel of the wheel, a line and a page zoom by; a pinch on a touchpad comes as a wheel with Ctrl. */
+const WHEEL = 0.0015;
+const TOUCHPAD_PINCH = 0.01;
+const LINE = 40;
+const PAGE = 400;
+
+/** @type {Record<string, [number, number]>} */
+const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+/**
+ * Lets people zoom `framing` on `element`; `changed` is called after each change.
+ *
+ * @param {HTMLElement} element
+ * @param {import("./framing.js").Framing} framing
+ * @param {() => void} changed
+ */
+export function followZooming(element, framing, changed) {
+  const gestures = new Gestures(framing);
+  const pointOf = (/** @type {MouseEvent} */ event) => {
+    const box = element.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  };
+
+  element.addEventListener("pointerdown", (event) => {
+    const onButton = event.target instanceof Element && event.target.closest("button");
+    if (onButton || (event.pointerType === "mouse" && event.button !== 0)) return;
+    // A finger that leaves the element still drags.
+    element.setPointerCapture(event.pointerId);
+    gestures.down(event.pointerId, pointOf(event), event.timeStamp);
+  });
+  element.addEventListener("pointermove", (event) => {
+    gestures.move(event.pointerId, pointOf(event));
+    changed();
+  });
+  element.addEventListener("pointerup", (event) => {
+    gestures.up(event.pointerId, pointOf(event), event.timeStamp);
+    changed();
+  });
+  element.addEventListener("pointercancel", (event) => gestures.cancel(event.pointerId));
+
+  const wheel = (/** @type {WheelEvent} */ event) => {
+    const unit = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? LINE : event.deltaMode ? PAGE : 1;
+    const before = framing.zoom;
+    framing.zoomBy(Math.exp(-event.deltaY * unit * (event.ctrlKey ? TOUCHPAD_PINCH : WHEEL)), pointOf(event));
+
+    // What does not zoom scrolls the page.
+    if (event.ctrlKey || framing.zoom !== before) event.preventDefault();
+    changed();
+  };
+  element.addEventListener("wheel", wheel, { passive: false });
+
+  element.addEventListener("keydown", (event) => {
+    if (event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
+    const arrow = framing.zoom > 1 ? ARROWS[event.key] : undefined;
+
+    if (event.key === "+" || event.key === "=") framing.zoomBy(KEY_ZOOM);
+    else if (event.key === "-") framing.zoomBy(1 / KEY_ZOOM);
+    else if (event.key === "0") framing.reset();
+    else if (arrow) {
+      framing.moveBy(arrow[0] * KEY_MOVE * element.clientWidth, arrow[1] * KEY_MOVE * element.clientHeight);
+    } else return;
+
+    event.preventDefault();
+    changed();
+  });
+}
