@@ -249,6 +249,7 @@ impl<A: Audience> Desk<A> {
         let size = self.link.size();
         if let Some(watcher) = self.watcher.as_mut().filter(|watcher| watcher.size() != size) {
             *watcher = self.app.live.watch(size);
+            tracing::debug!(size = size.name(), "a viewer's pictures change size");
             self.due = Instant::now() + link::PATIENCE;
         }
     }

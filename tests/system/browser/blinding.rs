@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 43] = [
+const KEYS: [&str; 44] = [
     "age",
     "answers",
     "area",
@@ -50,6 +50,7 @@ const KEYS: [&str; 43] = [
     "optional",
     "patch",
     "paused",
+    "per_cell",
     "phase",
     "points",
     "practice",

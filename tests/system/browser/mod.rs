@@ -18,6 +18,7 @@ mod scripts;
 mod tabs;
 mod theatre;
 mod trial;
+mod view;
 mod wait;
 mod wire;
 mod writing;

@@ -24,7 +24,12 @@ pub async fn shoot(browser: &Browser, name: &str) {
 
 /// Gives the page this size, as a turned tablet or its keyboard does, and waits until it is drawn.
 pub async fn resize(browser: &Browser, width: u32, height: u32) {
-    let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+    set_screen(browser, width, height, 1).await;
+}
+
+/// The same on a screen of `density` pixels per CSS pixel.
+pub async fn set_screen(browser: &Browser, width: u32, height: u32, density: u32) {
+    let size = json!({ "width": width, "height": height, "deviceScaleFactor": density, "mobile": false });
     browser.tools("Emulation.setDeviceMetricsOverride", size).await;
     // Two frames: one in which the page lays itself out anew, one in which what watches its size has drawn.
     let drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))";
