@@ -1,6 +1,8 @@
 //! The live stream: paced by its viewers, silent for hidden pages, and for surgeons without a trace
 //! of the policy.
 
+use std::net::SocketAddr;
+
 use futures_util::{SinkExt, StreamExt};
 use reqwest::header::AUTHORIZATION;
 use serde_json::{Value, json};
@@ -30,13 +32,16 @@ pub enum Heard {
 }
 
 /// A frame as a page gets it.
-struct Frame {
-    header: Value,
-    jpeg: Vec<u8>,
+pub struct Frame {
+    /// What came with the picture.
+    pub header: Value,
+    /// The picture.
+    pub jpeg: Vec<u8>,
 }
 
 impl Frame {
-    fn number(&self) -> u64 {
+    /// Its number.
+    pub fn number(&self) -> u64 {
         self.header["frame"].as_u64().unwrap()
     }
 
@@ -49,16 +54,23 @@ impl Frame {
 
 impl Page {
     pub async fn open(server: &Server, role: &str) -> Self {
-        let request = upgrade(server, &format!("/live?role={role}"), role);
+        Self::through(server.address, server, role).await
+    }
+
+    /// The same, through whatever listens on `address`.
+    pub async fn through(address: SocketAddr, server: &Server, role: &str) -> Self {
+        let mut request = upgrade(server, &format!("/live?role={role}"), role);
+        *request.uri_mut() = format!("ws://{address}/live?role={role}").parse().unwrap();
         Self { socket: connect_async(request).await.unwrap().0, heard: Vec::new() }
     }
 
-    async fn say(&mut self, message: Value) {
+    /// Sends a message.
+    pub async fn say(&mut self, message: Value) {
         self.socket.send(Message::text(message.to_string())).await.unwrap();
     }
 
     /// The next message other than a ping, waiting for it.
-    async fn message(&mut self) -> Message {
+    pub async fn message(&mut self) -> Message {
         let message = self.socket.next().await.unwrap().unwrap();
         match &message {
             Message::Text(text) => self.heard.push(Heard::Text(text.to_string())),
@@ -69,7 +81,7 @@ impl Page {
     }
 
     /// The next frame, waiting for it.
-    async fn frame(&mut self) -> Frame {
+    pub async fn frame(&mut self) -> Frame {
         loop {
             if let Message::Binary(frame) = self.message().await {
                 return unpack(&frame);
@@ -108,7 +120,8 @@ impl Page {
         }
     }
 
-    async fn drawn(&mut self, frame: &Frame) {
+    /// Tells that `frame` is drawn.
+    pub async fn drawn(&mut self, frame: &Frame) {
         self.say(json!({"type": "drawn", "frame": frame.number()})).await;
     }
 
@@ -121,6 +134,17 @@ impl Page {
                 Message::Binary(_) => frames += 1,
                 Message::Pong(payload) if payload == "so far" => return frames,
                 _ => {}
+            }
+        }
+    }
+
+    /// Draws frames until one fits, and gives that one.
+    pub async fn watch_until(&mut self, fits: impl Fn(&Value) -> bool) -> Frame {
+        loop {
+            let frame = self.frame().await;
+            self.drawn(&frame).await;
+            if fits(&frame.header) {
+                return frame;
             }
         }
     }

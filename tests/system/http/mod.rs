@@ -12,4 +12,5 @@ mod restart;
 mod roles;
 mod seed;
 mod service;
+mod sizes;
 mod stopping;

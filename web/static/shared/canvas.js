@@ -37,10 +37,28 @@ export function pixelsPerCss(canvas) {
  * @param {() => void} draw
  */
 export function onResize(canvas, draw) {
-  new ResizeObserver(() => {
-    const dpr = window.devicePixelRatio || 1;
-    canvas.width = Math.max(1, Math.round(canvas.clientWidth * dpr));
-    canvas.height = Math.max(1, Math.round(canvas.clientHeight * dpr));
+  const fit = () => {
+    const density = window.devicePixelRatio || 1;
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * density));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * density));
     draw();
-  }).observe(canvas);
+  };
+
+  new ResizeObserver(fit).observe(canvas);
+  onNewDensity(fit);
+}
+
+/**
+ * Calls `tell` when the screen has another number of pixels per CSS pixel, as after moving the window
+ * to another screen; nothing on the page need change its size then.
+ *
+ * @param {() => void} tell
+ */
+function onNewDensity(tell) {
+  const present = matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`);
+  const changed = () => {
+    tell();
+    onNewDensity(tell);
+  };
+  present.addEventListener("change", changed, { once: true });
 }

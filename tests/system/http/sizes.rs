@@ -1,0 +1,128 @@
+//! Each viewer gets pictures of the size that its screen and link can use; a size is made only while someone
+//! looks at it.
+
+#[path = "../../../benches/stream/link.rs"]
+mod link;
+
+use serde_json::json;
+use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
+
+use super::live::Page;
+use crate::support::Server;
+
+/// Few frames: the camera shares the machine with other tests.
+fn server() -> Server {
+    Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"])
+}
+
+/// The counter or gauge `name` of pictures of `size`.
+async fn count(server: &Server, name: &str, size: &str) -> u64 {
+    let text = server.get_as("operator", "/metrics").send().await.unwrap().text().await.unwrap();
+    let start = format!("parfocal_{name}{{size=\"{size}\"}} ");
+    let value = text.lines().find_map(|line| line.strip_prefix(&start)?.parse().ok());
+    value.unwrap_or_else(|| panic!("{start} in {text}"))
+}
+
+#[tokio::test]
+async fn a_size_is_made_only_while_someone_looks_at_it() {
+    let server = server();
+    let mut page = Page::open(&server, "surgeon").await;
+    page.watch(10).await;
+    for larger in ["half", "full"] {
+        assert_eq!(count(&server, "frames_encoded_total", larger).await, 0);
+    }
+
+    page.say(json!({"type": "screen", "width": 2360})).await;
+    page.watch_until(|header| header["per_cell"] == 4).await;
+    assert_eq!(count(&server, "viewers", "full").await, 1);
+    assert_eq!(count(&server, "viewers", "cell").await, 0);
+
+    page.say(json!({"type": "screen", "width": 500})).await;
+    page.watch_until(|header| header["per_cell"] == 1).await;
+    assert_eq!(count(&server, "viewers", "full").await, 0);
+
+    // One may have been in the making.
+    page.watch(5).await;
+    let made = count(&server, "frames_encoded_total", "full").await;
+    page.watch(10).await;
+    assert_eq!(count(&server, "frames_encoded_total", "full").await, made);
+}
+
+#[tokio::test]
+async fn a_size_is_made_once_for_all_who_look_at_it() {
+    let server = server();
+    let mut pages = [Page::open(&server, "surgeon").await, Page::open(&server, "operator").await];
+    for page in &mut pages {
+        page.say(json!({"type": "screen", "width": 1200})).await;
+        page.watch_until(|header| header["per_cell"] == 2).await;
+    }
+
+    let before = count(&server, "frames_encoded_total", "half").await;
+    let [surgeon, operator] = &mut pages;
+    let first = surgeon.frame().await;
+    surgeon.drawn(&first).await;
+    let (seen, _) = tokio::join!(
+        surgeon.watch_until(|header| header["frame"].as_u64() >= Some(first.number() + 20)),
+        operator.watch_until(|header| header["frame"].as_u64() >= Some(first.number() + 20))
+    );
+    let made = count(&server, "frames_encoded_total", "half").await - before;
+    assert!(made <= seen.number() - first.number() + 6, "{made} pictures of {} frames", seen.number() - first.number());
+}
+
+#[tokio::test]
+async fn a_larger_picture_tells_the_same_places_and_never_an_older_frame() {
+    let server = server();
+    let mut page = Page::open(&server, "surgeon").await;
+    let small = page.watch_until(|header| !header["area"].is_null()).await;
+    page.say(json!({"type": "screen", "width": 4000})).await;
+    let mut last = small.number();
+    let large = loop {
+        let frame = page.frame().await;
+        page.drawn(&frame).await;
+        assert!(frame.number() > last, "{} after {last}", frame.number());
+        last = frame.number();
+        if frame.header["per_cell"] == 4 {
+            break frame;
+        }
+    };
+
+    let picture = image::load_from_memory_with_format(&large.jpeg, image::ImageFormat::Jpeg).unwrap();
+    assert_eq!((picture.width(), picture.height()), (2048, 1088));
+    assert_eq!((&large.header["width"], &large.header["height"]), (&json!(2048), &json!(1088)));
+    assert_eq!(large.header["patch"], small.header["patch"]);
+    let radius = |header: &serde_json::Value| header["area"]["radius"].as_f64().unwrap();
+    assert!((radius(&large.header) - radius(&small.header)).abs() < 8.0, "both in cells");
+}
+
+#[tokio::test]
+async fn a_slow_link_keeps_the_small_pictures_that_it_carries() {
+    let server = server();
+    let address = link::slow(server.address, 400_000).await;
+    let mut slow = Page::through(address, &server, "surgeon").await;
+    slow.say(json!({"type": "screen", "width": 4000})).await;
+    for _ in 0..20 {
+        let frame = slow.frame().await;
+        slow.drawn(&frame).await;
+        assert_eq!(frame.header["per_cell"], 1);
+    }
+}
+
+#[tokio::test]
+async fn a_page_that_lies_about_its_screen_gets_the_largest_or_smallest_size_and_nonsense_a_reason() {
+    let server = server();
+    let mut page = Page::open(&server, "surgeon").await;
+    page.say(json!({"type": "screen", "width": u32::MAX})).await;
+    page.watch_until(|header| header["per_cell"] == 4).await;
+    page.say(json!({"type": "screen", "width": 0})).await;
+    page.watch_until(|header| header["per_cell"] == 1).await;
+
+    page.say(json!({"type": "screen", "width": -1})).await;
+    loop {
+        match page.message().await {
+            Message::Close(Some(close)) => break assert_eq!(close.code, CloseCode::Policy),
+            Message::Close(None) => panic!("no reason"),
+            _ => {}
+        }
+    }
+}
