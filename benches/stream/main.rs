@@ -1,5 +1,5 @@
 //! The whole system's figures: the real server in a process of its own, watched by 1 to 16 viewers,
-//! over a slow link, and beside four processes that keep every processor busy, with real-time
+//! of pictures of each size, over a slow link, and beside four processes that keep every processor busy, with real-time
 //! priority and without.
 //!
 //! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` for the rows of that name.
@@ -28,6 +28,8 @@ struct Scenario {
     /// The camera, and what its colour picture is made of.
     camera: Camera,
     viewers: usize,
+    /// Pixels that the picture is wide on the first viewer's screen; the others' show the smallest size.
+    screen: u32,
     /// Bits a second of the viewers' link, if it is a slow one.
     link: Option<u64>,
     /// Beside what else it runs.
@@ -57,24 +59,104 @@ const WITH: Beside = Beside::Busy { real_time: true };
 /// Processes that keep the processors busy.
 const BUSY: usize = 4;
 
-const SCENARIOS: [Scenario; 11] = [
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 0, link: None, beside: Beside::Nothing },
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 1, link: None, beside: Beside::Nothing },
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 4, link: None, beside: Beside::Nothing },
-    Scenario { name: "phantom", camera: Camera::Phantom, viewers: 16, link: None, beside: Beside::Nothing },
-    Scenario { name: "picture", camera: Camera::Picture, viewers: 1, link: None, beside: Beside::Nothing },
-    Scenario { name: "picture", camera: Camera::Picture, viewers: 16, link: None, beside: Beside::Nothing },
+/// Screens on which a picture of each size is as wide as it has pixels.
+const CELL: u32 = 512;
+const HALF: u32 = 1024;
+const FULL: u32 = 2048;
+
+const SCENARIOS: [Scenario; 15] = [
+    Scenario {
+        name: "phantom",
+        camera: Camera::Phantom,
+        viewers: 0,
+        screen: CELL,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "phantom",
+        camera: Camera::Phantom,
+        viewers: 1,
+        screen: CELL,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "phantom",
+        camera: Camera::Phantom,
+        viewers: 4,
+        screen: CELL,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "phantom",
+        camera: Camera::Phantom,
+        viewers: 16,
+        screen: CELL,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "phantom, half",
+        camera: Camera::Phantom,
+        viewers: 1,
+        screen: HALF,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "phantom, full",
+        camera: Camera::Phantom,
+        viewers: 1,
+        screen: FULL,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "full and 3 cell",
+        camera: Camera::Phantom,
+        viewers: 4,
+        screen: FULL,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "full, 4 Mbit/s",
+        camera: Camera::Phantom,
+        viewers: 1,
+        screen: FULL,
+        link: Some(4_000_000),
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "picture",
+        camera: Camera::Picture,
+        viewers: 1,
+        screen: CELL,
+        link: None,
+        beside: Beside::Nothing,
+    },
+    Scenario {
+        name: "picture",
+        camera: Camera::Picture,
+        viewers: 16,
+        screen: CELL,
+        link: None,
+        beside: Beside::Nothing,
+    },
     Scenario {
         name: "picture, 4 Mbit/s",
         camera: Camera::Picture,
         viewers: 1,
+        screen: CELL,
         link: Some(4_000_000),
         beside: Beside::Nothing,
     },
-    Scenario { name: "phantom, busy", camera: Camera::Phantom, viewers: 4, link: None, beside: WITHOUT },
-    Scenario { name: "the same, rt", camera: Camera::Phantom, viewers: 4, link: None, beside: WITH },
-    Scenario { name: "picture, busy", camera: Camera::Picture, viewers: 4, link: None, beside: WITHOUT },
-    Scenario { name: "the same, rt", camera: Camera::Picture, viewers: 4, link: None, beside: WITH },
+    Scenario { name: "phantom, busy", camera: Camera::Phantom, viewers: 4, screen: CELL, link: None, beside: WITHOUT },
+    Scenario { name: "the same, rt", camera: Camera::Phantom, viewers: 4, screen: CELL, link: None, beside: WITH },
+    Scenario { name: "picture, busy", camera: Camera::Picture, viewers: 4, screen: CELL, link: None, beside: WITHOUT },
+    Scenario { name: "the same, rt", camera: Camera::Picture, viewers: 4, screen: CELL, link: None, beside: WITH },
 ];
 
 /// What a row says.
@@ -131,7 +213,10 @@ async fn measure(scenario: &Scenario) -> Row {
         None => server.address,
     };
 
-    let watch = |_| tokio::spawn(viewer::watch(address, server.key.clone(), WARM_UP + MEASURED));
+    let watch = |number| {
+        let screen = if number == 0 { scenario.screen } else { CELL };
+        tokio::spawn(viewer::watch(address, server.key.clone(), screen, WARM_UP + MEASURED))
+    };
     let viewers: Vec<_> = (0..scenario.viewers).map(watch).collect();
 
     // What comes while the server warms up is left out of every figure.

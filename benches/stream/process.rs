@@ -113,7 +113,7 @@ pub struct Counted {
 pub struct Usage {
     /// The control loop.
     pub control: f64,
-    /// The imaging thread: colour, JPEG, content area.
+    /// The imaging threads: colour, JPEG, content area.
     pub imaging: f64,
     /// The threads that serve.
     pub serving: f64,
@@ -128,7 +128,7 @@ impl Counted {
             let name = fs::read_to_string(task.path().join("comm")).unwrap_or_default();
             let kind = match name.trim() {
                 "control" => &mut counted.control,
-                "imaging" => &mut counted.imaging,
+                name if name.starts_with("imaging") => &mut counted.imaging,
                 name if name.starts_with("tokio") => &mut counted.serving,
                 _ => continue,
             };

@@ -19,11 +19,12 @@ pub struct Seen {
     pub bytes: usize,
 }
 
-/// Watches for `time` as the operator, whose key is `key`.
-pub async fn watch(address: SocketAddr, key: String, time: Duration) -> Vec<Seen> {
+/// Watches for `time` as the operator, whose key is `key`, on a screen on which the picture is `screen` pixels wide.
+pub async fn watch(address: SocketAddr, key: String, screen: u32, time: Duration) -> Vec<Seen> {
     let mut request = format!("ws://{address}/live?role=operator").into_client_request().expect("an address");
     request.headers_mut().insert("authorization", format!("Bearer {key}").parse().expect("a key"));
     let (mut socket, _) = connect_async(request).await.expect("the stream");
+    socket.send(Message::text(format!("{{\"type\":\"screen\",\"width\":{screen}}}"))).await.expect("the stream");
     let mut seen = Vec::new();
     let end = tokio::time::Instant::now() + time;
     while let Ok(Some(Ok(message))) = tokio::time::timeout_at(end, socket.next()).await {

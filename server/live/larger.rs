@@ -15,9 +15,9 @@ use crate::imaging::{Developer, Size};
 /// Longest wait for a frame before checking whether more will come.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Exposures of two pictures at [`Size::Full`] lie at least so far apart: 25 a second. Made as fast as one
-/// thread can, they would keep a core busy for little, and their rate would depend on what else the
-/// machine does, such as asking a policy.
+/// Exposures of two pictures at [`Size::Full`] lie at least so far apart: 25 a second. At a camera's own rate
+/// they would keep most of a core busy, and how many of them come about would depend on what else the machine
+/// does, such as asking a policy.
 const FULL_INTERVAL: Duration = Duration::from_millis(38);
 
 /// A larger size's thread; ends when dropped.
