@@ -9,19 +9,20 @@
 
 mod audience;
 mod link;
+mod message;
 mod operator;
 mod surgeon;
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::extract::{Query, State};
 use axum::response::Response;
-use bytes::{BufMut, Bytes, BytesMut};
-use serde::{Deserialize, Serialize};
+use bytes::Bytes;
+use serde::Deserialize;
 use tokio::sync::watch;
-use tokio::time::{Instant, MissedTickBehavior, interval, timeout, timeout_at};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -36,6 +37,7 @@ use crate::live::{EncodedFrame, Watcher};
 use crate::trial::role::Role;
 use audience::Audience;
 use link::Link;
+use message::{Said, Told, close, pack, tell, tenth_millis};
 use operator::ForOperator;
 use surgeon::ForSurgeon;
 
@@ -53,27 +55,6 @@ const LARGEST_REQUEST: usize = 1024;
 struct LiveQuery {
     /// The role to be served as, of those that the browser holds; else the one that may see least.
     role: Option<Role>,
-}
-
-/// A message from a page.
-#[derive(Debug, Deserialize)]
-#[serde(tag = "type", rename_all = "kebab-case")]
-enum Said {
-    /// This frame is on screen.
-    Drawn { frame: u64 },
-    /// Whether the page can be seen.
-    Visible { visible: bool },
-    /// The whole picture, parts outside the view included, covers so many pixels of the screen from left to right.
-    Screen { width: u32 },
-}
-
-/// A text message to a page.
-#[derive(Serialize)]
-#[serde(tag = "type", rename_all = "kebab-case")]
-enum Told<S, T> {
-    Session { view: Option<S> },
-    Status(T),
-    Beat,
 }
 
 /// Pictures and state, as they come (WebSocket).
@@ -113,6 +94,7 @@ struct Left;
 /// A frame on its way.
 struct InFlight {
     number: u64,
+    size: Size,
     sent_at: Moment,
 }
 
@@ -121,6 +103,8 @@ struct Desk<A: Audience> {
     app: AppState,
     /// Set while the page can be seen.
     watcher: Option<Watcher>,
+    /// The next size, until its first frame is there.
+    coming: Option<Watcher>,
     /// The frame sent and not yet drawn.
     in_flight: Option<InFlight>,
     /// The last frame sent: those of a larger size take longer, and none may follow a later one.
@@ -155,6 +139,7 @@ impl<A: Audience> Desk<A> {
 
         Self {
             watcher: Some(app.live.watch(Size::Cell)),
+            coming: None,
             in_flight: None,
             last: 0,
             cells: None,
@@ -187,11 +172,7 @@ impl<A: Audience> Desk<A> {
                 },
                 Ok(()) = self.sessions.changed() => self.session(),
                 Ok(()) = self.statuses.changed() => self.status(),
-                next = next_frame(&mut self.watcher, self.due), if self.in_flight.is_none() => match next {
-                    Next::Frame(frame) => self.frame(&frame),
-                    Next::Ended => { self.watcher = None; None }
-                    Next::Missed => { self.link.missed(self.app.clock.now()); self.follow_link(); None }
-                },
+                next = Self::next_frame(&mut self.watcher, &mut self.coming, self.due), if self.in_flight.is_none() => self.take(next),
                 _ = self.heartbeat.tick() => self.beat()?,
             };
 
@@ -212,7 +193,10 @@ impl<A: Audience> Desk<A> {
 
         match serde_json::from_str(text) {
             Ok(Said::Drawn { frame }) => self.drawn(frame),
-            Ok(Said::Visible { visible: false }) => self.watcher = None,
+            Ok(Said::Visible { visible: false }) => {
+                self.watcher = None;
+                self.coming = None;
+            }
             Ok(Said::Visible { visible: true }) => {
                 self.in_flight = None;
                 self.due = Instant::now() + link::PATIENCE;
@@ -232,8 +216,13 @@ impl<A: Audience> Desk<A> {
     fn drawn(&mut self, frame: u64) {
         let Some(sent) = self.in_flight.take_if(|sent| sent.number == frame) else { return };
         let now = self.app.clock.now();
-        self.link.drawn(now, now.since(sent.sent_at));
-        self.due = Instant::now() + link::PATIENCE;
+        // While a larger size is coming, the one before says nothing about it.
+        if sent.size == self.link.size() {
+            self.link.drawn(now, now.since(sent.sent_at));
+        }
+        if self.coming.is_none() {
+            self.due = Instant::now() + link::PATIENCE;
+        }
         self.follow_link();
     }
 
@@ -244,14 +233,21 @@ impl<A: Audience> Desk<A> {
         }
     }
 
-    /// Joins the viewers of the size that suits the page now.
+    /// Joins the viewers of the size that suits the page now. Until a larger size's first frame is there, the page gets
+    /// those of the size before; a smaller one is soon there, and the size before was too slow.
     fn follow_link(&mut self) {
         let size = self.link.size();
-        if let Some(watcher) = self.watcher.as_mut().filter(|watcher| watcher.size() != size) {
-            *watcher = self.app.live.watch(size);
-            tracing::debug!(size = size.name(), "a viewer's pictures change size");
-            self.due = Instant::now() + link::PATIENCE;
+        let Some(watcher) = &mut self.watcher else { return };
+        if self.coming.as_ref().unwrap_or(watcher).size() == size {
+            return;
         }
+
+        tracing::debug!(size = size.name(), "a viewer's pictures change size");
+        self.coming = (size > watcher.size()).then(|| self.app.live.watch(size));
+        if size < watcher.size() {
+            *watcher = self.app.live.watch(size);
+        }
+        self.due = Instant::now() + link::PATIENCE;
     }
 
     fn session(&mut self) -> Option<Message> {
@@ -272,8 +268,43 @@ impl<A: Audience> Desk<A> {
         message
     }
 
+    /// Waits for the next frame of a visible page; waits forever for a hidden one. One of a larger size must come until
+    /// it is due. Dropping the future loses nothing.
+    async fn next_frame(watcher: &mut Option<Watcher>, coming: &mut Option<Watcher>, due: Instant) -> Next {
+        let Some(watcher) = watcher else { return std::future::pending().await };
+        let waits = coming.as_ref().unwrap_or(watcher).size() != Size::Cell;
+
+        tokio::select! {
+            biased;
+            frame = next_of(coming) => frame.map_or(Next::Ended, Next::Changed),
+            frame = watcher.next() => frame.map_or(Next::Ended, Next::Frame),
+            () = sleep_until(due), if waits => Next::Missed,
+        }
+    }
+
+    fn take(&mut self, next: Next) -> Option<Message> {
+        match next {
+            Next::Frame(frame) => self.frame(&frame),
+            Next::Changed(frame) => {
+                self.watcher = self.coming.take();
+                self.frame(&frame)
+            }
+            Next::Missed => {
+                self.link.missed(self.app.clock.now());
+                self.follow_link();
+                None
+            }
+            Next::Ended => {
+                self.watcher = None;
+                self.coming = None;
+                None
+            }
+        }
+    }
+
     fn frame(&mut self, frame: &EncodedFrame) -> Option<Message> {
         let picture = &frame.picture;
+        let size = self.watcher.as_ref()?.size();
         if picture.number <= self.last {
             return None;
         }
@@ -283,7 +314,7 @@ impl<A: Audience> Desk<A> {
         let message = pack(&A::header(frame, tenth_millis(age), &self.app), &picture.jpeg)?;
 
         self.last = picture.number;
-        self.in_flight = Some(InFlight { number: picture.number, sent_at: now });
+        self.in_flight = Some(InFlight { number: picture.number, size, sent_at: now });
         self.app.metrics.frames_sent.inc();
         self.app.metrics.bytes_sent.inc_by(message.len() as u64);
 
@@ -306,73 +337,26 @@ impl<A: Audience> Desk<A> {
     }
 }
 
+/// The next frame of a size that is coming, if one is.
+async fn next_of(coming: &mut Option<Watcher>) -> Option<Arc<EncodedFrame>> {
+    match coming {
+        Some(coming) => coming.next().await,
+        None => std::future::pending().await,
+    }
+}
+
 /// What comes of waiting for a frame.
 enum Next {
     Frame(Arc<EncodedFrame>),
-    /// None of this size came in time.
+    /// The first of another size.
+    Changed(Arc<EncodedFrame>),
+    /// A larger size did not come in time.
     Missed,
     /// None will come any more.
     Ended,
 }
 
-/// Waits for the next frame of a visible page; waits forever for a hidden one. One of a larger size must come
-/// until `due`.
-async fn next_frame(watcher: &mut Option<Watcher>, due: Instant) -> Next {
-    let Some(watcher) = watcher else { return std::future::pending().await };
-    let next = match watcher.size() {
-        Size::Cell => Ok(watcher.next().await),
-        Size::Half | Size::Full => timeout_at(due, watcher.next()).await,
-    };
-
-    match next {
-        Ok(Some(frame)) => Next::Frame(frame),
-        Ok(None) => Next::Ended,
-        Err(_) => Next::Missed,
-    }
-}
-
-fn close(code: u16, reason: &'static str) -> Message {
-    Message::Close(Some(CloseFrame { code, reason: reason.into() }))
-}
-
-fn tell(told: &impl Serialize) -> Option<Message> {
-    let text = serde_json::to_string(told).inspect_err(|error| tracing::error!(%error, "state cannot be told")).ok()?;
-    Some(Message::Text(text.into()))
-}
-
-/// A frame's message: header length, header, JPEG.
-fn pack(header: &impl Serialize, jpeg: &[u8]) -> Option<Bytes> {
-    let header = serde_json::to_vec(header).ok()?;
-    let length = u16::try_from(header.len()).ok()?;
-    let mut message = BytesMut::with_capacity(2 + header.len() + jpeg.len());
-    message.put_u16_le(length);
-    message.put_slice(&header);
-    message.put_slice(jpeg);
-    Some(message.freeze())
-}
-
-/// Milliseconds with one decimal.
-fn tenth_millis(age: Duration) -> f64 {
-    (age.as_secs_f64() * 1e4).round() / 10.0
-}
-
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(live))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_frame_is_packed_as_documented() {
-        let message = pack(&serde_json::json!({"frame": 7}), &[0xff, 0xd8]).unwrap();
-        assert_eq!(&message[..], b"\x0b\x00{\"frame\":7}\xff\xd8");
-    }
-
-    #[test]
-    fn an_age_is_given_in_tenths_of_a_millisecond() {
-        assert!((tenth_millis(Duration::from_micros(1_260)) - 1.3).abs() < 1e-9);
-    }
 }

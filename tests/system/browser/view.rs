@@ -32,8 +32,7 @@ fn server() -> Server {
     Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"])
 }
 
-/// Waits until the page shows pictures so many pixels wide. A busy machine draws slowly, and a slow viewer gets smaller
-/// ones: then it is tried again.
+/// Waits until the page shows pictures so many pixels wide. On a busy machine a larger size may need another try.
 async fn gets(browser: &Browser, width: u32) {
     until(&format!("pictures {width} pixels wide"), || async {
         browser.run("return document.querySelector(arguments[0]).width", &[json!(PICTURE)]).await == width

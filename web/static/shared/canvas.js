@@ -31,34 +31,24 @@ export function pixelsPerCss(canvas) {
 }
 
 /**
- * Keeps the pixels of `canvas` the screen's own, and calls `draw` when they change.
+ * Keeps the pixels of `canvas` the screen's own, and calls `draw` when they change. Returns a function to
+ * call now and then: no event tells reliably that the window has come to a screen with another number of
+ * pixels per CSS pixel, as nothing on the page need change its size.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {() => void} draw
  */
 export function onResize(canvas, draw) {
+  let density = 0;
   const fit = () => {
-    const density = window.devicePixelRatio || 1;
+    density = window.devicePixelRatio || 1;
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * density));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * density));
     draw();
   };
 
   new ResizeObserver(fit).observe(canvas);
-  onNewDensity(fit);
-}
-
-/**
- * Calls `tell` when the screen has another number of pixels per CSS pixel, as after moving the window
- * to another screen; nothing on the page need change its size then.
- *
- * @param {() => void} tell
- */
-function onNewDensity(tell) {
-  const present = matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`);
-  const changed = () => {
-    tell();
-    onNewDensity(tell);
+  return () => {
+    if (density !== (window.devicePixelRatio || 1)) fit();
   };
-  present.addEventListener("change", changed, { once: true });
 }

@@ -32,6 +32,7 @@ export class Viewer {
   #unzoom = make("button", { type: "button", className: "viewer-unzoom", hidden: true });
   #fit = new Fit({ glides: !matchMedia("(prefers-reduced-motion: reduce)").matches });
   #framing = new Framing();
+  #lookAtScreen;
   /** @type {Set<string>} */
   #shown = new Set();
   #peaking = new Peaking();
@@ -59,7 +60,7 @@ export class Viewer {
     element.setAttribute("role", "group");
     element.setAttribute("aria-label", "Live view. Plus and minus zoom, zero shows everything.");
 
-    onResize(this.#overlay.canvas, () => {
+    this.#lookAtScreen = onResize(this.#overlay.canvas, () => {
       const { canvas } = this.#overlay;
       const box = { width: canvas.clientWidth, height: canvas.clientHeight };
       this.#framing.resize(box, pixelsPerCss(canvas));
@@ -120,6 +121,7 @@ export class Viewer {
     this.#picture.drawImage(bitmap, 0, 0);
     this.#last = { header, receivedAt };
 
+    this.#lookAtScreen();
     const cells = cellsOf(header);
     this.#framing.show(cells, this.#fit.see(cells, header.area, receivedAt));
     if (this.#shown.has("peaking")) this.#peaking.look(bitmap, cells, header.area);

@@ -1,0 +1,71 @@
+//! The messages of `/live`, in both directions.
+
+use std::time::Duration;
+
+use axum::extract::ws::{CloseFrame, Message};
+use bytes::{BufMut, Bytes, BytesMut};
+use serde::{Deserialize, Serialize};
+
+/// A message from a page.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "type", rename_all = "kebab-case")]
+pub(super) enum Said {
+    /// This frame is on screen.
+    Drawn { frame: u64 },
+    /// Whether the page can be seen.
+    Visible { visible: bool },
+    /// The whole picture, parts outside the view included, covers so many pixels of the screen from left to right.
+    Screen { width: u32 },
+}
+
+/// A text message to a page.
+#[derive(Serialize)]
+#[serde(tag = "type", rename_all = "kebab-case")]
+pub(super) enum Told<S, T> {
+    Session { view: Option<S> },
+    Status(T),
+    Beat,
+}
+
+/// Ends the connection, for a reason.
+pub(super) fn close(code: u16, reason: &'static str) -> Message {
+    Message::Close(Some(CloseFrame { code, reason: reason.into() }))
+}
+
+/// A text message.
+pub(super) fn tell(told: &impl Serialize) -> Option<Message> {
+    let text = serde_json::to_string(told).inspect_err(|error| tracing::error!(%error, "state cannot be told")).ok()?;
+    Some(Message::Text(text.into()))
+}
+
+/// A frame's message: header length, header, JPEG.
+pub(super) fn pack(header: &impl Serialize, jpeg: &[u8]) -> Option<Bytes> {
+    let header = serde_json::to_vec(header).ok()?;
+    let length = u16::try_from(header.len()).ok()?;
+    let mut message = BytesMut::with_capacity(2 + header.len() + jpeg.len());
+    message.put_u16_le(length);
+    message.put_slice(&header);
+    message.put_slice(jpeg);
+    Some(message.freeze())
+}
+
+/// Milliseconds with one decimal.
+pub(super) fn tenth_millis(age: Duration) -> f64 {
+    (age.as_secs_f64() * 1e4).round() / 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_packed_as_documented() {
+        let message = pack(&serde_json::json!({"frame": 7}), &[0xff, 0xd8]).unwrap();
+        assert_eq!(&message[..], b"\x0b\x00{\"frame\":7}\xff\xd8");
+    }
+
+    #[test]
+    fn an_age_is_given_in_tenths_of_a_millisecond() {
+        assert!((tenth_millis(Duration::from_micros(1_260)) - 1.3).abs() < 1e-9);
+    }
+}
