@@ -14,6 +14,7 @@ pub mod priority;
 pub mod imaging;
 pub mod lens;
 
+pub mod recording;
 pub mod simulation;
 
 pub mod autofocus;

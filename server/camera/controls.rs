@@ -1,5 +1,6 @@
 //! The settings that an operator may change on a running camera: exposure, gain, frame rate.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,16 @@ pub enum Setting {
 impl Setting {
     /// Every setting.
     pub const ALL: [Self; 3] = [Self::Exposure, Self::Gain, Self::FrameRate];
+
+    /// Its name, as in JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Exposure => "exposure",
+            Self::Gain => "gain",
+            Self::FrameRate => "frame-rate",
+        }
+    }
 
     /// Name at the start of a sentence.
     #[must_use]
@@ -52,6 +63,14 @@ pub struct CameraOffer {
     pub settings: Vec<Adjustable>,
     /// Why the camera did not make the last change, if it did not.
     pub trouble: Option<String>,
+}
+
+impl CameraOffer {
+    /// The settings' values by their names, as JSON has them.
+    #[must_use]
+    pub fn by_name(&self) -> BTreeMap<String, f64> {
+        self.settings.iter().map(|one| (one.setting.name().to_owned(), one.value)).collect()
+    }
 }
 
 /// A camera's settings, shared between the operator and the camera's thread. Clone freely; never blocks.

@@ -10,6 +10,7 @@ pub mod phantom;
 mod playback;
 mod pool;
 pub mod recorded;
+mod replay;
 mod settings;
 mod spec;
 
@@ -17,7 +18,7 @@ pub use controls::{Adjustable, CameraOffer, ControlError, Controls, Setting};
 pub use pace::Pace;
 pub use pool::MosaicPool;
 pub use settings::CameraSettings;
-pub use spec::open;
+pub use spec::{open, own_calibration};
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,13 +1,14 @@
 //! From `--camera SPEC` to a camera.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::phantom::{Before, PhantomCamera};
-use super::{Camera, CameraError, CameraSettings, footage, recorded};
+use super::{Camera, CameraError, CameraSettings, footage, recorded, replay};
+use crate::recording::CALIBRATION;
 
 /// Opens the camera that `spec` names: `phantom`, `phantom:still` (in a clamp), `phantom:white` (before a
 /// white tile), `phantom:dark` (with its lens cap on), `footage:PATH` with a video, an image or a folder
-/// of images, `scan:DIR` with a recorded scan, or `gige:ID`.
+/// of images, `scan:DIR` with a recorded scan, `recording:DIR` with a hyperspectral recording, or `gige:ID`.
 ///
 /// # Errors
 /// [`CameraError::BadSource`] when the camera is unknown, or its source cannot be used.
@@ -25,6 +26,10 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
             Ok(camera) => Ok(Box::new(camera)),
             Err(error) => Err(CameraError::BadSource(error.to_string())),
         },
+        Some(("recording", path)) if !path.is_empty() => match replay::open(Path::new(path), settings) {
+            Ok(camera) => Ok(Box::new(camera)),
+            Err(error) => Err(CameraError::BadSource(error.to_string())),
+        },
         #[cfg(feature = "aravis")]
         Some(("gige", source)) => Ok(Box::new(super::gige::GigeCamera::open(source, settings)?)),
         #[cfg(not(feature = "aravis"))]
@@ -36,7 +41,14 @@ pub fn open(spec: &str, settings: CameraSettings) -> Result<Box<dyn Camera>, Cam
         _ => Err(CameraError::BadSource(format!(
             "unknown camera `{spec}`; choose `phantom` (a simulated brain; `phantom:still`, `phantom:white` and \
              `phantom:dark` to try the bench's commands), `footage:PATH` (a video, an image or a folder of images), \
-             `scan:DIR` (a recorded scan) or `gige:ID` (`gige:list` lists them)"
+             `scan:DIR` (a recorded scan), `recording:DIR` (a hyperspectral recording) or `gige:ID` (`gige:list` lists \
+             them)"
         ))),
     }
+}
+
+/// The calibration that belongs to the camera that `spec` names, if it brings one: a recording's own.
+#[must_use]
+pub fn own_calibration(spec: &str) -> Option<PathBuf> {
+    spec.strip_prefix("recording:").filter(|path| !path.is_empty()).map(|path| Path::new(path).join(CALIBRATION))
 }

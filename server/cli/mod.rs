@@ -11,6 +11,7 @@ mod lens;
 mod output;
 mod policies;
 mod restore;
+mod recording;
 mod scan;
 mod serve;
 mod train;
@@ -49,6 +50,8 @@ enum Command {
     Policies(policies::Arguments),
     /// Put a backup in the place of the database, and keep what was there.
     Restore(restore::Arguments),
+    /// Record hyperspectral video, and get cubes, video and pictures out of it.
+    Recording(recording::Arguments),
     /// Record, import and check focal-time scans.
     Scan(scan::Arguments),
     /// Start the server: the live view, the control loop and the trial.
@@ -86,6 +89,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Policies(arguments) => policies::run(&arguments),
         Command::Restore(arguments) => restore::run(&arguments),
+        Command::Recording(arguments) => recording::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),

@@ -39,7 +39,8 @@ pub struct Arguments {
     /// Folder for the database and the keys.
     #[arg(long, value_name = "DIR", default_value = "data")]
     data_dir: PathBuf,
-    /// Camera: phantom, footage:PATH, scan:DIR or gige:ID (gige:list lists them); docs/scripting.md has their options.
+    /// Camera: phantom, footage:PATH, scan:DIR, recording:DIR or gige:ID (gige:list lists them); docs/scripting.md has
+    /// their options.
     #[arg(long, value_name = "SPEC", default_value = "phantom")]
     camera: String,
     /// Lens: simulated, emulated (an emulated Optotune driver), optotune:auto or optotune:DEVICE.
@@ -132,7 +133,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let address = listener.local_addr()?;
 
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
-    let calibration = calibration::read_or_default(arguments.calibration.as_deref())?;
+    let calibration = calibration_of(arguments)?;
     let registry = registry(arguments)?;
 
     let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
@@ -236,6 +237,12 @@ fn bound_real_time() -> std::io::Result<()> {
     });
 
     Ok(())
+}
+
+/// The calibration asked for, else the camera's own, else that of a typical unit.
+fn calibration_of(arguments: &Arguments) -> Result<Calibration, Failure> {
+    let own = camera::own_calibration(&arguments.camera);
+    Ok(calibration::read_or_default(arguments.calibration.as_deref().or(own.as_deref()))?)
 }
 
 /// The policies that ship and those from files, each tried once.

@@ -10,6 +10,7 @@ mod slot;
 mod source;
 mod spawn;
 mod stepper;
+mod tap;
 mod window;
 
 pub use eye::Eye;
@@ -18,6 +19,7 @@ pub use runner::keep_policies_quiet;
 pub use slot::LatestSlot;
 pub use spawn::{ControlLoop, Rig, Settings};
 pub use stepper::Stepper;
+pub use tap::Tap;
 pub use window::LatencyFigures;
 
 use std::sync::Arc;
@@ -199,6 +201,8 @@ pub struct ControlHandle {
     pub frames: Arc<LatestSlot<ControlledFrame>>,
     /// The camera's settings, where it has any.
     pub camera: Option<Controls>,
+    /// Where frames leave to be recorded.
+    pub tap: Tap,
 }
 
 /// Access to the loop's state and frames, without the right to command it.

@@ -13,6 +13,7 @@ use super::pilot::HoldReason;
 use super::runner::guarded;
 use super::source::Source;
 use super::stepper::Stepper;
+use super::tap::Tap;
 use super::window::LatencyWindow;
 use super::{Command, ControlHandle, ControlStatus, ControlledFrame, Hold, LatestSlot, StepRecord};
 use crate::autofocus::Registry;
@@ -83,9 +84,11 @@ impl ControlLoop {
         let frames = Arc::new(LatestSlot::default());
         let stop = Arc::new(AtomicBool::new(false));
 
-        let worker = Worker::new(stepper, source, clock, telemetry, frames.clone(), controls.clone());
+        let tap = Tap::default();
+        let outlets = Outlets { telemetry, frames: frames.clone(), tap: tap.clone() };
+        let worker = Worker::new(stepper, source, clock, outlets, controls.clone());
         let status = worker.status.subscribe();
-        let handle = ControlHandle { commands: commands_in, status, frames, camera: controls };
+        let handle = ControlHandle { commands: commands_in, status, frames, camera: controls, tap };
 
         let stopping = stop.clone();
         let thread = thread::Builder::new().name("control".into()).spawn(move || worker.run(commands, &stopping))?;
@@ -112,13 +115,19 @@ impl Drop for ControlLoop {
     }
 }
 
+/// Where what the loop made goes. None of them makes it wait.
+struct Outlets {
+    telemetry: mpsc::Sender<StepRecord>,
+    frames: Arc<LatestSlot<ControlledFrame>>,
+    tap: Tap,
+}
+
 /// The state of the loop's thread.
 struct Worker {
     stepper: Stepper,
     source: Source,
     clock: Arc<dyn Clock>,
-    telemetry: mpsc::Sender<StepRecord>,
-    frames: Arc<LatestSlot<ControlledFrame>>,
+    outlets: Outlets,
     /// Looked at for the status alone.
     controls: Option<Controls>,
     status: watch::Sender<Arc<ControlStatus>>,
@@ -140,8 +149,7 @@ impl Worker {
         stepper: Stepper,
         source: Source,
         clock: Arc<dyn Clock>,
-        telemetry: mpsc::Sender<StepRecord>,
-        frames: Arc<LatestSlot<ControlledFrame>>,
+        outlets: Outlets,
         controls: Option<Controls>,
     ) -> Self {
         let now = clock.now();
@@ -166,8 +174,7 @@ impl Worker {
             stepper,
             source,
             clock,
-            telemetry,
-            frames,
+            outlets,
             controls,
             status: watch::Sender::new(Arc::new(first)),
             published_at: now,
@@ -195,10 +202,10 @@ impl Worker {
             }
         }
 
-        let Self { stepper, source, frames, .. } = self;
+        let Self { stepper, source, outlets, .. } = self;
         // First of all: a camera that hangs must not keep the lens under current.
         drop(stepper);
-        frames.close();
+        outlets.frames.close();
         if !source.stop(FAREWELL) {
             tracing::warn!("the camera hangs; its thread is left behind");
         }
@@ -221,10 +228,11 @@ impl Worker {
                 self.steps += 1;
                 self.window.add(self.last_frame_at, controlled.record.latency_micros);
 
-                if self.telemetry.try_send(controlled.record.clone()).is_err() {
+                if self.outlets.telemetry.try_send(controlled.record.clone()).is_err() {
                     self.telemetry_dropped += 1;
                 }
-                self.frames.put(controlled);
+                self.outlets.tap.offer(&controlled);
+                self.outlets.frames.put(controlled);
             }
             Err(reason) => self.camera_fault = Some(reason),
         }

@@ -1,0 +1,123 @@
+//! `parfocal recording info`: what a recording holds, and whether it is whole and unchanged.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::cli::output::{Failure, print};
+use crate::recording::{Header, Recording};
+
+/// Bytes of a sample when four of 10 bit are packed into five bytes.
+const PACKED: f64 = 1.25;
+
+/// Arguments of `parfocal recording info`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the recording.
+    folder: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is printed.
+#[derive(Debug, Serialize)]
+struct Info {
+    path: String,
+    #[serde(flatten)]
+    header: Header,
+    width: usize,
+    height: usize,
+    frames: usize,
+    seconds: f64,
+    fps: Option<f64>,
+    /// Frames that the camera numbered but that are not here, those lost by the recorder included.
+    frames_missing: u64,
+    /// Bytes of the frames on disk.
+    bytes: u64,
+    /// The same beside the samples packed at 10 bit.
+    share_of_packed: Option<f64>,
+    /// What is wrong with frames that cannot be read.
+    damaged: Vec<String>,
+}
+
+/// Looks at the recording and checks every frame.
+///
+/// # Errors
+/// When there is no recording; when frames are damaged, after reporting them.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let recording = Recording::open(&arguments.folder)?;
+    let info = look(arguments, &recording);
+
+    let text = if arguments.json { serde_json::to_string(&info)? + "\n" } else { describe(&info) };
+    print(&text)?;
+
+    match info.damaged.as_slice() {
+        [] => Ok(()),
+        [only] => Err(only.clone().into()),
+        [first, rest @ ..] => Err(format!("{first} (and {} more)", rest.len()).into()),
+    }
+}
+
+fn look(arguments: &Arguments, recording: &Recording) -> Info {
+    let frames = recording.rows().len();
+    let (width, height) = recording.size();
+    let packed = PACKED * (width * height * frames) as f64;
+    let bytes = recording.bytes();
+
+    Info {
+        path: arguments.folder.display().to_string(),
+        header: recording.header().clone(),
+        width,
+        height,
+        frames,
+        seconds: recording.seconds(),
+        fps: recording.rate(),
+        frames_missing: recording.missing(),
+        bytes,
+        share_of_packed: (frames > 0).then(|| bytes as f64 / packed),
+        damaged: recording.check(),
+    }
+}
+
+fn describe(info: &Info) -> String {
+    let Info { header, width, height, frames, seconds, bytes, .. } = info;
+    let mut text = String::new();
+    let simulated = if header.simulated { " (simulated)" } else { "" };
+
+    let _ = writeln!(text, "recording    {} by {}", header.started, header.software);
+    let _ = writeln!(text, "camera       {}, {width}x{height}{simulated}", header.camera);
+    let _ = writeln!(text, "lens         {}", header.lens);
+    let _ = writeln!(text, "calibration  {}", header.calibration);
+    if let Some(session) = &header.session {
+        let _ = writeln!(text, "session      {session}");
+    }
+    for (name, value) in &header.camera_settings {
+        let _ = writeln!(text, "{name:12} {value}");
+    }
+
+    let rate = info.fps.map_or(String::new(), |fps| format!(", {fps:.1} a second"));
+    let _ = writeln!(text, "frames       {frames} over {seconds:.1} s{rate}");
+    let _ = writeln!(
+        text,
+        "missing      {} ({} because this machine or its disk was too slow)",
+        info.frames_missing, header.frames_lost
+    );
+
+    let share = info.share_of_packed.map_or(String::new(), |share| format!(", {share:.2} of packed 10 bit"));
+    let _ = writeln!(text, "size         {:.1} MB{share}", *bytes as f64 / 1e6);
+
+    let ended = match &header.ended {
+        Some(ended) => ended.to_string(),
+        None => "cut short, or still being recorded; the frames above are whole".to_owned(),
+    };
+    let _ = writeln!(text, "ended        {ended}");
+
+    let checked = if info.damaged.is_empty() { "every frame matches its checksum" } else { "damaged:" };
+    let _ = writeln!(text, "checked      {checked}");
+    for damage in &info.damaged {
+        let _ = writeln!(text, "  {damage}");
+    }
+    text
+}

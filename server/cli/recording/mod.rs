@@ -1,0 +1,40 @@
+//! `parfocal recording`: hyperspectral recordings, made, looked at, and turned into what other programs read.
+
+mod cube;
+mod info;
+mod record;
+mod video;
+
+use super::output::Failure;
+
+/// Arguments of `parfocal recording`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Record every frame of a camera, lossless, until Ctrl-C.
+    Record(record::Arguments),
+    /// Print what a recording holds, and check every frame against its checksum.
+    Info(info::Arguments),
+    /// Save a frame as a cube of 16 bands that ENVI and Spectral Python read.
+    Cube(cube::Arguments),
+    /// Save a recording, or a part of it, as a video or as pictures.
+    Video(video::Arguments),
+}
+
+/// Does what the arguments say.
+///
+/// # Errors
+/// When a recording cannot be made, read or saved as something else.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.action {
+        Action::Record(arguments) => record::run(arguments),
+        Action::Info(arguments) => info::run(arguments),
+        Action::Cube(arguments) => cube::run(arguments),
+        Action::Video(arguments) => video::run(arguments),
+    }
+}

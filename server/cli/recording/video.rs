@@ -1,0 +1,198 @@
+//! `parfocal recording video`: a recording as a video for people, or its frames as pictures.
+
+use std::fs;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use image::{ImageBuffer, ImageFormat, Luma, Rgb};
+
+use crate::camera::calibration;
+use crate::cli::output::{Failure, print};
+use crate::files::replace;
+use crate::imaging::{Developer, GrayImage, MosaicFrame, RgbImage, Size};
+use crate::recording::Recording;
+
+/// Endings of video files that `ffmpeg` chooses a format by.
+const VIDEOS: [&str; 4] = ["mp4", "mkv", "mov", "avi"];
+
+/// Arguments of `parfocal recording video`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the recording.
+    folder: PathBuf,
+    /// A video (.mp4, .mkv, .mov or .avi), or a new folder for a picture of each frame.
+    #[arg(long, value_name = "FILE|DIR")]
+    out: PathBuf,
+    /// Begin so many seconds after the first frame.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    from: f64,
+    /// End so many seconds after the first frame; at the last frame if left out.
+    #[arg(long, value_name = "S")]
+    to: Option<f64>,
+    /// Size of the pictures: one pixel a mosaic cell, two by two, or one a sample.
+    #[arg(long, value_enum, default_value_t = Size::Cell)]
+    size: Size,
+    /// What a folder gets: developed pictures (png), or the raw mosaics with 16 bit a sample (tiff).
+    #[arg(long, value_enum, default_value_t = Pictures::Png)]
+    pictures: Pictures,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Pictures {
+    /// Developed, 8 bit sRGB.
+    Png,
+    /// Raw mosaics.
+    Tiff,
+}
+
+/// Saves the video or the pictures.
+///
+/// # Errors
+/// When a frame cannot be read, `ffmpeg` is missing or fails, or a file cannot be written.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let recording = Recording::open(&arguments.folder)?;
+    let calibration = calibration::read(&recording.calibration())?;
+    let frames = chosen(arguments, &recording)?;
+    let mut studio = Studio { developer: Developer::new(&calibration), size: arguments.size };
+
+    let ending = arguments.out.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    let video = VIDEOS.iter().any(|known| ending.eq_ignore_ascii_case(known));
+    if video {
+        save_video(arguments, &recording, &frames, &mut studio)?;
+    } else {
+        save_pictures(arguments, &recording, &frames, &mut studio)?;
+    }
+    print(&format!("{} frames in {}\n", frames.len(), arguments.out.display()))
+}
+
+/// Numbers of the frames within the span asked for.
+fn chosen(arguments: &Arguments, recording: &Recording) -> Result<Vec<usize>, Failure> {
+    let rows = recording.rows();
+    let first = rows.first().map_or(0, |row| row.time);
+    let to = arguments.to.unwrap_or(f64::INFINITY);
+    let within = |&frame: &usize| {
+        let seconds = (rows[frame].time - first) as f64 / 1e9;
+        (arguments.from..=to).contains(&seconds)
+    };
+
+    let frames: Vec<usize> = (0..rows.len()).filter(within).collect();
+    if frames.is_empty() {
+        let length = recording.seconds();
+        return Err(format!(
+            "no frame of {} lies within the seconds asked for; it lasts {length:.1} s",
+            arguments.folder.display()
+        )
+        .into());
+    }
+    Ok(frames)
+}
+
+/// Makes pictures for people.
+struct Studio {
+    developer: Developer,
+    size: Size,
+}
+
+impl Studio {
+    fn develop(&mut self, mosaic: &MosaicFrame, picture: &mut RgbImage) {
+        self.developer.develop(mosaic, self.size, picture, &mut GrayImage::default());
+    }
+}
+
+/// Pipes the frames into `ffmpeg`, each for as long as it was the latest.
+fn save_video(
+    arguments: &Arguments,
+    recording: &Recording,
+    frames: &[usize],
+    studio: &mut Studio,
+) -> Result<(), Failure> {
+    let fps = recording.rate().map_or(25.0, |rate| rate.round().clamp(1.0, 1000.0));
+    let rows = recording.rows();
+    let start = rows[frames[0]].time;
+    let tick = |frame: usize| ((rows[frame].time - start) as f64 / 1e9 * fps).round() as usize;
+
+    let mut encoder: Option<Child> = None;
+    let mut picture = RgbImage::default();
+    let mut shown = 0;
+
+    for (place, &frame) in frames.iter().enumerate() {
+        let until = frames.get(place + 1).map_or(shown + 1, |&next| tick(next));
+        if until <= shown {
+            continue;
+        }
+
+        studio.develop(&recording.frame(frame)?, &mut picture);
+        if encoder.is_none() {
+            encoder = Some(start_encoder(&arguments.out, fps, &picture)?);
+        }
+        let Some(input) = encoder.as_mut().and_then(|encoder| encoder.stdin.as_mut()) else { break };
+
+        // It has ended early if it takes no more; then it says why.
+        if (shown..until).any(|_| input.write_all(&picture.data).is_err()) {
+            break;
+        }
+        shown = until;
+    }
+
+    let Some(encoder) = encoder else { return Ok(()) };
+    let ended = encoder.wait_with_output()?;
+    if ended.status.success() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&ended.stderr);
+    let last = said.lines().last().unwrap_or("no reason given");
+    Err(format!("ffmpeg cannot write {}: {last}", arguments.out.display()).into())
+}
+
+fn start_encoder(out: &Path, fps: f64, picture: &RgbImage) -> Result<Child, Failure> {
+    let mut target = std::ffi::OsString::from("file:");
+    target.push(out);
+
+    let size = format!("{}x{}", picture.width, picture.height);
+    let rate = fps.to_string();
+    let input = ["-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-video_size", &size, "-framerate", &rate];
+    let mut command = Command::new("ffmpeg");
+    command.args(input).args(["-i", "-", "-pix_fmt", "yuv420p"]).arg(target);
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+
+    command.spawn().map_err(|error| {
+        format!("cannot start `ffmpeg`, which makes videos ({error}); install it, on Debian with `apt install ffmpeg`")
+            .into()
+    })
+}
+
+fn save_pictures(
+    arguments: &Arguments,
+    recording: &Recording,
+    frames: &[usize],
+    studio: &mut Studio,
+) -> Result<(), Failure> {
+    let out = &arguments.out;
+    fs::create_dir(out).map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
+
+    let mut picture = RgbImage::default();
+    for &frame in frames {
+        let mosaic = recording.frame(frame)?;
+        let mut bytes = Cursor::new(Vec::new());
+        let (ending, written) = match arguments.pictures {
+            Pictures::Png => {
+                studio.develop(&mosaic, &mut picture);
+                let (width, height) = (picture.width as u32, picture.height as u32);
+                let image = ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, picture.data.as_slice());
+                ("png", image.map(|image| image.write_to(&mut bytes, ImageFormat::Png)))
+            }
+            Pictures::Tiff => {
+                let (width, height) = (mosaic.width() as u32, mosaic.height() as u32);
+                let image = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, mosaic.samples());
+                ("tiff", image.map(|image| image.write_to(&mut bytes, ImageFormat::Tiff)))
+            }
+        };
+
+        let path = out.join(format!("frame{frame:06}.{ending}"));
+        let failed = |problem: &dyn std::fmt::Display| format!("cannot write {}: {problem}", path.display());
+        written.ok_or_else(|| failed(&"its size is wrong"))?.map_err(|error| failed(&error))?;
+        replace(&path, bytes.get_ref()).map_err(|error| failed(&error))?;
+    }
+    Ok(())
+}

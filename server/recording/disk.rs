@@ -1,0 +1,48 @@
+//! How much a recording may write: it leaves a reserve, so that the trial's own data always has room.
+
+use std::path::Path;
+
+/// The reserve of a large disk, bytes.
+const RESERVE: u64 = 1 << 30;
+/// The reserve of a small disk: one part in so many.
+const PART: u64 = 20;
+
+/// A disk's room, bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// What this program may still write.
+    pub available: u64,
+    /// What recordings leave free: 1 GiB, or a twentieth of a disk smaller than 20 GiB.
+    pub reserve: u64,
+}
+
+impl Room {
+    /// Bytes that a recording may still take.
+    #[must_use]
+    pub const fn for_recordings(self) -> u64 {
+        self.available.saturating_sub(self.reserve)
+    }
+}
+
+/// The room on the disk that holds `path`, or its nearest folder above that exists.
+///
+/// # Errors
+/// When the system does not tell.
+pub fn room(path: &Path) -> std::io::Result<Room> {
+    let there = path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("."));
+    let told = rustix::fs::statvfs(there)?;
+
+    let total = told.f_blocks.saturating_mul(told.f_frsize);
+    Ok(Room { available: told.f_bavail.saturating_mul(told.f_frsize), reserve: RESERVE.min(total / PART) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_leaves_the_reserve() {
+        assert_eq!(Room { available: 5000, reserve: 1000 }.for_recordings(), 4000);
+        assert_eq!(Room { available: 500, reserve: 1000 }.for_recordings(), 0);
+    }
+}

@@ -1,0 +1,144 @@
+//! Why a recording cannot be written or read.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::header::{FORMAT, VERSION};
+
+/// Why a recording cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The folder is there already.
+    #[error("{} exists; choose a new folder for the recording", .0.display())]
+    Exists(PathBuf),
+    /// There is no recording there.
+    #[error("{} is not a recording: it has no zarr.json of the format {FORMAT}", .0.display())]
+    NoRecording(PathBuf),
+    /// It was made by another version of the format.
+    #[error(
+        "{} is a recording of format version {found}, but this parfocal reads version {VERSION}; \
+         use the parfocal that made it",
+        path.display()
+    )]
+    OtherVersion {
+        /// The recording's folder.
+        path: PathBuf,
+        /// Its version.
+        found: u64,
+    },
+    /// The description is invalid.
+    #[error("{} does not describe a recording: {reason}", path.display())]
+    Nonsense {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file cannot be read.
+    #[error("cannot read {}: {error}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// A file is damaged.
+    #[error("{}: {damage}; restore it from a copy, or leave these frames out", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        damage: Damage,
+    },
+    /// There is no such frame.
+    #[error("{} has {frames} frames, counted from 0; there is no frame {asked}", path.display())]
+    NoFrame {
+        /// The recording's folder.
+        path: PathBuf,
+        /// Its frames.
+        frames: usize,
+        /// The frame asked for.
+        asked: usize,
+    },
+    /// The disk is full.
+    #[error("no space is left on the disk of {}: {kept} frames are saved", path.display())]
+    Full {
+        /// The recording's folder.
+        path: PathBuf,
+        /// Frames that are stored.
+        kept: usize,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {}: {error} ({kept} frames are saved)", path.display())]
+    Unwritable {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+        /// Frames that are stored.
+        kept: usize,
+    },
+    /// A frame has another size than the recording.
+    #[error("the camera's frames changed from {}x{} to {}x{}; start another recording", of.0, of.1, found.0, found.1)]
+    OtherSize {
+        /// Width and height of the recording's mosaics, samples.
+        of: (usize, usize),
+        /// Those of the frame.
+        found: (usize, usize),
+    },
+    /// The codecs do not work: an error of the program.
+    #[error("the recording's codec failed: {0}")]
+    Codec(String),
+}
+
+impl RecordingError {
+    /// `error` in writing `path`, after `kept` frames were stored.
+    pub fn unwritable(path: &Path, kept: usize, error: io::Error) -> Self {
+        let path = path.to_owned();
+        match error.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full { path, kept },
+            _ => Self::Unwritable { path, error, kept },
+        }
+    }
+
+    /// `error` in reading `path`.
+    pub fn unreadable(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |error| Self::Unreadable { path, error }
+    }
+
+    /// The description in `path` is invalid.
+    pub fn nonsense(path: &Path, reason: impl std::fmt::Display) -> Self {
+        Self::Nonsense { path: path.to_owned(), reason: reason.to_string() }
+    }
+}
+
+/// What is wrong with a file of a recording, and which frames that concerns. Frames count from 0.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Damage {
+    /// The file of a shard is gone.
+    #[error("the file is missing, so frames {first} to {last} are lost")]
+    NoShard {
+        /// First frame of the shard.
+        first: usize,
+        /// Last frame of the shard.
+        last: usize,
+    },
+    /// A shard's index is cut off or does not match its checksum.
+    #[error("its index is cut off or does not match its checksum, so frames {first} to {last} cannot be found in it")]
+    Index {
+        /// First frame of the shard.
+        first: usize,
+        /// Last frame of the shard.
+        last: usize,
+    },
+    /// The shard holds no such frame.
+    #[error("frame {0} is not in it")]
+    Absent(usize),
+    /// A frame does not match its checksum.
+    #[error("frame {0} does not match its checksum")]
+    Frame(usize),
+    /// Values that stand beside the frames do not match their checksum.
+    #[error("the values of `{0}` are missing or do not match their checksum")]
+    Column(&'static str),
+}

@@ -1,0 +1,65 @@
+//! What a recording says of itself: the attributes of its Zarr group.
+
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+/// Value of [`Header::format`].
+pub const FORMAT: &str = "parfocal-recording";
+/// Value of [`Header::version`].
+pub const VERSION: u64 = 1;
+/// Folder of the calibration, below the recording's own.
+pub const CALIBRATION: &str = "calibration";
+
+/// How a recording was made. The group's attributes, beside those that Zarr readers need.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Always [`FORMAT`].
+    pub format: String,
+    /// Always [`VERSION`].
+    pub version: u64,
+    /// The program that made it, and its version.
+    pub software: String,
+    /// Time of the wall's clock (UTC) from which `time` counts.
+    pub started: Timestamp,
+    /// Name of the camera, for people.
+    pub camera: String,
+    /// Name of the lens, for people.
+    pub lens: String,
+    /// Whether camera or lens are simulated.
+    pub simulated: bool,
+    /// Name and version of the sensor's calibration, which lies in the folder `calibration`.
+    pub calibration: String,
+    /// The camera's settings when the recording began, by name, where it has any: `exposure` in microseconds, `gain`,
+    /// `frame-rate` a second.
+    pub camera_settings: BTreeMap<String, f64>,
+    /// The trial session that it was made in, if one was under way.
+    pub session: Option<String>,
+    /// Frames that the camera delivered but the recorder was too slow for.
+    pub frames_lost: u64,
+    /// How it ended; none while it is under way, and where it was cut short.
+    pub ended: Option<Ended>,
+}
+
+/// Why a recording ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "why", content = "problem", rename_all = "kebab-case")]
+pub enum Ended {
+    /// As it was meant to.
+    Stopped,
+    /// The disk's reserve was reached.
+    DiskNearlyFull,
+    /// Something failed, in words.
+    Failed(String),
+}
+
+impl std::fmt::Display for Ended {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stopped => out.write_str("stopped"),
+            Self::DiskNearlyFull => out.write_str("the disk is nearly full"),
+            Self::Failed(problem) => out.write_str(problem),
+        }
+    }
+}

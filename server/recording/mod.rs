@@ -1,0 +1,20 @@
+//! Hyperspectral recordings: every frame's mosaic, lossless, with its time and focal power, as plain Zarr v3 in a folder.
+//! `docs/recordings.md` describes the layout for others.
+
+mod codec;
+mod disk;
+mod error;
+mod header;
+mod layout;
+mod reading;
+mod recorder;
+mod shard;
+mod writing;
+
+pub use disk::{Room, room};
+pub use error::{Damage, RecordingError};
+pub use header::{CALIBRATION, Ended, FORMAT, Header, VERSION};
+pub use layout::{SHARD_FRAMES, by_wavelength};
+pub use reading::Recording;
+pub use recorder::{Intake, Progress, Recorder, Shot, compressed_size};
+pub use writing::{FrameRow, Writer};

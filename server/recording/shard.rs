@@ -1,0 +1,83 @@
+//! Shards: files that hold the frames of one stretch of time, each compressed by itself, and an index at their end
+//! (codec `sharding_indexed` of Zarr v3). Written here, because frames are compressed as they come and a shard is
+//! stored whole.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+
+use zarrs::array::FillValue;
+use zarrs::array::data_type::uint64;
+
+use super::codec::{Coder, plain_codecs};
+use super::error::RecordingError;
+
+/// Offset and length of a chunk that is absent.
+const ABSENT: u64 = u64::MAX;
+/// Bytes of the index's checksum.
+const CHECKSUM: usize = 4;
+
+/// Reads and writes the index of shards of so many frames.
+pub struct Index {
+    coder: Coder,
+    frames: usize,
+}
+
+impl Index {
+    /// For shards of `frames` frames.
+    ///
+    /// # Errors
+    /// When the codecs do not work.
+    pub fn new(frames: usize) -> Result<Self, RecordingError> {
+        let coder = Coder::new(uint64(), FillValue::from(ABSENT), &[frames, 1, 1, 2], plain_codecs())?;
+        Ok(Self { coder, frames })
+    }
+
+    /// The index of a shard that begins with these frames, given their stored lengths.
+    ///
+    /// # Errors
+    /// When there are more than fit.
+    pub fn encode(&self, lengths: &[usize]) -> Result<Vec<u8>, RecordingError> {
+        let mut places = Vec::with_capacity(2 * self.frames);
+        let mut offset = 0;
+        for &length in lengths {
+            places.extend([offset, length as u64]);
+            offset += length as u64;
+        }
+
+        places.resize((2 * self.frames).max(places.len()), ABSENT);
+        self.coder.encode(&places)
+    }
+
+    /// Offset and length of each frame in a shard; none for those that it lacks. `None` where the index is cut off or
+    /// damaged.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn read(&self, shard: &mut File) -> io::Result<Option<Vec<Option<(u64, u64)>>>> {
+        let length = 16 * self.frames + CHECKSUM;
+        let whole = shard.metadata()?.len();
+        let Some(start) = whole.checked_sub(length as u64) else { return Ok(None) };
+
+        let mut stored = vec![0; length];
+        shard.seek(SeekFrom::Start(start))?;
+        shard.read_exact(&mut stored)?;
+
+        let Ok(places) = self.coder.decode::<u64>(stored) else { return Ok(None) };
+        let place = |pair: &[u64]| match *pair {
+            [offset, length] if offset.checked_add(length).is_some_and(|end| end <= start) => Some((offset, length)),
+            _ => None,
+        };
+        Ok(Some(places.chunks_exact(2).map(place).collect()))
+    }
+}
+
+/// Writes a shard: its frames, then its index.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write(out: &mut dyn Write, frames: &[Vec<u8>], index: &[u8]) -> io::Result<()> {
+    for frame in frames {
+        out.write_all(frame)?;
+    }
+    out.write_all(index)
+}

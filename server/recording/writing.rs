@@ -1,0 +1,261 @@
+//! Writes a recording. Each shard becomes whole under another name and is then renamed; only after that do the arrays
+//! become longer. So whatever ends the program, what was stored before opens.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use zarrs::array::data_type::{float64, int64, uint64};
+use zarrs::array::{Element, FillValue};
+
+use super::codec::{Coder, plain_codecs};
+use super::error::RecordingError;
+use super::header::{Ended, Header};
+use super::layout::{BandValues, COLUMN_CHUNK, Column, DESCRIPTION, MOSAIC, SHARD_FRAMES, band_arrays, group, growing};
+use super::shard::{self, Index};
+use crate::files::{replace, replace_with};
+use crate::imaging::{BANDS, Calibration};
+
+/// What is known of a frame beside its mosaic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameRow {
+    /// End of the exposure, nanoseconds since the recording's start.
+    pub time: i64,
+    /// The camera's number of the frame.
+    pub number: u64,
+    /// Length of the exposure, milliseconds.
+    pub exposure: f64,
+    /// Focal power asked for after the frame.
+    pub asked: f64,
+    /// Focal power at the middle of the exposure; NaN while unknown.
+    pub measured: f64,
+    /// Best focal power, where a simulation knows it; else NaN.
+    pub optimal: f64,
+}
+
+/// A recording under way.
+pub struct Writer {
+    folder: PathBuf,
+    header: Header,
+    size: (usize, usize),
+    /// Descriptions of the arrays that do not grow.
+    fixed: Vec<(String, Value)>,
+    index: Index,
+    columns: Columns,
+    /// Rows of the file of each column that is not full yet, those of frames that wait for their shard included.
+    rows: Vec<FrameRow>,
+    /// Frames that wait for their shard, compressed.
+    waiting: Vec<Vec<u8>>,
+    /// Frames in whole shards.
+    stored: usize,
+}
+
+/// The coders of a file of a column.
+struct Columns {
+    time: Coder,
+    number: Coder,
+    other: Coder,
+}
+
+impl Columns {
+    fn new() -> Result<Self, RecordingError> {
+        let shape = [COLUMN_CHUNK];
+        Ok(Self {
+            time: Coder::new(int64(), FillValue::from(0_i64), &shape, plain_codecs())?,
+            number: Coder::new(uint64(), FillValue::from(0_u64), &shape, plain_codecs())?,
+            other: Coder::new(float64(), FillValue::from(f64::NAN), &shape, plain_codecs())?,
+        })
+    }
+
+    fn encode(&self, column: Column, rows: &[FrameRow]) -> Result<Vec<u8>, RecordingError> {
+        match column {
+            Column::Time => padded(&self.time, rows.iter().map(|row| row.time), 0),
+            Column::Number => padded(&self.number, rows.iter().map(|row| row.number), 0),
+            Column::Exposure => padded(&self.other, rows.iter().map(|row| row.exposure), f64::NAN),
+            Column::Asked => padded(&self.other, rows.iter().map(|row| row.asked), f64::NAN),
+            Column::Measured => padded(&self.other, rows.iter().map(|row| row.measured), f64::NAN),
+            Column::Optimal => padded(&self.other, rows.iter().map(|row| row.optimal), f64::NAN),
+        }
+    }
+}
+
+fn padded<T: Element>(coder: &Coder, values: impl Iterator<Item = T>, fill: T) -> Result<Vec<u8>, RecordingError> {
+    let mut values: Vec<T> = values.collect();
+    values.resize(COLUMN_CHUNK, fill);
+    coder.encode(&values)
+}
+
+impl Writer {
+    /// Begins a recording of mosaics of `size` (width and height in samples) in `folder`, which must not exist.
+    ///
+    /// # Errors
+    /// When the folder exists or cannot be written.
+    pub fn create(
+        folder: &Path,
+        header: Header,
+        size: (usize, usize),
+        calibration: &Calibration,
+    ) -> Result<Self, RecordingError> {
+        make_folder(folder)?;
+
+        let mut fixed = Vec::new();
+        for array in band_arrays(calibration) {
+            let stored = match &array.values {
+                BandValues::Nanometres(values) => {
+                    Coder::new(float64(), FillValue::from(f64::NAN), &[BANDS], plain_codecs())?.encode(values)?
+                }
+                BandValues::Places(values) => {
+                    Coder::new(int64(), FillValue::from(0_i64), &[BANDS], plain_codecs())?.encode(values)?
+                }
+            };
+            let description = array.description();
+            put(&folder.join(array.name).join("c/0"), 0, &stored)?;
+            put(&folder.join(array.name).join(DESCRIPTION), 0, &pretty(&description))?;
+            fixed.push((array.name.to_owned(), description));
+        }
+
+        let writer = Self {
+            folder: folder.to_owned(),
+            header,
+            size,
+            fixed,
+            index: Index::new(SHARD_FRAMES)?,
+            columns: Columns::new()?,
+            rows: Vec::new(),
+            waiting: Vec::new(),
+            stored: 0,
+        };
+        writer.describe()?;
+        Ok(writer)
+    }
+
+    /// The recording's folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Width and height of its mosaics in samples.
+    #[must_use]
+    pub const fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    /// How it is being made.
+    #[must_use]
+    pub const fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Frames that would be there if the program were killed now.
+    #[must_use]
+    pub const fn stored(&self) -> usize {
+        self.stored
+    }
+
+    /// Bytes that the frames that wait for their shard will take.
+    #[must_use]
+    pub fn waiting_bytes(&self) -> u64 {
+        self.waiting.iter().map(|frame| frame.len() as u64).sum()
+    }
+
+    /// Sets how many frames were lost so far; stored with the next shard.
+    pub const fn set_lost(&mut self, frames: u64) {
+        self.header.frames_lost = frames;
+    }
+
+    /// Adds a frame, compressed by [`Coder::of_frames`] of this size. Every [`SHARD_FRAMES`] frames become a file.
+    ///
+    /// # Errors
+    /// When it cannot be written; then the frames of this shard are lost, and those before it are kept.
+    pub fn add(&mut self, row: FrameRow, compressed: Vec<u8>) -> Result<(), RecordingError> {
+        self.rows.push(row);
+        self.waiting.push(compressed);
+        if self.waiting.len() == SHARD_FRAMES { self.store() } else { Ok(()) }
+    }
+
+    /// Stores the frames that still wait, and notes how the recording ended.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn finish(mut self, ended: Ended) -> Result<usize, RecordingError> {
+        self.header.ended = Some(ended);
+        if self.waiting.is_empty() { self.describe() } else { self.store() }?;
+        Ok(self.stored)
+    }
+
+    /// Makes a file of the frames that wait, and the arrays longer by these.
+    fn store(&mut self) -> Result<(), RecordingError> {
+        let frames = std::mem::take(&mut self.waiting);
+        let lengths: Vec<usize> = frames.iter().map(Vec::len).collect();
+        let stored = self.index.encode(&lengths).and_then(|index| self.store_shard(&frames, &index));
+
+        if let Err(error) = stored {
+            // The rows of frames that are not there must not become those of later ones.
+            self.rows.truncate(self.rows.len() - frames.len());
+            return Err(error);
+        }
+
+        for column in Column::ALL {
+            let file = self.folder.join(column.name()).join("c").join((self.stored / COLUMN_CHUNK).to_string());
+            put(&file, self.stored, &self.columns.encode(column, &self.rows)?)?;
+        }
+
+        self.stored += frames.len();
+        if self.rows.len() == COLUMN_CHUNK {
+            self.rows.clear();
+        }
+        self.describe()
+    }
+
+    fn store_shard(&self, frames: &[Vec<u8>], index: &[u8]) -> Result<(), RecordingError> {
+        let path = self.folder.join(MOSAIC).join(format!("c/{}/0/0", self.stored / SHARD_FRAMES));
+        let failed = |error| RecordingError::unwritable(&self.folder, self.stored, error);
+        make_parent(&path).map_err(failed)?;
+        replace_with(&path, |out| shard::write(out as &mut dyn Write, frames, index)).map_err(failed)
+    }
+
+    /// Describes what is stored now: first all of it in one file, then each array for readers that do not look there.
+    fn describe(&self) -> Result<(), RecordingError> {
+        let growing = growing(&self.header, self.size, self.stored);
+        let mut arrays = growing.clone();
+        arrays.extend(self.fixed.iter().cloned());
+
+        let whole = group(&self.header, &arrays)?;
+        put(&self.folder.join(DESCRIPTION), self.stored, &pretty(&whole))?;
+
+        for (name, description) in &growing {
+            put(&self.folder.join(name).join(DESCRIPTION), self.stored, &pretty(description))?;
+        }
+        Ok(())
+    }
+}
+
+/// Makes the folder of a recording or another that must be new.
+///
+/// # Errors
+/// When it exists or cannot be made.
+pub fn make_folder(folder: &Path) -> Result<(), RecordingError> {
+    let failed = |error| RecordingError::unwritable(folder, 0, error);
+    make_parent(folder).map_err(failed)?;
+    fs::create_dir(folder).map_err(|error| match error.kind() {
+        std::io::ErrorKind::AlreadyExists => RecordingError::Exists(folder.to_owned()),
+        _ => failed(error),
+    })
+}
+
+fn make_parent(path: &Path) -> std::io::Result<()> {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).map_or(Ok(()), fs::create_dir_all)
+}
+
+fn put(path: &Path, kept: usize, bytes: &[u8]) -> Result<(), RecordingError> {
+    let written = make_parent(path).and_then(|()| replace(path, bytes));
+    written.map_err(|error| RecordingError::unwritable(path, kept, error))
+}
+
+fn pretty(description: &Value) -> Vec<u8> {
+    let mut text = format!("{description:#}");
+    text.push('\n');
+    text.into_bytes()
+}
