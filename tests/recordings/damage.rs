@@ -1,0 +1,172 @@
+//! Recordings that are cut short, damaged, of another version, or have no room.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, SeekFrom, Write};
+
+use super::*;
+
+/// Reads, changes and writes a byte.
+fn flip(file: &Path, at: u64) {
+    let mut file = OpenOptions::new().read(true).write(true).open(file).unwrap();
+    let mut byte = [0];
+    file.seek(SeekFrom::Start(at)).unwrap();
+    file.read_exact(&mut byte).unwrap();
+    file.seek(SeekFrom::Start(at)).unwrap();
+    file.write_all(&[byte[0] ^ 0x10]).unwrap();
+}
+
+fn check(recording: &Path) -> String {
+    complaint(&parfocal(&["recording", "info", text(recording)]))
+}
+
+#[test]
+fn what_a_killed_recording_had_stored_opens() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("recording");
+    let mut recording = command(&["recording", "record", "--out", text(&out)]).stderr(Stdio::null()).spawn().unwrap();
+    wait_for(|| Recording::open(&out).is_ok_and(|there| there.rows().len() >= 50));
+    recording.kill().unwrap();
+    recording.wait().unwrap();
+
+    let told = info(&out);
+    assert!(told["frames"].as_u64().unwrap() >= 50);
+    assert_eq!((&told["ended"], &told["damaged"]), (&Value::Null, &serde_json::json!([])));
+    assert!(done(&["recording", "info", text(&out)]).contains("cut short"));
+    assert_eq!(python(&[text(&out)])["shape"][0], told["frames"]);
+}
+
+#[test]
+fn a_damaged_frame_is_named_and_the_others_are_read() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 30);
+    let shard = recording.join("mosaic/c/0/0/0");
+
+    // By the format's description: pairs of offset and length, and four bytes of checksum, at the end.
+    let bytes = fs::read(&shard).unwrap();
+    let index = &bytes[bytes.len() - 25 * 16 - 4..];
+    let offset = u64::from_le_bytes(index[16 * 3..16 * 3 + 8].try_into().unwrap());
+    flip(&shard, offset + 40);
+
+    let told = check(&recording);
+    assert!(told.contains("frame 3 does not match its checksum"), "{told}");
+    assert!(!told.contains("more)"), "only this one: {told}");
+    let opened = Recording::open(&recording).unwrap();
+    assert!(opened.frame(3).is_err() && opened.frame(2).unwrap() == mosaic(2) && opened.frame(4).unwrap() == mosaic(4));
+}
+
+#[test]
+fn a_cut_or_missing_file_names_its_frames() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 60);
+    let shard = recording.join("mosaic/c/1/0/0");
+    let length = fs::metadata(&shard).unwrap().len();
+    File::options().write(true).open(&shard).unwrap().set_len(length - 1).unwrap();
+    let told = check(&recording);
+    assert!(told.contains("so frames 25 to 49 cannot be found in it") && !told.contains("more)"), "{told}");
+
+    fs::remove_file(&shard).unwrap();
+    let told = check(&recording);
+    assert!(told.contains("the file is missing, so frames 25 to 49 are lost"), "{told}");
+    assert!(Recording::open(&recording).unwrap().frame(50).unwrap() == mosaic(50));
+
+    flip(&recording.join("time/c/0"), 100);
+    assert!(check(&recording).contains("the values of `time` are missing or do not match their checksum"));
+}
+
+#[test]
+fn what_is_no_recording_of_this_version_is_said_to_be_so() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 2);
+    let description = recording.join("zarr.json");
+    let original = fs::read_to_string(&description).unwrap();
+    let told = |from: &str, to: &str| {
+        assert!(original.contains(from));
+        fs::write(&description, original.replace(from, to)).unwrap();
+        check(&recording)
+    };
+
+    assert!(told("\"version\": 1", "\"version\": 2").contains("format version 2, but this parfocal reads version 1"));
+    assert!(told("parfocal-recording", "something").contains("is not a recording"));
+    assert!(told("2026-03-01T12:00:00.25Z", "yesterday").contains("does not describe a recording"));
+    assert!(told("{", "[").contains("does not describe a recording"));
+    let sensor = told("      \"mosaic\": {", "      \"mosaics\": {");
+    assert!(sensor.contains("it has no mosaics"), "{sensor}");
+
+    let told = complaint(&parfocal(&["recording", "info", text(&folder.path().join("nowhere"))]));
+    assert!(told.contains("is not a recording"), "{told}");
+}
+
+#[test]
+fn a_folder_that_exists_and_a_camera_without_mosaics_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let told = complaint(&parfocal(&["recording", "record", "--out", text(folder.path()), "--seconds", "1"]));
+    assert!(told.contains("exists; choose a new folder"), "{told}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+
+    let still = folder.path().join("still.png");
+    image::GrayImage::from_pixel(320, 240, image::Luma([90])).save(&still).unwrap();
+    let camera = format!("footage:{}", still.display());
+    let out = folder.path().join("out");
+    let told = complaint(&parfocal(&["recording", "record", "--out", text(&out), "--camera", &camera]));
+    assert!(told.contains("delivers colour pictures") && !out.exists(), "{told}");
+
+    let told = complaint(&parfocal(&["recording", "record", "--out", text(&out), "--policy", "guess"]));
+    assert!(told.contains("guess") && !out.exists(), "{told}");
+}
+
+/// A disk of its own, in memory; gone when dropped.
+struct SmallDisk(TempDir);
+
+impl SmallDisk {
+    /// A disk of so many megabytes, or (said on standard error) none where this user may not mount one.
+    fn mount(megabytes: u32) -> Option<Self> {
+        let folder = TempDir::new().unwrap();
+        let size = format!("size={megabytes}m");
+        let mounted = Command::new("mount").args(["-t", "tmpfs", "-o", &size, "tmpfs"]).arg(folder.path()).output();
+        if mounted.is_ok_and(|output| output.status.success()) {
+            return Some(Self(folder));
+        }
+        eprintln!("skipped: to try a full disk, one has to be mounted, which takes root");
+        None
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg("--lazy").arg(self.0.path()).status();
+    }
+}
+
+#[test]
+fn a_recording_stops_by_itself_before_the_disk_is_full() {
+    let Some(disk) = SmallDisk::mount(60) else { return };
+    let out = disk.0.path().join("recording");
+    let told = complaint(&parfocal(&["recording", "record", "--out", text(&out), "--seconds", "60"]));
+    assert!(told.contains("nearly full"), "{told}");
+
+    let found = info(&out);
+    assert!(found["frames"].as_u64().unwrap() >= 25, "{found}");
+    assert_eq!(found["ended"]["why"], "disk-nearly-full");
+    assert!(told.contains(&format!("{} frames in", found["frames"])), "{told}");
+
+    // A twentieth of the disk is left.
+    let free = rustix::fs::statvfs(disk.0.path()).unwrap();
+    assert!(free.f_bavail * free.f_frsize > 60 * 1024 * 1024 / 21, "{} blocks", free.f_bavail);
+}
+
+#[test]
+fn a_disk_that_something_else_fills_costs_only_what_was_not_stored() {
+    let Some(disk) = SmallDisk::mount(200) else { return };
+    let out = disk.0.path().join("recording");
+    let recording = command(&["recording", "record", "--out", text(&out)]).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(|| Recording::open(&out).is_ok_and(|there| !there.rows().is_empty()));
+
+    let mut filler = File::create(disk.0.path().join("filler")).unwrap();
+    while filler.write_all(&[0; 4096]).is_ok() {}
+    let told = complaint(&recording.wait_with_output().unwrap());
+    assert!(told.contains("full"), "{told}");
+
+    let found = info(&out);
+    assert!(found["frames"].as_u64().unwrap() >= 25 && found["frames"].as_u64().unwrap().is_multiple_of(25), "{found}");
+    assert!(told.contains(&format!("{} frames in", found["frames"])), "{told} {found}");
+}

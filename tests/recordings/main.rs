@@ -1,0 +1,290 @@
+//! Hyperspectral recordings from outside: made by the command, killed, damaged, played back, and opened by Python's
+//! own libraries.
+
+mod damage;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use parfocal::camera::{self, CameraSettings, FrameImage};
+use parfocal::clock::{Clock, Moment, SystemClock};
+use parfocal::imaging::{Calibration, MosaicFrame};
+use parfocal::lens::{FocalPower, Lens, SimulatedLens};
+use parfocal::recording::{CALIBRATION, FORMAT, Header, Recorder, Recording, Shot, VERSION, Writer};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Width and height of the recordings that tests make up.
+const SIZE: (usize, usize) = (64, 32);
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn parfocal(arguments: &[&str]) -> Output {
+    command(arguments).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// What a command that succeeds prints.
+fn done(arguments: &[&str]) -> String {
+    let output = parfocal(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    said(&output)
+}
+
+/// The one sentence that a failing command ends with.
+fn complaint(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(1), "{}{}", said(output), String::from_utf8_lossy(&output.stderr));
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    error.lines().find(|line| line.starts_with("parfocal: ")).unwrap_or_else(|| panic!("{error}")).to_owned()
+}
+
+fn info(recording: &Path) -> Value {
+    serde_json::from_str(&done(&["recording", "info", text(recording), "--json"])).unwrap()
+}
+
+/// What Python's zarr, xarray and, for a cube, spectral find.
+fn python(arguments: &[&str]) -> Value {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let packages = root.join("target/recordings");
+    assert!(packages.join("installed").exists(), "Python's readers are missing; run `.ci/setup test` once");
+
+    let mut python = Command::new("python3");
+    python.arg("-s").arg(root.join("tests/recordings/read.py")).args(arguments).env("PYTHONPATH", packages);
+    let output = python.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Sample (`x`, `y`) of frame `frame` of a recording that a test makes up.
+fn sample(frame: usize, x: usize, y: usize) -> u16 {
+    ((frame * 97 + y * 31 + x * 7) % 1024) as u16
+}
+
+fn mosaic(frame: usize) -> MosaicFrame {
+    let (width, height) = SIZE;
+    let samples = (0..width * height).map(|place| sample(frame, place % width, place / width)).collect();
+    MosaicFrame::new(width, height, samples).unwrap()
+}
+
+fn header() -> Header {
+    Header {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        software: "a test".to_owned(),
+        started: "2026-03-01T12:00:00.25Z".parse().unwrap(),
+        camera: "a test's".to_owned(),
+        lens: "a test's".to_owned(),
+        simulated: true,
+        calibration: Calibration::default().title(),
+        camera_settings: [("gain".to_owned(), 2.5)].into(),
+        session: None,
+        frames_lost: 0,
+        ended: None,
+    }
+}
+
+/// A recording of `frames` frames at 50 a second whose camera lost every tenth frame. No focal power was measured.
+fn made_up(folder: &TempDir, frames: usize) -> PathBuf {
+    let path = folder.path().join("recording");
+    let calibration = Calibration::default();
+    let writer = Writer::create(&path, header(), SIZE, &calibration).unwrap();
+    camera::calibration::save(&path.join(CALIBRATION), &calibration, &[]).unwrap();
+
+    let recorder = Recorder::start(writer, Moment::from_nanos(1_000_000_000)).unwrap();
+    for frame in 0..frames {
+        let number = (frame + frame / 9) as u64;
+        recorder.intake().offer(Shot {
+            number: 100 + number,
+            exposed_at: Moment::from_nanos(1_000_000_000 + number * 20_000_000),
+            exposure: Duration::from_micros(2500),
+            asked: FocalPower::new(frame as f64 / frames as f64).unwrap(),
+            measured: None,
+            optimal: None,
+            mosaic: Arc::new(mosaic(frame)),
+        });
+        // More frames at once than fit would be lost, as they should.
+        wait_for(|| recorder.progress().frames > frame as u64);
+    }
+    assert_eq!(recorder.stop().lost, 0);
+    path
+}
+
+fn wait_for(mut happened: impl FnMut() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(60);
+    while !happened() {
+        assert!(Instant::now() < limit, "it did not happen within a minute");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn python_reads_every_sample_and_the_wavelengths_are_coordinates() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 60);
+    let found = python(&[text(&recording)]);
+
+    assert_eq!(found["shape"], serde_json::json!([60, 32, 64]));
+    assert_eq!(found["dimensions"], serde_json::json!(["frame", "y", "x"]));
+    assert_eq!((&found["same"], &found["lazily"]), (&Value::Bool(true), &Value::Bool(true)));
+    assert_eq!(found["units"], "nm");
+    assert_eq!(found["started"], "2026-03-01T12:00:00.25Z");
+    let coordinates = found["coordinates"].as_array().unwrap();
+    for name in ["wavelength", "fwhm", "time", "focal_power_asked", "focal_power_measured", "frame_number"] {
+        assert!(coordinates.contains(&name.into()), "{name} is no coordinate: {coordinates:?}");
+    }
+
+    // The published centres of the sensor's bands, sorted.
+    let published = [
+        460.1, 468.5, 475.4, 484.5, 496.0, 503.0, 513.3, 524.1, 532.0, 544.4, 550.8, 560.0, 570.5, 576.9, 586.9, 594.9,
+    ];
+    assert_eq!(found["wavelengths"], serde_json::json!(published));
+
+    let first: Vec<u16> = (0..8).map(|place| sample(0, place % 4, place / 4)).collect();
+    assert_eq!(found["first"], serde_json::json!(first));
+    let sum = |frame| (0..64 * 32).map(|place| u64::from(sample(frame, place % 64, place / 64))).sum::<u64>();
+    assert_eq!(found["sums"], serde_json::json!((0..60).map(sum).collect::<Vec<_>>()));
+
+    assert_eq!(found["numbers"][59], 165);
+    assert!((found["seconds"][59].as_f64().unwrap() - 65.0 * 0.02).abs() < 1e-9);
+    assert!((found["asked"][30].as_f64().unwrap() - 0.5).abs() < 1e-12);
+
+    let told = info(&recording);
+    assert_eq!((&told["frames"], &told["frames_missing"], &told["frames_lost"]), (&60.into(), &6.into(), &0.into()));
+    assert_eq!(told["camera_settings"]["gain"], 2.5);
+}
+
+#[test]
+fn spectral_python_opens_a_frames_cube() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 30);
+    let cube = folder.path().join("cube.hdr");
+    done(&["recording", "cube", text(&recording), "--frame", "27", "--out", text(&cube)]);
+
+    let found = python(&[text(&recording), text(&cube), "27"]);
+    assert_eq!(found["cube"], serde_json::json!([8, 16, 16]));
+    assert_eq!(found["equal"], true);
+    assert_eq!((found["centres"][0].as_f64(), found["centres"][15].as_f64()), (Some(460.1), Some(594.9)));
+    assert_eq!((found["widths"][0].as_f64(), found["widths"][15].as_f64()), (Some(10.9), Some(16.3)));
+
+    let told = complaint(&parfocal(&["recording", "cube", text(&recording), "--frame", "30", "--out", text(&cube)]));
+    assert!(told.contains("has 30 frames, counted from 0; there is no frame 30"), "{told}");
+}
+
+#[test]
+fn the_phantom_is_recorded_small_enough_and_played_back() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("phantom");
+    let printed =
+        done(&["recording", "record", "--out", text(&out), "--seconds", "1.5", "--policy", "mgm-hill-climber"]);
+    assert!(printed.contains("frames in"), "{printed}");
+
+    let told = info(&out);
+    let frames = told["frames"].as_u64().unwrap();
+    assert!(frames >= 5, "{told}");
+    assert_eq!((&told["width"], &told["height"], &told["simulated"]), (&2048.into(), &1088.into(), &true.into()));
+    assert_eq!(told["ended"]["why"], "stopped");
+    let share = told["share_of_packed"].as_f64().unwrap();
+    assert!(share < 0.75, "{share} of packed 10 bit");
+    assert_eq!(python(&[text(&out)])["shape"][0], frames);
+
+    let recording = Recording::open(&out).unwrap();
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+    let optics = SimulatedLens::new(Arc::clone(&clock)).optics();
+    let settings = CameraSettings { fps: 1.0, seed: 0, optics, clock };
+    let mut camera = camera::open(&format!("recording:{}", out.display()), settings).unwrap();
+    assert_eq!(camera.mosaic_size(), Some((2048, 1088)));
+
+    let mut seen = Vec::new();
+    while seen.len() < 3 {
+        let frame = camera.next_frame(Duration::from_secs(5)).unwrap();
+        let FrameImage::Mosaic(mosaic) = frame.image else { panic!("a recording plays mosaics") };
+        let index = (frame.number - 1) % frames;
+        assert!(*mosaic == recording.frame(index as usize).unwrap(), "frame {index}");
+        assert!(frame.truth.is_some(), "what the simulation knew is kept");
+        seen.push(frame.exposed_at);
+    }
+    assert!(camera.health().simulated && camera.health().name.contains("a recording of: brain phantom"));
+    let period = 1.0 / recording.rate().unwrap();
+    let paced = seen[2].since(seen[0]).as_secs_f64();
+    assert!(paced > period, "3 frames within {paced} s, one every {period} s");
+}
+
+#[test]
+fn a_span_becomes_a_video_or_pictures() {
+    let folder = TempDir::new().unwrap();
+    let recording = made_up(&folder, 60);
+    let video = folder.path().join("video.mp4");
+    done(&["recording", "video", text(&recording), "--out", text(&video), "--size", "full"]);
+
+    let mut probe = Command::new("ffprobe");
+    probe.args([
+        "-v",
+        "error",
+        "-count_frames",
+        "-show_entries",
+        "stream=width,height,nb_read_frames",
+        "-of",
+        "csv=p=0",
+    ]);
+    let output = probe.arg(&video).output().unwrap();
+    // 66 numbered by the camera, at 46 a second: lost ones last as long as the one before.
+    let fields: Vec<u32> = said(&output).trim().split(',').map(|field| field.parse().unwrap()).collect();
+    assert_eq!(fields[..2], [64, 32]);
+    assert!((60..=61).contains(&fields[2]), "{fields:?}");
+
+    let pictures = folder.path().join("pictures");
+    let span = ["--from", "0.1", "--to", "0.15", "--pictures", "tiff"];
+    let arguments = ["recording", "video", text(&recording), "--out", text(&pictures)];
+    done(&[&arguments[..], &span[..]].concat());
+    let mut names: Vec<String> =
+        fs::read_dir(&pictures).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, ["frame000005.tiff", "frame000006.tiff", "frame000007.tiff"]);
+    let picture = image::open(pictures.join("frame000006.tiff")).unwrap().into_luma16();
+    assert!(picture.into_raw() == mosaic(6).samples());
+
+    let told = complaint(&parfocal(&[&arguments[..], &["--from", "9"]].concat()));
+    assert!(told.contains("lies within the seconds asked for"), "{told}");
+}
+
+#[test]
+fn what_does_not_fit_into_a_recorder_is_lost_and_counted() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("recording");
+    let writer = Writer::create(&path, header(), (2048, 1088), &Calibration::default()).unwrap();
+    let recorder = Recorder::start(writer, Moment::default()).unwrap();
+
+    let shot = |number| Shot {
+        number,
+        exposed_at: Moment::from_nanos(number),
+        exposure: Duration::ZERO,
+        asked: FocalPower::MIDDLE,
+        measured: None,
+        optimal: None,
+        mosaic: Arc::new(MosaicFrame::new(2048, 1088, vec![number as u16; 2048 * 1088]).unwrap()),
+    };
+    let shots: Vec<Shot> = (1..=100).map(shot).collect();
+    let intake = recorder.intake();
+    shots.into_iter().for_each(|shot| intake.offer(shot));
+
+    let progress = recorder.stop();
+    assert!(progress.lost > 0 && progress.frames > 0, "{progress:?}");
+    assert_eq!(progress.lost + progress.frames, 100);
+    let stored = Recording::open(&path).unwrap();
+    assert_eq!(stored.header().frames_lost, progress.lost);
+    assert_eq!(stored.rows().len() as u64, progress.frames);
+}
