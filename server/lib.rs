@@ -33,6 +33,8 @@ pub mod store;
 
 pub mod conductor;
 
+pub mod recorder;
+
 pub mod http;
 
 pub mod cli;

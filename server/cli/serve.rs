@@ -27,6 +27,7 @@ use crate::http::keys::Keys;
 use crate::http::{self, App};
 use crate::imaging::{Calibration, Developer, Reconstructor, Size};
 use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
+use crate::recorder::{self, Recordings};
 use crate::store::{self, Store, device_log, telemetry};
 use crate::{lens, live, priority};
 
@@ -90,6 +91,12 @@ Real-time priority:
 
 /// Open connections get this long to end by themselves, and then the disk as long to take what is left.
 const GRACE: Duration = Duration::from_millis(700);
+
+/// Folder of the recordings, in the data folder.
+const RECORDINGS: &str = "recordings";
+
+/// The disk gets this long to take the rest of a recording.
+const RECORDING: Duration = Duration::from_secs(3);
 
 /// Lens and camera get this long to be put to rest.
 const DEVICES: Duration = Duration::from_secs(5);
@@ -170,7 +177,20 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     })
     .await?;
 
+    let recordings = Recordings::new(recorder::Parts {
+        clock: Arc::clone(&clock),
+        tap: control.tap.clone(),
+        status: control.status.clone(),
+        controls: control.camera.clone(),
+        live: live.clone(),
+        conductor: conductor.clone(),
+        folder: arguments.data_dir.join(RECORDINGS),
+        calibration: calibration.clone(),
+        size: mosaics,
+    });
+
     let conducting = tokio::spawn(conductor.clone().run());
+    let recording = tokio::spawn(recordings.clone().run());
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
 
@@ -178,6 +198,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         clock,
         live,
         store: store.clone(),
+        recordings: recordings.clone(),
         surgeon_view: conductor.surgeon_view(),
         operator_view: conductor.operator_view(),
         conductor,
@@ -208,6 +229,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let _ = timeout(GRACE, async { (server.await, end.closed().await) }).await;
 
     conducting.abort();
+    recording.abort();
+    if timeout(RECORDING, recordings.stop()).await.is_err() {
+        tracing::error!("the disk does not take the rest of the recording; exiting without it");
+    }
     let stopping = tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join()));
     if timeout(DEVICES, stopping).await.is_err() {
         tracing::error!("the control loop does not stop; exiting without it");

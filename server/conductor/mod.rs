@@ -37,6 +37,7 @@ use crate::store::Store;
 use crate::trial::action::Action;
 use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::phase::Phase;
+use crate::trial::protocol::Record;
 use crate::trial::remark::{Holding, NewAnswer, NewComment};
 use crate::trial::role::Role;
 use crate::trial::view::{OperatorView, SurgeonView};
@@ -177,6 +178,23 @@ impl Conductor {
     #[must_use]
     pub fn operator_view(&self) -> watch::Receiver<Option<Arc<OperatorView>>> {
         self.shared.operator.subscribe()
+    }
+
+    /// The session that has neither ended nor been closed, if there is one.
+    #[must_use]
+    pub fn session_under_way(&self) -> Option<SessionId> {
+        let live = self.shared.live();
+        live.shown().filter(|course| !course.state.phase().has_ended()).map(Course::session)
+    }
+
+    /// What the session under way is to have recorded, from its start to its end.
+    #[must_use]
+    pub fn to_record(&self) -> Option<(SessionId, Record)> {
+        let live = self.shared.live();
+        let course = live.shown()?;
+        let phase = course.state.phase();
+        let runs = phase != Phase::Ready && !phase.has_ended();
+        (runs && course.protocol.record != Record::None).then(|| (course.session(), course.protocol.record))
     }
 
     /// Makes a session for `participant` by `protocol` and draws its allocation; it waits for

@@ -15,6 +15,7 @@ mod mjpeg;
 mod openapi;
 mod operator;
 mod places;
+mod recording;
 mod researcher;
 pub mod roles;
 pub mod security;
@@ -54,6 +55,7 @@ pub fn router(app: AppState) -> Router {
         .merge(surgeon::routes())
         .merge(operator::routes())
         .merge(camera::routes())
+        .merge(recording::routes())
         .merge(researcher::routes())
         .merge(export::routes())
         .merge(live::routes())

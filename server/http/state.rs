@@ -13,6 +13,7 @@ use crate::clock::Clock;
 use crate::conductor::Conductor;
 use crate::control::ControlObserver;
 use crate::live::LiveHandle;
+use crate::recorder::Recordings;
 use crate::store::Store;
 use crate::trial::permission::{CurrentSession, may_see_focal_power};
 use crate::trial::role::Role;
@@ -30,6 +31,8 @@ pub struct App {
     pub store: Store,
     /// Trial sessions.
     pub conductor: Conductor,
+    /// Recordings.
+    pub recordings: Recordings,
     /// The session under way as surgeons may see it.
     pub surgeon_view: watch::Receiver<Option<Arc<SurgeonView>>>,
     /// The session under way as the operator sees it.

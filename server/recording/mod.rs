@@ -9,6 +9,7 @@ mod layout;
 mod reading;
 mod recorder;
 mod shard;
+mod view;
 mod writing;
 
 pub use disk::{Room, room};
@@ -17,4 +18,5 @@ pub use header::{CALIBRATION, Ended, FORMAT, Header, VERSION};
 pub use layout::{SHARD_FRAMES, by_wavelength};
 pub use reading::Recording;
 pub use recorder::{Intake, Progress, Recorder, Shot, compressed_size};
+pub use view::{VIEW_FORMAT, ViewHeader, ViewWriter};
 pub use writing::{FrameRow, Writer};

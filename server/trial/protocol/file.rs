@@ -8,7 +8,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::fault::{Fault, ProtocolError};
-use super::{Prompt, Protocol};
+use super::{Prompt, Protocol, Record};
 use crate::autofocus::PolicyName;
 use crate::lens::FocalPower;
 use crate::trial::allocation::Order;
@@ -50,6 +50,8 @@ struct File {
     prompt_seconds: Option<Spanned<u32>>,
     #[serde(default)]
     grace_minutes: Option<Spanned<u32>>,
+    #[serde(default)]
+    record: Record,
     #[serde(default)]
     quick_comments: Vec<Spanned<String>>,
     #[serde(default)]
@@ -119,6 +121,7 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
         prompt_stay: Duration::from_secs(stay.into()),
         quick_comments: reader.all_shown(&file.quick_comments, "quick_comments")?,
         grace,
+        record: file.record,
         after_segment: reader.questions(&file.after_segment, &mut ids, false)?,
         closing: reader.questions(&file.closing, &mut ids, true)?,
         policies,

@@ -7,8 +7,9 @@ mod file;
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use utoipa::ToSchema;
 
 pub use fault::ProtocolError;
 
@@ -46,12 +47,27 @@ pub struct Protocol {
     pub quick_comments: Vec<String>,
     /// How long after the end what a surgeon's device still holds counts.
     pub grace: Duration,
+    /// What is recorded.
+    pub record: Record,
     /// Questions after each segment.
     pub after_segment: Vec<Question>,
     /// Questions at the end.
     pub closing: Vec<Question>,
     /// The TOML text, byte for byte.
     pub source: Arc<str>,
+}
+
+/// What of a session is recorded, from its start to its end.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Record {
+    /// Nothing.
+    #[default]
+    None,
+    /// The pictures as viewers get them.
+    View,
+    /// Every mosaic of the camera, lossless.
+    Mosaic,
 }
 
 /// A prompt to comment.

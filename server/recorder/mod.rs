@@ -1,0 +1,418 @@
+//! What is recorded while the server runs: mosaics when the operator asks for it, and what a protocol asks for, from a
+//! session's start to its end. A trial never waits for a recording, and goes on without one.
+
+mod status;
+mod view;
+
+pub use status::RecordingStatus;
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::sync::{Mutex as Pen, watch};
+use tokio::task::spawn_blocking;
+use tokio::time::{Instant, interval};
+
+use crate::camera::{Controls, calibration};
+use crate::clock::{Clock, Moment};
+use crate::conductor::Conductor;
+use crate::control::{ControlStatus, Tap};
+use crate::ids::SessionId;
+use crate::imaging::Calibration;
+use crate::live::LiveHandle;
+use crate::recording::{
+    CALIBRATION, Ended, FORMAT, Header, Intake, Progress, Recorder, RecordingError, Room, VERSION, VIEW_FORMAT,
+    ViewHeader, ViewWriter, Writer, compressed_size, room,
+};
+use crate::trial::protocol::Record;
+use view::ViewRecorder;
+
+/// How often to look whether a recording ended by itself.
+const TICK: Duration = Duration::from_secs(1);
+/// How often a frame is compressed while nothing is recorded, to tell how long the disk would last.
+const MEASURE: Duration = Duration::from_secs(10);
+/// How long that frame is waited for.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What the recorder works with.
+pub struct Parts {
+    /// Both clocks.
+    pub clock: Arc<dyn Clock>,
+    /// Where frames leave the control loop.
+    pub tap: Tap,
+    /// The loop's state.
+    pub status: watch::Receiver<Arc<ControlStatus>>,
+    /// The camera's settings, where it has any.
+    pub controls: Option<Controls>,
+    /// Pictures.
+    pub live: LiveHandle,
+    /// The sessions.
+    pub conductor: Conductor,
+    /// Folder of the recordings.
+    pub folder: PathBuf,
+    /// The sensor's calibration.
+    pub calibration: Calibration,
+    /// Width and height of the camera's mosaics, samples; none of a camera that delivers colour pictures.
+    pub size: Option<(usize, usize)>,
+}
+
+/// Why a recording was not started.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The camera has no mosaics.
+    #[error("The camera delivers colour pictures. Only mosaics of a hyperspectral sensor can be recorded.")]
+    NoMosaics,
+    /// One is under way.
+    #[error("A recording is under way already. Stop it first.")]
+    UnderWay,
+    /// The disk has no room.
+    #[error(
+        "The disk has {:.1} GB free, and {:.1} GB of it stay free for the trial. Free some space.",
+        .0.available as f64 / 1e9,
+        .0.reserve as f64 / 1e9
+    )]
+    NoRoom(Room),
+    /// It cannot be written.
+    #[error("The recording could not be started: {0}.")]
+    Failed(String),
+}
+
+impl From<RecordingError> for StartError {
+    fn from(error: RecordingError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// Records at most one thing at a time. Clone freely.
+#[derive(Clone)]
+pub struct Recordings(Arc<Shared>);
+
+struct Shared {
+    parts: Parts,
+    state: Mutex<State>,
+    /// Held while a recording is being started or stopped.
+    pen: Pen<()>,
+}
+
+#[derive(Default)]
+struct State {
+    active: Option<Active>,
+    /// The session whose recording was started last, so that one that ended early stays ended.
+    followed: Option<SessionId>,
+    /// What the operator is to know of the last recording.
+    notice: Option<String>,
+    /// Bytes of a frame, as measured last.
+    frame_bytes: Option<u64>,
+}
+
+/// A recording under way.
+struct Active {
+    what: Running,
+    /// Whether a protocol asked for it.
+    by_protocol: bool,
+    began: Moment,
+}
+
+enum Running {
+    Mosaic(Recorder),
+    View(ViewRecorder),
+}
+
+impl Running {
+    fn progress(&self) -> Progress {
+        match self {
+            Self::Mosaic(recorder) => recorder.progress(),
+            Self::View(recorder) => recorder.progress(),
+        }
+    }
+
+    fn folder(&self) -> &std::path::Path {
+        match self {
+            Self::Mosaic(recorder) => recorder.folder(),
+            Self::View(recorder) => recorder.folder(),
+        }
+    }
+
+    const fn kind(&self) -> Record {
+        match self {
+            Self::Mosaic(_) => Record::Mosaic,
+            Self::View(_) => Record::View,
+        }
+    }
+
+    fn stop(self) -> Progress {
+        match self {
+            Self::Mosaic(recorder) => recorder.stop(),
+            Self::View(recorder) => recorder.stop(),
+        }
+    }
+}
+
+impl Recordings {
+    /// Nothing is recorded yet. Something has to await [`Recordings::run`] for protocols to be followed.
+    #[must_use]
+    pub fn new(parts: Parts) -> Self {
+        Self(Arc::new(Shared { parts, state: Mutex::default(), pen: Pen::new(()) }))
+    }
+
+    /// Follows the sessions, and notices when a recording ends by itself. Never ends.
+    pub async fn run(self) {
+        let mut sessions = self.0.parts.conductor.operator_view();
+        let mut ticks = interval(TICK);
+        let mut measured: Option<Instant> = None;
+
+        loop {
+            tokio::select! {
+                changed = sessions.changed() => if changed.is_err() { return },
+                _ = ticks.tick() => {}
+            }
+            self.follow().await;
+            self.notice_the_end().await;
+
+            if self.0.state().active.is_none() && measured.is_none_or(|at| at.elapsed() >= MEASURE) {
+                measured = Some(Instant::now());
+                self.measure().await;
+            }
+        }
+    }
+
+    /// Begins to record mosaics.
+    ///
+    /// # Errors
+    /// When one is under way, the camera has no mosaics, or the disk has no room.
+    pub async fn start(&self) -> Result<(), StartError> {
+        let _pen = self.0.pen.lock().await;
+        if self.0.state().active.is_some() {
+            return Err(StartError::UnderWay);
+        }
+        self.begin(Record::Mosaic, None).await
+    }
+
+    /// Ends the recording under way, if one is, and stores what was recorded.
+    pub async fn stop(&self) {
+        let _pen = self.0.pen.lock().await;
+        self.end().await;
+    }
+
+    /// How things stand.
+    #[must_use]
+    pub fn status(&self) -> RecordingStatus {
+        let parts = &self.0.parts;
+        let status = parts.status.borrow().clone();
+        let room = room(&parts.folder).ok();
+        let state = self.0.state();
+
+        let mut told = RecordingStatus {
+            unavailable: parts.size.is_none().then(|| StartError::NoMosaics.to_string()),
+            notice: state.notice.clone(),
+            free_bytes: room.map(|room| room.available),
+            reserve_bytes: room.map(|room| room.reserve),
+            ..RecordingStatus::default()
+        };
+
+        let idle = state.frame_bytes.map(|bytes| bytes as f64 * status.camera.fps);
+        told.bytes_per_second = idle.filter(|_| parts.size.is_some());
+
+        if let Some(active) = &state.active {
+            let progress = active.what.progress();
+            let seconds = parts.clock.now().since(active.began).as_secs_f64();
+            let measured = (progress.frames > 0).then(|| progress.bytes as f64 / progress.frames as f64);
+            told.bytes_per_second = measured.map(|bytes| bytes * status.camera.fps).or(told.bytes_per_second);
+            told.recording = Some(active.what.kind());
+            told.folder = active.what.folder().file_name().map(|name| name.to_string_lossy().into_owned());
+            told.by_protocol = active.by_protocol;
+            told.seconds = Some(seconds);
+            told.frames = progress.frames;
+            told.lost = progress.lost;
+            told.bytes = progress.bytes;
+        }
+
+        let rate = told.bytes_per_second.filter(|rate| *rate > 0.0);
+        told.seconds_left = room.zip(rate).map(|(room, rate)| room.for_recordings() as f64 / rate);
+        told
+    }
+
+    /// Starts what the session under way is to have recorded, and ends it with the session.
+    async fn follow(&self) {
+        let wanted = self.0.parts.conductor.to_record();
+        let followed = self.0.state().followed;
+
+        match wanted {
+            Some((session, what)) if followed != Some(session) => {
+                let _pen = self.0.pen.lock().await;
+                self.0.state().followed = Some(session);
+                self.end().await;
+                if let Err(error) = self.begin(what, Some(session)).await {
+                    tracing::error!(%error, "a session is not being recorded");
+                    self.0.state().notice = Some(format!("This session is not being recorded. {error}"));
+                }
+            }
+            None if followed.is_some() => {
+                let _pen = self.0.pen.lock().await;
+                self.0.state().followed = None;
+                if self.0.state().active.as_ref().is_some_and(|active| active.by_protocol) {
+                    self.end().await;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    async fn notice_the_end(&self) {
+        let _pen = self.0.pen.lock().await;
+        let ended = self.0.state().active.as_ref().is_some_and(|active| active.what.progress().ended.is_some());
+        if ended {
+            self.end().await;
+        }
+    }
+
+    /// Begins to record; whoever calls holds the pen, and nothing is being recorded.
+    async fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
+        let shared = Arc::clone(&self.0);
+        let stopped = |_| StartError::Failed("the server is ending".to_owned());
+        spawn_blocking(move || shared.begin(what, session)).await.map_err(stopped)?
+    }
+
+    /// Ends the recording under way, if one is; whoever calls holds the pen.
+    async fn end(&self) {
+        let Some(active) = self.0.state().active.take() else { return };
+        self.0.parts.tap.disconnect();
+
+        let folder = active.what.folder().display().to_string();
+        let Ok(progress) = spawn_blocking(move || active.what.stop()).await else { return };
+        tracing::info!(folder, frames = progress.frames, lost = progress.lost, "a recording ended");
+
+        let lost = match progress.lost {
+            0 => String::new(),
+            lost => format!(" {lost} frames were lost, because this machine or its disk was too slow."),
+        };
+        let because = match progress.ended {
+            Some(Ended::Stopped) | None => String::new(),
+            Some(Ended::DiskNearlyFull) => {
+                " The recording stopped by itself, because the disk is nearly full; the trial goes on.".to_owned()
+            }
+            Some(Ended::Failed(problem)) => format!(" The recording stopped: {problem}. The trial goes on."),
+        };
+        self.0.state().notice = Some(format!("{} frames are saved in {folder}.{because}{lost}", progress.frames));
+    }
+
+    /// Compresses a frame, to know how many bytes one takes.
+    async fn measure(&self) {
+        if self.0.parts.size.is_none() {
+            return;
+        }
+
+        let (intake, frames) = Intake::new(1);
+        {
+            // Under the pen, so that no recording starts between the look and the connection.
+            let _pen = self.0.pen.lock().await;
+            if self.0.state().active.is_none() {
+                self.0.parts.tap.connect(intake);
+            }
+        }
+
+        let shared = Arc::clone(&self.0);
+        let size = spawn_blocking(move || {
+            let shot = frames.recv_timeout(PATIENCE).ok();
+            let state = shared.state();
+            if state.active.is_none() {
+                shared.parts.tap.disconnect();
+            }
+            drop(state);
+            shot.and_then(|shot| compressed_size(&shot.mosaic).ok())
+        });
+
+        if let Ok(Some(bytes)) = size.await {
+            self.0.state().frame_bytes = Some(bytes as u64);
+        }
+    }
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
+        let room = room(&self.parts.folder).map_err(|error| StartError::Failed(error.to_string()))?;
+        if room.for_recordings() == 0 {
+            return Err(StartError::NoRoom(room));
+        }
+
+        let folder = self.new_folder(session);
+        let began = self.parts.clock.now();
+        let under_way = self.parts.conductor.session_under_way();
+        let session_name = session.or(under_way).map(|session| session.to_string());
+
+        let running = match what {
+            Record::None => return Ok(()),
+            Record::Mosaic => Running::Mosaic(self.record_mosaics(folder, session_name, began)?),
+            Record::View => Running::View(self.record_view(folder, session_name, began)?),
+        };
+
+        tracing::info!(folder = %running.folder().display(), "a recording began");
+        let mut state = self.state();
+        state.notice = None;
+        if let Running::Mosaic(recorder) = &running {
+            // While the state is held, so that a measurement does not take the tap away.
+            self.parts.tap.connect(recorder.intake());
+        }
+        state.active = Some(Active { what: running, by_protocol: session.is_some(), began });
+        Ok(())
+    }
+
+    /// A name that no recording has: the session's, or the time.
+    fn new_folder(&self, session: Option<SessionId>) -> PathBuf {
+        let name = session.map_or_else(
+            || self.parts.clock.wall().strftime("%Y-%m-%dT%H-%M-%SZ").to_string(),
+            |session| session.to_string(),
+        );
+        let numbered = |number: u32| if number == 1 { name.clone() } else { format!("{name}-{number}") };
+        let mut names = (1..u32::MAX).map(|number| self.parts.folder.join(numbered(number)));
+        names.find(|folder| !folder.exists()).unwrap_or_else(|| self.parts.folder.join(&name))
+    }
+
+    fn record_mosaics(&self, folder: PathBuf, session: Option<String>, began: Moment) -> Result<Recorder, StartError> {
+        let Parts { clock, status, calibration, controls, size, .. } = &self.parts;
+        let size = size.ok_or(StartError::NoMosaics)?;
+        let status = status.borrow().clone();
+
+        let header = Header {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            software: SOFTWARE.to_owned(),
+            started: clock.wall(),
+            camera: status.camera.name.to_string(),
+            lens: status.lens.name.to_string(),
+            simulated: status.camera.simulated || status.lens.simulated,
+            calibration: calibration.title(),
+            camera_settings: controls.as_ref().map(|controls| controls.offered().by_name()).unwrap_or_default(),
+            session,
+            frames_lost: 0,
+            ended: None,
+        };
+
+        let writer = Writer::create(&folder, header, size, calibration)?;
+        calibration::save(&folder.join(CALIBRATION), calibration, &[])
+            .map_err(|error| StartError::Failed(error.to_string()))?;
+        Ok(Recorder::start(writer, began)?)
+    }
+
+    fn record_view(&self, folder: PathBuf, session: Option<String>, began: Moment) -> Result<ViewRecorder, StartError> {
+        let header = ViewHeader {
+            format: VIEW_FORMAT.to_owned(),
+            version: 1,
+            software: SOFTWARE.to_owned(),
+            started: self.parts.clock.wall(),
+            camera: self.parts.status.borrow().camera.name.to_string(),
+            session,
+            ended: None,
+        };
+        let writer = ViewWriter::create(&folder, header)?;
+        Ok(ViewRecorder::start(writer, self.parts.live.watch(), began)?)
+    }
+}
+
+/// The program and its version.
+const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));

@@ -1,0 +1,37 @@
+//! What the operator is told of recordings.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::trial::protocol::Record;
+
+/// How recording stands. Nothing in it depends on the policy.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct RecordingStatus {
+    /// Why the operator cannot record, where it is so.
+    pub unavailable: Option<String>,
+    /// What is being recorded, if anything.
+    pub recording: Option<Record>,
+    /// Name of its folder, below `recordings` in the data folder.
+    pub folder: Option<String>,
+    /// Whether the session's protocol asked for it.
+    pub by_protocol: bool,
+    /// Seconds since it began.
+    pub seconds: Option<f64>,
+    /// Frames recorded.
+    pub frames: u64,
+    /// Frames lost, because this machine or its disk was too slow.
+    pub lost: u64,
+    /// Bytes recorded.
+    pub bytes: u64,
+    /// Bytes a second, as measured; while nothing is recorded, what mosaics would take.
+    pub bytes_per_second: Option<f64>,
+    /// Bytes free on the disk.
+    pub free_bytes: Option<u64>,
+    /// Bytes of these that recordings leave free.
+    pub reserve_bytes: Option<u64>,
+    /// Seconds after which a recording would stop by itself.
+    pub seconds_left: Option<f64>,
+    /// What became of the last recording.
+    pub notice: Option<String>,
+}
