@@ -8,6 +8,7 @@ mod finality;
 mod live;
 mod privacy;
 mod real_time;
+mod recordings;
 mod restart;
 mod roles;
 mod seed;

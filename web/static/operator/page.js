@@ -9,6 +9,7 @@ import { drawCamera } from "./camera_card.js";
 import { followChoices } from "./choices.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
+import { followRecording } from "./recording_card.js";
 import { SessionCard } from "./session_card.js";
 import { offerLink } from "./surgeon_link.js";
 import { Traces } from "./traces.js";
@@ -79,5 +80,6 @@ followOverlayBoxes((name, on) => {
 });
 
 offerLink();
+followRecording();
 setInterval(() => sessionCard.drawTime(), TICK_MS);
 refreshChoices();

@@ -1,0 +1,180 @@
+//! Recordings made by the server: by the operator's button, and because a protocol asks for them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use parfocal::recording::{Ended, Recording};
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+
+use crate::support::Server;
+use crate::support::disk::SmallDisk;
+
+const PATH: &str = "/api/operator/recording";
+
+fn start(data: Arc<tempfile::TempDir>) -> Server {
+    let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/http");
+    Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "10", "--protocols", protocols])
+}
+
+async fn post(server: &Server, path: &str, body: Value) -> (StatusCode, Value) {
+    let answer = server.post_as("operator", path).json(&body).send().await.unwrap();
+    let status = answer.status();
+    (status, serde_json::from_str(&answer.text().await.unwrap()).unwrap_or_default())
+}
+
+async fn order(server: &Server, record: bool) -> (StatusCode, Value) {
+    post(server, PATH, json!({ "record": record })).await
+}
+
+/// Asks how recording stands until it stands as `wanted`.
+async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
+    let limit = Instant::now() + Duration::from_secs(60);
+    loop {
+        let status: Value = server.get_as("operator", PATH).send().await.unwrap().json().await.unwrap();
+        if wanted(&status) {
+            return status;
+        }
+        assert!(Instant::now() < limit, "{status}");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+/// A session under way by `protocol`: its id.
+async fn begin(server: &Server, protocol: &str) -> String {
+    post(server, "/api/operator/participants", json!({"code": "S-05"})).await;
+    let (_, made) = post(server, "/api/operator/sessions", json!({"participant": "S-05", "protocol": protocol})).await;
+    let session = made["session"].as_str().unwrap().to_owned();
+    let (status, said) = post(server, "/api/operator/actions", json!({"session": session, "action": "start"})).await;
+    assert_eq!(status, StatusCode::OK, "{said}");
+    session
+}
+
+async fn abort(server: &Server, session: &str) {
+    let action = json!({"session": session, "action": "abort", "reason": "the test is over"});
+    let (status, said) = post(server, "/api/operator/actions", action).await;
+    assert_eq!(status, StatusCode::OK, "{said}");
+}
+
+fn recordings(server: &Server) -> PathBuf {
+    server.data.path().join("recordings")
+}
+
+#[tokio::test]
+async fn the_operator_records_and_reads_before_how_long_the_disk_lasts() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let before = until(&server, |status| status["seconds_left"].is_number()).await;
+    let rate = before["bytes_per_second"].as_f64().unwrap();
+    let room = before["free_bytes"].as_f64().unwrap() - before["reserve_bytes"].as_f64().unwrap();
+    assert!((before["seconds_left"].as_f64().unwrap() / (room / rate) - 1.0).abs() < 0.01, "{before}");
+    // Ten frames a second of 2048 x 1088 samples, between a tenth and all of packed 10 bit.
+    let packed = 10.0 * 2048.0 * 1088.0 * 1.25;
+    assert!((0.05 * packed..packed).contains(&rate), "{rate}");
+
+    let (status, said) = order(&server, true).await;
+    assert_eq!((status, &said["recording"], &said["by_protocol"]), (StatusCode::OK, &"mosaic".into(), &false.into()));
+    assert_eq!(order(&server, true).await.0, StatusCode::CONFLICT, "one at a time");
+    let running = until(&server, |status| status["frames"].as_u64() >= Some(5)).await;
+
+    let (status, said) = order(&server, false).await;
+    assert_eq!((status, &said["recording"]), (StatusCode::OK, &Value::Null));
+    assert!(said["notice"].as_str().unwrap().contains("frames are saved in"), "{said}");
+    assert_eq!(order(&server, false).await.0, StatusCode::OK, "stopping again changes nothing");
+
+    let recording = Recording::open(&recordings(&server).join(running["folder"].as_str().unwrap())).unwrap();
+    assert!(recording.rows().len() >= 5 && recording.check().is_empty());
+    assert_eq!((&recording.header().session, &recording.header().ended), (&None, &Some(Ended::Stopped)));
+    assert!(recording.calibration().join("calibration.toml").exists());
+}
+
+#[tokio::test]
+async fn only_the_operator_may_see_or_order_recordings() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    for role in ["surgeon", "researcher"] {
+        let seen = server.get_as(role, PATH).send().await.unwrap().status();
+        let ordered = server.post_as(role, PATH).json(&json!({"record": true})).send().await.unwrap().status();
+        assert_eq!((seen, ordered), (StatusCode::FORBIDDEN, StatusCode::FORBIDDEN), "{role}");
+    }
+    assert!(!recordings(&server).exists());
+}
+
+#[tokio::test]
+async fn a_protocol_records_mosaics_from_a_sessions_start_to_its_end() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "recorded").await;
+    let running = until(&server, |status| status["frames"].as_u64() >= Some(5)).await;
+    assert_eq!((&running["recording"], &running["by_protocol"]), (&"mosaic".into(), &true.into()));
+    assert_eq!(running["folder"], session.as_str());
+
+    // What surgeons get says nothing of it.
+    let view = server.get_as("surgeon", "/api/surgeon/session").send().await.unwrap().text().await.unwrap();
+    assert!(!view.contains("record\"") && !view.contains("mosaic"), "{view}");
+
+    abort(&server, &session).await;
+    until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
+    let recording = Recording::open(&recordings(&server).join(&session)).unwrap();
+    assert_eq!(recording.header().session.as_deref(), Some(session.as_str()));
+    assert!(recording.rows().len() >= 5 && recording.check().is_empty());
+    assert!(recording.rows().iter().all(|row| (0.0..=1.0).contains(&row.measured)));
+}
+
+#[tokio::test]
+async fn a_protocol_keeps_the_view_as_it_was_sent() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "viewed").await;
+    until(&server, |status| status["recording"] == "view" && status["frames"].as_u64() >= Some(3)).await;
+    abort(&server, &session).await;
+    until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
+
+    let folder = recordings(&server).join(&session);
+    let pictures = std::fs::read(folder.join("view.mjpeg")).unwrap();
+    let mut lines = csv::Reader::from_path(folder.join("view.csv")).unwrap();
+    assert_eq!(lines.headers().unwrap(), vec!["frame_number", "time_ns", "offset", "length"], "no focal power");
+
+    let mut end = 0;
+    let mut last = (0, 0);
+    for line in lines.deserialize() {
+        let (number, time, offset, length): (u64, u64, usize, usize) = line.unwrap();
+        assert!((number, time) > last && offset == end, "{number} {time} {offset}");
+        let picture = image::load_from_memory(&pictures[offset..offset + length]).unwrap();
+        assert_eq!((picture.width(), picture.height()), (512, 272));
+        last = (number, time);
+        end = offset + length;
+    }
+    assert!(end == pictures.len() && end > 0);
+
+    let header: Value = serde_json::from_slice(&std::fs::read(folder.join("view.json")).unwrap()).unwrap();
+    assert_eq!((&header["session"], &header["ended"]["why"]), (&session.into(), &"stopped".into()));
+}
+
+#[tokio::test]
+async fn near_the_disks_end_recording_stops_by_itself_and_the_trial_goes_on() {
+    let Some(disk) = SmallDisk::mount() else { return };
+    let server = start(Arc::clone(&disk.folder));
+    let session = begin(&server, "recorded").await;
+    let ended = until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
+    let notice = ended["notice"].as_str().unwrap();
+    assert!(notice.contains("nearly full; the trial goes on") || notice.contains("not being recorded"), "{notice}");
+
+    let comment =
+        json!({"key": "00000000-0000-4000-8000-000000000001", "session": session, "kind": "text", "text": "sharp"});
+    let kept = server.post_as("surgeon", "/api/surgeon/comments").json(&comment).send().await.unwrap();
+    assert_eq!(kept.status(), StatusCode::NO_CONTENT);
+    let view: Value = server.get_as("operator", "/api/operator/session").send().await.unwrap().json().await.unwrap();
+    assert_eq!(view["phase"], "notice");
+}
+
+#[tokio::test]
+async fn a_camera_of_colour_pictures_cannot_be_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = folder.path().join("still.png");
+    image::GrayImage::from_pixel(640, 480, image::Luma([90])).save(&still).unwrap();
+    let camera = format!("footage:{}", still.display());
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--camera", &camera]);
+
+    let status: Value = server.get_as("operator", PATH).send().await.unwrap().json().await.unwrap();
+    assert!(status["unavailable"].as_str().unwrap().contains("colour pictures"));
+    let (refused, said) = order(&server, true).await;
+    assert_eq!(refused, StatusCode::CONFLICT, "{said}");
+}

@@ -1,0 +1,61 @@
+// The recording: how it stands, how long the disk will last, and the button that starts and stops
+// it.
+
+import { get, post } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+import { tell, tellTrouble } from "../shared/trouble.js";
+import { diskWords, nowWords } from "./recording_words.js";
+
+const PATH = "/api/operator/recording";
+const EVERY_MS = 2000;
+
+const button = byId("record", HTMLButtonElement);
+let recording = false;
+let busy = false;
+
+/** @param {Api.RecordingStatus} status */
+function draw(status) {
+  recording = Boolean(status.recording);
+  setText(byId("recording-now"), nowWords(status));
+  setText(byId("recording-disk"), diskWords(status));
+  setText(byId("recording-notice"), (!recording && status.notice) || "");
+  byId("recording-notice").hidden = recording || !status.notice;
+  setText(byId("recording-unavailable"), recording ? "" : (status.unavailable ?? ""));
+
+  setText(button, recording ? "Stop recording" : "Record mosaics");
+  button.disabled = busy || (!recording && Boolean(status.unavailable));
+}
+
+async function refresh() {
+  if (document.hidden || busy) return;
+  try {
+    const status = await get(PATH);
+    if (!busy) draw(status);
+  } catch {
+    // The page says by itself that the server does not answer.
+  }
+}
+
+async function turn() {
+  busy = true;
+  button.disabled = true;
+  try {
+    const status = await post(PATH, { record: !recording });
+    busy = false;
+    tell(byId("recording-trouble"), "");
+    draw(status);
+  } catch (error) {
+    tellTrouble(byId("recording-trouble"), error);
+  } finally {
+    busy = false;
+    button.disabled = false;
+  }
+}
+
+/** Keeps the card up to date. */
+export function followRecording() {
+  button.addEventListener("click", turn);
+  document.addEventListener("visibilitychange", refresh);
+  setInterval(refresh, EVERY_MS);
+  refresh();
+}
