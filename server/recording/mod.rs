@@ -1,7 +1,8 @@
-//! Hyperspectral recordings: every frame's mosaic, lossless, with its time and focal power, as plain Zarr v3 in a folder.
-//! `docs/recordings.md` describes the layout for others.
+//! Hyperspectral recordings: every frame's mosaic, lossless, with its time and focal power, as plain Zarr v3 in a
+//! folder. `docs/recordings.md` describes the layout for others.
 
 mod codec;
+mod columns;
 mod disk;
 mod error;
 mod header;
@@ -12,6 +13,7 @@ mod shard;
 mod view;
 mod writing;
 
+pub use columns::FrameRow;
 pub use disk::{Room, room};
 pub use error::{Damage, RecordingError};
 pub use header::{CALIBRATION, Ended, FORMAT, Header, VERSION};
@@ -19,4 +21,4 @@ pub use layout::{SHARD_FRAMES, by_wavelength};
 pub use reading::Recording;
 pub use recorder::{Intake, Progress, Recorder, Shot, compressed_size};
 pub use view::{VIEW_FORMAT, ViewHeader, ViewWriter};
-pub use writing::{FrameRow, Writer};
+pub use writing::Writer;

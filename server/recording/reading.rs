@@ -6,15 +6,13 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::Value;
-use zarrs::array::data_type::{float64, int64, uint64};
-use zarrs::array::{ElementOwned, FillValue};
 
-use super::codec::{Coder, plain_codecs};
+use super::codec::Coder;
+use super::columns::{Columns, FrameRow};
 use super::error::{Damage, RecordingError};
 use super::header::{CALIBRATION, FORMAT, Header, VERSION};
-use super::layout::{COLUMN_CHUNK, Column, DESCRIPTION, MOSAIC, SHARD_FRAMES};
+use super::layout::{DESCRIPTION, MOSAIC, SHARD_FRAMES};
 use super::shard::Index;
-use super::writing::FrameRow;
 use crate::imaging::{CELL, MosaicFrame};
 
 /// Largest side of a mosaic that is believed, samples.
@@ -59,7 +57,7 @@ impl Recording {
             serde_json::from_value(attributes.clone()).map_err(|e| RecordingError::nonsense(&path, e))?;
         let (frames, size) = extent(&described).map_err(|reason| RecordingError::nonsense(&path, reason))?;
 
-        let rows = rows(folder, frames)?;
+        let rows = Columns::new()?.read(folder, frames)?;
         let coder = Coder::of_frames(size.0, size.1)?;
         Ok(Self { folder: folder.to_owned(), header, size, rows, coder, index: Index::new(SHARD_FRAMES)? })
     }
@@ -192,56 +190,4 @@ fn extent(described: &Value) -> Result<(usize, (usize, usize)), String> {
         return Err(format!("its files do not hold {SHARD_FRAMES} frames each"));
     }
     Ok((frames as usize, (width as usize, height as usize)))
-}
-
-fn rows(folder: &Path, frames: usize) -> Result<Vec<FrameRow>, RecordingError> {
-    let time = column::<i64>(folder, Column::Time, frames, || {
-        Coder::new(int64(), FillValue::from(0_i64), &[COLUMN_CHUNK], plain_codecs())
-    })?;
-    let number = column::<u64>(folder, Column::Number, frames, || {
-        Coder::new(uint64(), FillValue::from(0_u64), &[COLUMN_CHUNK], plain_codecs())
-    })?;
-    let values = |which| {
-        column::<f64>(folder, which, frames, || {
-            Coder::new(float64(), FillValue::from(f64::NAN), &[COLUMN_CHUNK], plain_codecs())
-        })
-    };
-    let exposure = values(Column::Exposure)?;
-    let asked = values(Column::Asked)?;
-    let measured = values(Column::Measured)?;
-    let optimal = values(Column::Optimal)?;
-
-    let row = |frame: usize| FrameRow {
-        time: time[frame],
-        number: number[frame],
-        exposure: exposure[frame],
-        asked: asked[frame],
-        measured: measured[frame],
-        optimal: optimal[frame],
-    };
-    Ok((0..frames).map(row).collect())
-}
-
-/// The first `frames` values of a column.
-fn column<T: ElementOwned>(
-    folder: &Path,
-    column: Column,
-    frames: usize,
-    coder: impl Fn() -> Result<Coder, RecordingError>,
-) -> Result<Vec<T>, RecordingError> {
-    let coder = coder()?;
-    let mut values = Vec::new();
-
-    for file in 0..frames.div_ceil(COLUMN_CHUNK) {
-        let path = folder.join(column.name()).join(format!("c/{file}"));
-        let damaged = || RecordingError::Damaged { path: path.clone(), damage: Damage::Column(column.name()) };
-        let stored = fs::read(&path).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => damaged(),
-            _ => RecordingError::unreadable(&path)(error),
-        })?;
-        values.extend(coder.decode::<T>(stored).map_err(|_| damaged())?);
-    }
-
-    values.truncate(frames);
-    Ok(values)
 }

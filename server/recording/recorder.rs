@@ -9,10 +9,11 @@ use std::time::Duration;
 use std::{io, thread};
 
 use super::codec::Coder;
+use super::columns::FrameRow;
 use super::disk::room;
 use super::error::RecordingError;
 use super::header::Ended;
-use super::writing::{FrameRow, Writer};
+use super::writing::Writer;
 use crate::clock::Moment;
 use crate::imaging::MosaicFrame;
 use crate::lens::FocalPower;

@@ -6,33 +6,17 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use zarrs::array::data_type::{float64, int64, uint64};
-use zarrs::array::{Element, FillValue};
+use zarrs::array::FillValue;
+use zarrs::array::data_type::{float64, int64};
 
 use super::codec::{Coder, plain_codecs};
+use super::columns::{Columns, FrameRow};
 use super::error::RecordingError;
 use super::header::{Ended, Header};
 use super::layout::{BandValues, COLUMN_CHUNK, Column, DESCRIPTION, MOSAIC, SHARD_FRAMES, band_arrays, group, growing};
 use super::shard::{self, Index};
 use crate::files::{replace, replace_with};
 use crate::imaging::{BANDS, Calibration};
-
-/// What is known of a frame beside its mosaic.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameRow {
-    /// End of the exposure, nanoseconds since the recording's start.
-    pub time: i64,
-    /// The camera's number of the frame.
-    pub number: u64,
-    /// Length of the exposure, milliseconds.
-    pub exposure: f64,
-    /// Focal power asked for after the frame.
-    pub asked: f64,
-    /// Focal power at the middle of the exposure; NaN while unknown.
-    pub measured: f64,
-    /// Best focal power, where a simulation knows it; else NaN.
-    pub optimal: f64,
-}
 
 /// A recording under way.
 pub struct Writer {
@@ -49,41 +33,6 @@ pub struct Writer {
     waiting: Vec<Vec<u8>>,
     /// Frames in whole shards.
     stored: usize,
-}
-
-/// The coders of a file of a column.
-struct Columns {
-    time: Coder,
-    number: Coder,
-    other: Coder,
-}
-
-impl Columns {
-    fn new() -> Result<Self, RecordingError> {
-        let shape = [COLUMN_CHUNK];
-        Ok(Self {
-            time: Coder::new(int64(), FillValue::from(0_i64), &shape, plain_codecs())?,
-            number: Coder::new(uint64(), FillValue::from(0_u64), &shape, plain_codecs())?,
-            other: Coder::new(float64(), FillValue::from(f64::NAN), &shape, plain_codecs())?,
-        })
-    }
-
-    fn encode(&self, column: Column, rows: &[FrameRow]) -> Result<Vec<u8>, RecordingError> {
-        match column {
-            Column::Time => padded(&self.time, rows.iter().map(|row| row.time), 0),
-            Column::Number => padded(&self.number, rows.iter().map(|row| row.number), 0),
-            Column::Exposure => padded(&self.other, rows.iter().map(|row| row.exposure), f64::NAN),
-            Column::Asked => padded(&self.other, rows.iter().map(|row| row.asked), f64::NAN),
-            Column::Measured => padded(&self.other, rows.iter().map(|row| row.measured), f64::NAN),
-            Column::Optimal => padded(&self.other, rows.iter().map(|row| row.optimal), f64::NAN),
-        }
-    }
-}
-
-fn padded<T: Element>(coder: &Coder, values: impl Iterator<Item = T>, fill: T) -> Result<Vec<u8>, RecordingError> {
-    let mut values: Vec<T> = values.collect();
-    values.resize(COLUMN_CHUNK, fill);
-    coder.encode(&values)
 }
 
 impl Writer {

@@ -13,6 +13,7 @@ mod killed;
 mod lens_troubles;
 mod outbox;
 mod proxy;
+mod recording_card;
 mod screenshots;
 mod scripts;
 mod tabs;
