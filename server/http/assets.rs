@@ -35,6 +35,8 @@ static ASSETS: &[Asset] = &assets![
     "operator/orders.js",
     "operator/page.css",
     "operator/page.js",
+    "operator/recording_card.js",
+    "operator/recording_words.js",
     "operator/session_card.js",
     "operator/session_words.js",
     "operator/surgeon_link.js",

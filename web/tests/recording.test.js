@@ -5,6 +5,7 @@ import { test } from "node:test";
 
 import { amount, diskWords, lasting, nowWords } from "../static/operator/recording_words.js";
 
+/** @type {Api.RecordingStatus} */
 const IDLE = {
   unavailable: null,
   recording: null,
@@ -43,8 +44,10 @@ test("before it starts, the disk's time is told", () => {
 });
 
 test("while it runs, lost frames and the protocol's wish are told", () => {
+  /** @type {Api.RecordingStatus} */
   const running = { ...IDLE, recording: "mosaic", seconds: 61.9, frames: 1500, bytes: 2.4e9 };
   assert.equal(nowWords(running), "Recording mosaics: 1 min, 1500 frames, 2.4 GB.");
+  /** @type {Api.RecordingStatus} */
   const view = { ...running, recording: "view", by_protocol: true, lost: 3 };
   assert.equal(
     nowWords(view),
