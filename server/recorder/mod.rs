@@ -1,32 +1,28 @@
 //! What is recorded while the server runs: mosaics when the operator asks for it, and what a protocol asks for, from a
 //! session's start to its end. A trial never waits for a recording, and goes on without one.
 
+mod parts;
+mod running;
+mod starting;
 mod status;
 mod view;
 
+pub use parts::Parts;
+pub use starting::StartError;
 pub use status::RecordingStatus;
 
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use tokio::sync::{Mutex as Pen, watch};
+use tokio::sync::Mutex as Pen;
 use tokio::task::spawn_blocking;
 use tokio::time::{Instant, interval};
 
-use crate::camera::{Controls, calibration};
-use crate::clock::{Clock, Moment};
-use crate::conductor::Conductor;
-use crate::control::{ControlStatus, Tap};
+use crate::clock::Moment;
 use crate::ids::SessionId;
-use crate::imaging::Calibration;
-use crate::live::LiveHandle;
-use crate::recording::{
-    CALIBRATION, Ended, FORMAT, Header, Intake, Progress, Recorder, RecordingError, Room, VERSION, VIEW_FORMAT,
-    ViewHeader, ViewWriter, Writer, compressed_size, room,
-};
+use crate::recording::{Ended, Intake, compressed_size, room};
 use crate::trial::protocol::Record;
-use view::ViewRecorder;
+use running::Running;
 
 /// How often to look whether a recording ended by itself.
 const TICK: Duration = Duration::from_secs(1);
@@ -34,55 +30,6 @@ const TICK: Duration = Duration::from_secs(1);
 const MEASURE: Duration = Duration::from_secs(10);
 /// How long that frame is waited for.
 const PATIENCE: Duration = Duration::from_secs(1);
-
-/// What the recorder works with.
-pub struct Parts {
-    /// Both clocks.
-    pub clock: Arc<dyn Clock>,
-    /// Where frames leave the control loop.
-    pub tap: Tap,
-    /// The loop's state.
-    pub status: watch::Receiver<Arc<ControlStatus>>,
-    /// The camera's settings, where it has any.
-    pub controls: Option<Controls>,
-    /// Pictures.
-    pub live: LiveHandle,
-    /// The sessions.
-    pub conductor: Conductor,
-    /// Folder of the recordings.
-    pub folder: PathBuf,
-    /// The sensor's calibration.
-    pub calibration: Calibration,
-    /// Width and height of the camera's mosaics, samples; none of a camera that delivers colour pictures.
-    pub size: Option<(usize, usize)>,
-}
-
-/// Why a recording was not started.
-#[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    /// The camera has no mosaics.
-    #[error("The camera delivers colour pictures. Only mosaics of a hyperspectral sensor can be recorded.")]
-    NoMosaics,
-    /// One is under way.
-    #[error("A recording is under way already. Stop it first.")]
-    UnderWay,
-    /// The disk has no room.
-    #[error(
-        "The disk has {:.1} GB free, and {:.1} GB of it stay free for the trial. Free some space.",
-        .0.available as f64 / 1e9,
-        .0.reserve as f64 / 1e9
-    )]
-    NoRoom(Room),
-    /// It cannot be written.
-    #[error("The recording could not be started: {0}.")]
-    Failed(String),
-}
-
-impl From<RecordingError> for StartError {
-    fn from(error: RecordingError) -> Self {
-        Self::Failed(error.to_string())
-    }
-}
 
 /// Records at most one thing at a time. Clone freely.
 #[derive(Clone)]
@@ -112,41 +59,6 @@ struct Active {
     /// Whether a protocol asked for it.
     by_protocol: bool,
     began: Moment,
-}
-
-enum Running {
-    Mosaic(Recorder),
-    View(ViewRecorder),
-}
-
-impl Running {
-    fn progress(&self) -> Progress {
-        match self {
-            Self::Mosaic(recorder) => recorder.progress(),
-            Self::View(recorder) => recorder.progress(),
-        }
-    }
-
-    fn folder(&self) -> &std::path::Path {
-        match self {
-            Self::Mosaic(recorder) => recorder.folder(),
-            Self::View(recorder) => recorder.folder(),
-        }
-    }
-
-    const fn kind(&self) -> Record {
-        match self {
-            Self::Mosaic(_) => Record::Mosaic,
-            Self::View(_) => Record::View,
-        }
-    }
-
-    fn stop(self) -> Progress {
-        match self {
-            Self::Mosaic(recorder) => recorder.stop(),
-            Self::View(recorder) => recorder.stop(),
-        }
-    }
 }
 
 impl Recordings {
@@ -334,22 +246,10 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Begins to record; the session asked for it, if one is given.
     fn begin(&self, what: Record, session: Option<SessionId>) -> Result<(), StartError> {
-        let room = room(&self.parts.folder).map_err(|error| StartError::Failed(error.to_string()))?;
-        if room.for_recordings() == 0 {
-            return Err(StartError::NoRoom(room));
-        }
-
-        let folder = self.new_folder(session);
         let began = self.parts.clock.now();
-        let under_way = self.parts.conductor.session_under_way();
-        let session_name = session.or(under_way).map(|session| session.to_string());
-
-        let running = match what {
-            Record::None => return Ok(()),
-            Record::Mosaic => Running::Mosaic(self.record_mosaics(folder, session_name, began)?),
-            Record::View => Running::View(self.record_view(folder, session_name, began)?),
-        };
+        let Some(running) = starting::start(&self.parts, what, session, began)? else { return Ok(()) };
 
         tracing::info!(folder = %running.folder().display(), "a recording began");
         let mut state = self.state();
@@ -361,58 +261,4 @@ impl Shared {
         state.active = Some(Active { what: running, by_protocol: session.is_some(), began });
         Ok(())
     }
-
-    /// A name that no recording has: the session's, or the time.
-    fn new_folder(&self, session: Option<SessionId>) -> PathBuf {
-        let name = session.map_or_else(
-            || self.parts.clock.wall().strftime("%Y-%m-%dT%H-%M-%SZ").to_string(),
-            |session| session.to_string(),
-        );
-        let numbered = |number: u32| if number == 1 { name.clone() } else { format!("{name}-{number}") };
-        let mut names = (1..u32::MAX).map(|number| self.parts.folder.join(numbered(number)));
-        names.find(|folder| !folder.exists()).unwrap_or_else(|| self.parts.folder.join(&name))
-    }
-
-    fn record_mosaics(&self, folder: PathBuf, session: Option<String>, began: Moment) -> Result<Recorder, StartError> {
-        let Parts { clock, status, calibration, controls, size, .. } = &self.parts;
-        let size = size.ok_or(StartError::NoMosaics)?;
-        let status = status.borrow().clone();
-
-        let header = Header {
-            format: FORMAT.to_owned(),
-            version: VERSION,
-            software: SOFTWARE.to_owned(),
-            started: clock.wall(),
-            camera: status.camera.name.to_string(),
-            lens: status.lens.name.to_string(),
-            simulated: status.camera.simulated || status.lens.simulated,
-            calibration: calibration.title(),
-            camera_settings: controls.as_ref().map(|controls| controls.offered().by_name()).unwrap_or_default(),
-            session,
-            frames_lost: 0,
-            ended: None,
-        };
-
-        let writer = Writer::create(&folder, header, size, calibration)?;
-        calibration::save(&folder.join(CALIBRATION), calibration, &[])
-            .map_err(|error| StartError::Failed(error.to_string()))?;
-        Ok(Recorder::start(writer, began)?)
-    }
-
-    fn record_view(&self, folder: PathBuf, session: Option<String>, began: Moment) -> Result<ViewRecorder, StartError> {
-        let header = ViewHeader {
-            format: VIEW_FORMAT.to_owned(),
-            version: 1,
-            software: SOFTWARE.to_owned(),
-            started: self.parts.clock.wall(),
-            camera: self.parts.status.borrow().camera.name.to_string(),
-            session,
-            ended: None,
-        };
-        let writer = ViewWriter::create(&folder, header)?;
-        Ok(ViewRecorder::start(writer, self.parts.live.watch(), began)?)
-    }
 }
-
-/// The program and its version.
-const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));

@@ -10,7 +10,7 @@ use tokio::sync::Notify;
 use crate::clock::Moment;
 use crate::live::Watcher;
 use crate::priority;
-use crate::recording::{Ended, Progress, RecordingError, ViewWriter, room};
+use crate::recording::{Ended, Progress, RecordingError, Room, ViewWriter, room};
 
 /// A recording of the view under way. Dropping it stops it.
 pub struct ViewRecorder {
@@ -91,7 +91,7 @@ impl Worker {
             let Some(frame) = frame else { break Ended::Stopped };
             let picture = &frame.picture;
 
-            let left = room(self.writer.folder()).map_or(u64::MAX, |room| room.for_recordings());
+            let left = room(self.writer.folder()).map_or(u64::MAX, Room::for_recordings);
             if left < picture.jpeg.len() as u64 {
                 break Ended::DiskNearlyFull;
             }

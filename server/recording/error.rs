@@ -93,6 +93,7 @@ pub enum RecordingError {
 
 impl RecordingError {
     /// `error` in writing `path`, after `kept` frames were stored.
+    #[must_use]
     pub fn unwritable(path: &Path, kept: usize, error: io::Error) -> Self {
         let path = path.to_owned();
         match error.kind() {

@@ -174,6 +174,7 @@ impl BandArray {
 }
 
 /// The bands of `calibration` in order of wavelength: band numbers as in its mosaic cell.
+#[must_use]
 pub fn by_wavelength(calibration: &Calibration) -> Vec<usize> {
     let mut order: Vec<usize> = (0..calibration.bands.len()).collect();
     order.sort_by(|&a, &b| calibration.bands[a].centre_nm.total_cmp(&calibration.bands[b].centre_nm));

@@ -10,7 +10,7 @@ use std::{io, thread};
 
 use super::codec::Coder;
 use super::columns::FrameRow;
-use super::disk::room;
+use super::disk::{Room, room};
 use super::error::RecordingError;
 use super::header::Ended;
 use super::writing::Writer;
@@ -131,7 +131,7 @@ impl Recorder {
         let compressing = thread::Builder::new().name("compressing".into()).spawn(move || compressor.run());
         let storing = thread::Builder::new().name("recording".into()).spawn(move || storer.run());
         let threads = vec![compressing.map_err(no_thread)?, storing.map_err(no_thread)?];
-        Ok(Self { intake, progress, stop, threads, folder })
+        Ok(Self { folder, intake, progress, stop, threads })
     }
 
     /// Where frames are offered.
@@ -257,7 +257,7 @@ impl Storer {
         let bytes = frame.len() as u64;
 
         // A disk that does not tell its room is written to until it is full.
-        let room = room(self.writer.folder()).map_or(u64::MAX, |room| room.for_recordings());
+        let room = room(self.writer.folder()).map_or(u64::MAX, Room::for_recordings);
         if self.writer.waiting_bytes() + bytes > room {
             return Some(Ended::DiskNearlyFull);
         }

@@ -16,6 +16,9 @@ const ABSENT: u64 = u64::MAX;
 /// Bytes of the index's checksum.
 const CHECKSUM: usize = 4;
 
+/// Offset and length of a frame in its shard, bytes.
+pub type Place = (u64, u64);
+
 /// Reads and writes the index of shards of so many frames.
 pub struct Index {
     coder: Coder,
@@ -53,7 +56,7 @@ impl Index {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn read(&self, shard: &mut File) -> io::Result<Option<Vec<Option<(u64, u64)>>>> {
+    pub fn read(&self, shard: &mut File) -> io::Result<Option<Vec<Option<Place>>>> {
         let length = 16 * self.frames + CHECKSUM;
         let whole = shard.metadata()?.len();
         let Some(start) = whole.checked_sub(length as u64) else { return Ok(None) };
