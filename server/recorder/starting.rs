@@ -8,6 +8,7 @@ use super::view::ViewRecorder;
 use crate::camera::calibration;
 use crate::clock::Moment;
 use crate::ids::SessionId;
+use crate::imaging::Size;
 use crate::recording::{
     CALIBRATION, FORMAT, Header, Recorder, RecordingError, Room, VERSION, VIEW_FORMAT, ViewHeader, ViewWriter, Writer,
     room,
@@ -124,5 +125,6 @@ fn record_view(
         ended: None,
     };
     let writer = ViewWriter::create(folder, header)?;
-    Ok(ViewRecorder::start(writer, parts.live.watch(), began)?)
+    // One size throughout, and the one that every frame is made at, whatever screens come and go.
+    Ok(ViewRecorder::start(writer, parts.live.watch(Size::Cell), began)?)
 }
