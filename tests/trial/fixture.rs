@@ -9,7 +9,7 @@ use parfocal::autofocus::{BlurRate, PolicyName, Registry};
 use parfocal::camera::{CameraHealth, CameraOffer};
 use parfocal::clock::{Clock, ManualClock};
 use parfocal::conductor::{ConductError, Conductor, Library, Parts};
-use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot};
+use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot, Tap};
 use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal::lens::{FocalPower, LensHealth};
 use parfocal::store::{Recorder, Run, Store};
@@ -239,5 +239,8 @@ fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
 
     let (commands, received) = mpsc::unbounded_channel();
     let status = watch::channel(Arc::new(status)).1;
-    (ControlHandle { commands, status, frames: Arc::new(LatestSlot::default()), camera: None }, received)
+    (
+        ControlHandle { commands, status, frames: Arc::new(LatestSlot::default()), camera: None, tap: Tap::default() },
+        received,
+    )
 }
