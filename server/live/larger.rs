@@ -70,7 +70,8 @@ impl Worker {
         crate::priority::lower_further();
         while !self.slot.is_closed() {
             let Some(frame) = self.slot.take(PATIENCE) else { continue };
-            if !self.is_due(&frame) {
+            // Its last viewer may have left meanwhile.
+            if !self.outlet.is_watched() || !self.is_due(&frame) {
                 continue;
             }
 

@@ -73,13 +73,13 @@ impl Worker {
             let Some(frame) = self.control.frames.take(PATIENCE) else { continue };
 
             // One bad picture must not end the live view.
-            if catch_unwind(AssertUnwindSafe(|| self.turn(frame))).is_err() {
+            if catch_unwind(AssertUnwindSafe(|| self.turn(&frame))).is_err() {
                 tracing::error!("a picture could not be made; going on with the next");
             }
         }
     }
 
-    fn turn(&mut self, frame: ControlledFrame) {
+    fn turn(&mut self, frame: &ControlledFrame) {
         self.counts.latency().observe(f64::from(frame.record.latency_micros) / 1e6);
         let watched = self.outlet.is_watched();
 
@@ -101,7 +101,7 @@ impl Worker {
             }
         }
         for larger in &self.larger {
-            larger.offer(&frame);
+            larger.offer(frame);
         }
 
         if detect {

@@ -563,7 +563,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The live picture as motion JPEG, without end. */
+        /** The live picture as motion JPEG, one pixel a mosaic cell, without end. */
         get: operations["stream_mjpeg"];
         put?: never;
         post?: never;
