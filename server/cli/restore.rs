@@ -33,11 +33,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return print(&(serde_json::to_string(&restored)? + "\n"));
     }
 
-    let mut said = format!("restored {}, verified\nchain {}\n", arguments.file.display(), restored.backup);
-    if let Some(kept) = &restored.kept {
-        said += &format!("what was there is kept as {}\n", kept.display());
-    }
-    print(&(said + &in_words(&restored)))
+    let file = arguments.file.display();
+    let kept = restored.kept.as_ref();
+    let kept = kept.map_or_else(String::new, |kept| format!("what was there is kept as {}\n", kept.display()));
+    let relation = in_words(&restored);
+    print(&format!("restored {file}, verified\nchain {}\n{kept}{relation}", restored.backup))
 }
 
 fn in_words(restored: &Restored) -> String {

@@ -142,7 +142,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
     match app.conductor.recorder(role).record(&Access::Entered).await {
         Ok(_) => tracing::info!(role = role_name(role), "a browser was let in"),
         Err(error) => {
-            tracing::error!(role = role_name(role), "a browser was let in and could not be recorded: {error}")
+            tracing::error!(role = role_name(role), "a browser was let in and could not be recorded: {error}");
         }
     }
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Redirect::to(home(role))))

@@ -208,7 +208,8 @@ async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupErr
         0 => database.with_file_name(format!("parfocal-replaced-{stamp}.db")),
         _ => database.with_file_name(format!("parfocal-replaced-{stamp}-{number}.db")),
     };
-    let kept = (0..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0));
+    // Several restores within a second are possible; a hundred are not.
+    let kept = (0..100).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0));
 
     std::fs::hard_link(database, &kept).map_err(BackupError::file(&kept))?;
     for suffix in ["-wal", "-shm"] {

@@ -101,11 +101,11 @@ async fn chain(snapshot: &Reader, expected: Option<Head>) -> Result<String, Wron
     }
 
     let waiting = unchained(&mut connection, &walk).await?;
-    let mut said = walk.end()?;
-    if waiting > 0 {
-        said += &format!("; the latest {waiting} steps of telemetry are not chained yet");
-    }
-    Ok(said)
+    let said = walk.end()?;
+    Ok(match waiting {
+        0 => said,
+        _ => format!("{said}; the latest {waiting} steps of telemetry are not chained yet"),
+    })
 }
 
 fn found(row: &SqliteRow) -> Result<FoundRow, StoreError> {

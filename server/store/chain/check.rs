@@ -210,14 +210,14 @@ impl Walk {
             ));
         }
 
-        let mut said = format!("{} rows, {} of them whole; head {}", self.last.number, self.whole, self.last);
+        let mut said = vec![format!("{} rows, {} of them whole; head {}", self.last.number, self.whole, self.last)];
         if self.adopted > 0 {
-            said += &format!("; {} were recorded before there was a chain", self.adopted);
+            said.push(format!("{} were recorded before there was a chain", self.adopted));
         }
         if self.withheld > 0 {
-            said += &format!("; of {} a part is withheld here", self.withheld);
+            said.push(format!("of {} a part is withheld here", self.withheld));
         }
-        Ok(said)
+        Ok(said.join("; "))
     }
 }
 

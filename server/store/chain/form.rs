@@ -126,6 +126,7 @@ pub struct Head {
 
 impl Head {
     /// The head of a chain without a row.
+    #[must_use]
     pub fn none() -> Self {
         Self { number: 0, hash: GENESIS.to_owned() }
     }

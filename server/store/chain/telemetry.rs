@@ -15,10 +15,10 @@ use crate::store::StoreError;
 /// Most steps of a block: two and a half minutes at 50 a second.
 const MOST: i64 = 8192;
 
-/// Columns of telemetry.csv that are hashed.
+/// Columns of `telemetry.csv` that are hashed.
 pub const OPEN: [&str; 7] = ["run", "frame", "exposed_ns", "asked", "measured", "held", "optimal"];
 
-/// Columns of policy_steps.csv that are hashed.
+/// Columns of `policy_steps.csv` that are hashed.
 pub const SEALED: [&str; 5] = ["policy", "metric", "policy_micros", "latency_micros", "held"];
 
 /// The columns of both, the latter with `step_` before their names. Steps `?2 + 1` to `?2 + ?3` of segment `?1`.

@@ -216,6 +216,7 @@ impl Table {
     }
 
     /// The first format of exports that has it.
+    #[must_use]
     pub fn since(&self) -> u64 {
         self.columns.iter().map(|column| column.since).min().unwrap_or(1)
     }

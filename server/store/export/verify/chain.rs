@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ::csv::StringRecord;
+use serde_json::Value;
 
 use super::files::{cells, csv, json, session_cell};
 use super::verdict::{Outcome, Verdict};
@@ -19,15 +20,15 @@ type Cells = BTreeMap<String, String>;
 pub(super) fn chain(folder: &Path, expected: Option<&Head>) -> Outcome {
     let salts = salts(folder)?;
     let mut walk = Walk::new(records(folder)?, expected.cloned());
-    let mut steps = Steps::read(folder)?;
+    let steps = Steps::read(folder)?;
     let mut last = None;
 
     for row in rows(folder, "chain")? {
         let row = found(row, &salts)?;
-        if let Some(block) = walk.row(&row)? {
-            if !steps.check(&block)? {
-                walk.withhold();
-            }
+        if let Some(block) = walk.row(&row)?
+            && !steps.check(&block)?
+        {
+            walk.withhold();
         }
         last = Some(row.entry);
     }
@@ -116,10 +117,9 @@ fn rows(folder: &Path, name: &str) -> Result<Vec<Cells>, String> {
 
 /// The records of the tables, by kind and key.
 fn records(folder: &Path) -> Result<BTreeMap<(&'static str, String), Record>, String> {
-    let unblinding = match folder.join("allocation.json").exists() {
-        true => json(folder, "allocation.json")?["unblinding_reason"].as_str().map(str::to_owned),
-        false => None,
-    };
+    let told = folder.join("allocation.json").exists();
+    let unblinding = if told { json(folder, "allocation.json")?["unblinding_reason"].take() } else { Value::Null };
+    let unblinding = unblinding.as_str();
 
     let mut found = BTreeMap::new();
     // An export tells of no participant but by the session's code.
@@ -140,7 +140,7 @@ fn records(folder: &Path) -> Result<BTreeMap<(&'static str, String), Record>, St
             let mut withheld = kind.name == "run";
             if kind.name == "event" && cell(&row, "kind") == UNBLINDED {
                 withheld = unblinding.is_none();
-                row.insert("reason".to_owned(), unblinding.clone().unwrap_or_default());
+                row.insert("reason".to_owned(), unblinding.unwrap_or_default().to_owned());
             }
 
             let all = |columns: &[&str]| columns.iter().map(|column| cell(&row, column)).collect();
@@ -179,7 +179,7 @@ impl Steps {
     }
 
     /// Checks `block`: whether its sealed columns could be checked, too.
-    fn check(&mut self, block: &BlockToCheck) -> Result<bool, String> {
+    fn check(&self, block: &BlockToCheck) -> Result<bool, String> {
         let (steps, open) = hashed(&self.open, block, begin_open());
         let Some(sealed) = &self.sealed else {
             block.check(steps, &open, None)?;
