@@ -1,5 +1,7 @@
--- The chain: a row for each record that counts as evidence, written in the same transaction as the record. docs/evidence.md
--- tells, byte for byte, what is hashed. place counts the rows of a session from 1. adopted marks what was recorded before
+-- The chain: a row for each record that counts as evidence, written in the same transaction as the record.
+-- docs/evidence.md
+-- tells, byte for byte, what is hashed. place counts the rows of a session from 1. adopted marks what was recorded
+-- before
 -- this migration. sealed is the hash of what of the record can be withheld or erased; its salt is in chain_salts.
 CREATE TABLE chain (
     number INTEGER PRIMARY KEY,

@@ -1,4 +1,5 @@
-//! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged and true to its commitments.
+//! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged and true to its
+//! commitments.
 
 use std::path::{Path, PathBuf};
 

@@ -202,7 +202,7 @@ async fn course(
     Ok(Json(Timeline { points: Vec::new(), ..timeline }))
 }
 
-/// One session over time. Its focal path may tell policies apart even before unblinding: that it was looked at is recorded.
+/// One session over time with its focal path, which may tell policies apart: each look at it is recorded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]

@@ -89,7 +89,8 @@ impl Recorder {
         Self { way: Way::Server(store.clone()), reader: store.reader().clone(), role: Some(role), clock }
     }
 
-    /// What is done from the command line with the database of data folder `folder`, whether or not a server has it open.
+    /// What is done from the command line with the database of data folder `folder`, whether or not a server has
+    /// it open.
     ///
     /// # Errors
     /// When there is none, it is not of this version, or it cannot be written.

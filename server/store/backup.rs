@@ -100,7 +100,8 @@ pub struct Restored {
     pub relation: Relation,
 }
 
-/// Copies the database of data folder `folder` to the new file `out`, whether or not a server has it open. The copy gets its
+/// Copies the database of data folder `folder` to the new file `out`, whether or not a server has it open. The
+/// copy gets its
 /// name once it is verified and on the disk.
 ///
 /// # Errors

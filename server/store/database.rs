@@ -198,7 +198,8 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     Ok(pool.connect_with(options).await?)
 }
 
-/// Records the start of a run. Before it what an earlier version recorded is chained, and the telemetry that the run before
+/// Records the start of a run. Before it what an earlier version recorded is chained, and the telemetry that the
+/// run before
 /// did not come to chain.
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;

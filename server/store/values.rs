@@ -32,7 +32,8 @@ where
     text.parse().map_err(|error| StoreError::Damaged(format!("column {column}, '{text}': {error}")))
 }
 
-/// Begins a transaction that may write from its beginning, so that nobody writes between what it reads and what it writes.
+/// Begins a transaction that may write from its beginning, so that nobody writes between what it reads and what it
+/// writes.
 pub(super) async fn begin(connection: &mut SqliteConnection) -> Result<Transaction<'_, Sqlite>, StoreError> {
     Ok(connection.begin_with("BEGIN IMMEDIATE").await?)
 }

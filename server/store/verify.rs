@@ -13,7 +13,8 @@ use super::{Reader, StoreError};
 use crate::ids::SessionId;
 use crate::trial::commitment::Allocation;
 
-/// Checks the database of data folder `path`, or the database file `path`: every check, in order. With `expected`, a head
+/// Checks the database of data folder `path`, or the database file `path`: every check, in order. With `expected`,
+/// a head
 /// known from elsewhere, also whether the chain is the one that had it.
 ///
 /// # Errors
@@ -137,7 +138,8 @@ async fn check_block(connection: &mut SqliteConnection, block: &BlockToCheck) ->
     Ok(block.check(hashes.steps, &hashes.open, Some(&hashes.sealed))?)
 }
 
-/// How many steps of telemetry have no block yet. Only the latest run may have such: the next start of the server chains
+/// How many steps of telemetry have no block yet. Only the latest run may have such: the next start of the server
+/// chains
 /// what a killed one did not come to chain.
 async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64, Wrong> {
     let sessions = sqlx::query_as(

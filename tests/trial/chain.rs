@@ -93,7 +93,8 @@ const TAMPERED: [(&str, &str); 47] = [
     ("UPDATE events SET payload = json_set(payload, '$.reason', 'x') WHERE kind = 'unblinded'", "events: event"),
     ("DELETE FROM events WHERE number = 6", "/6 is missing"),
     (
-        "INSERT INTO events SELECT session, 99, run, wall, monotonic_ns, role, kind, payload FROM events WHERE number = 1",
+        "INSERT INTO events SELECT session, 99, run, wall, monotonic_ns, role, kind, payload FROM events
+         WHERE number = 1",
         "/99 was inserted",
     ),
     (
@@ -119,8 +120,8 @@ const TAMPERED: [(&str, &str); 47] = [
     ("UPDATE answers SET question = 'other' WHERE number = 1", "answers: answer"),
     ("DELETE FROM answers WHERE number = 1", "is missing"),
     (
-        "INSERT INTO answers (key, session, question, value, run, wall, monotonic_ns) SELECT 'k', session, question, value,
-         run, wall, 1 FROM answers LIMIT 1",
+        "INSERT INTO answers (key, session, question, value, run, wall, monotonic_ns) SELECT 'k', session, question,
+         value, run, wall, 1 FROM answers LIMIT 1",
         "answers: answer k was inserted",
     ),
     ("UPDATE device_events SET message = 'fine' WHERE number = 1", "devices: device 1 was changed"),
@@ -181,8 +182,8 @@ async fn a_head_that_was_noted_tells_of_what_was_cut_off_or_written_anew() {
     let database = folder.path().join("parfocal.db");
 
     // The latest event and its row.
-    let cut = "DELETE FROM events WHERE kind = 'unblinded'; DELETE FROM chain_salts WHERE number = (SELECT max(number) FROM \
-               chain); DELETE FROM chain WHERE number = (SELECT max(number) FROM chain)";
+    let cut = "DELETE FROM events WHERE kind = 'unblinded'; DELETE FROM chain_salts WHERE number = (SELECT max(number) \
+               FROM chain); DELETE FROM chain WHERE number = (SELECT max(number) FROM chain)";
     assert_eq!(failed(&after(&database, cut, None).await), [""; 0], "nobody else knows that there was more");
     let wrong = said(&after(&database, cut, Some(&head)).await, "chain").unwrap_err();
     assert!(wrong.contains("cut off") && wrong.contains(&head.to_string()), "{wrong}");

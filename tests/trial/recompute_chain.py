@@ -103,11 +103,14 @@ def main(folder):
                 assert sha256("parfocal-sealed-1", salt, *hidden) == sealed, f"{kind} {row['key']} was changed"
             elif sealed:
                 withheld += 1
-            assert sha256("parfocal-record-1", kind, *content, sealed) == row["content"], f"{kind} {row['key']} was changed"
+            found = sha256("parfocal-record-1", kind, *content, sealed)
+            assert found == row["content"], f"{kind} {row['key']} was changed"
             names = "salt wall kind key session place adopted sealed content".split()
-            assert sha256("parfocal-entry-1", *(row[name] for name in names)) == row["entry"], f"row {number} was changed"
+            found = sha256("parfocal-entry-1", *(row[name] for name in names))
+            assert found == row["entry"], f"row {number} was changed"
             seen += 1
-        assert sha256("parfocal-chain-1", str(number), previous, row["entry"]) == row["hash"], f"row {number} was changed"
+        found = sha256("parfocal-chain-1", str(number), previous, row["entry"])
+        assert found == row["hash"], f"row {number} was changed"
         previous = row["hash"]
     assert not records, f"no row tells of {sorted(records)[0]}"
     print(json.dumps({"head": f"{number}:{previous}", "whole": seen, "withheld": withheld}))

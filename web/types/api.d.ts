@@ -288,7 +288,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** One session over time. Its focal path may tell policies apart even before unblinding: that it was looked at is recorded. */
+        /** One session over time with its focal path, which may tell policies apart: each look at it is recorded. */
         get: operations["researcher_timeline"];
         put?: never;
         post?: never;

@@ -8,7 +8,8 @@ use super::records::{keys, one};
 use super::telemetry;
 use crate::store::StoreError;
 
-/// Chains what a database of a version without a chain holds, marked as adopted. A chain that has a row is left as it is:
+/// Chains what a database of a version without a chain holds, marked as adopted. A chain that has a row is left as
+/// it is:
 /// what is put beside it is never adopted.
 pub async fn adopt(connection: &mut SqliteConnection, wall: &str) -> Result<(), StoreError> {
     if head(connection).await?.number > 0 {

@@ -154,7 +154,8 @@ const ACCESS: Kind = Kind {
     table: "accesses",
     open: &["number", "wall", "run", "monotonic_ns", "role", "kind", "session", "detail"],
     sealed: &[],
-    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, * FROM accesses",
+    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
+         FROM accesses",
     one: "number = ?",
     order: "number",
 };

@@ -1,4 +1,5 @@
-//! Verification of the chain that an export tells: every row follows the row before, and the session's rows are those of
+//! Verification of the chain that an export tells: every row follows the row before, and the session's rows are
+//! those of
 //! the records in the tables.
 
 use std::collections::BTreeMap;

@@ -42,7 +42,8 @@ pub fn is_export(path: &Path) -> bool {
     [SUMS, "datapackage.json", "sessions.csv"].iter().any(|file| path.join(file).exists())
 }
 
-/// Checks the export in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether the chain
+/// Checks the export in `folder`: every check, in order. With `expected`, a head known from elsewhere, also
+/// whether the chain
 /// is the one that had it.
 #[must_use]
 pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
