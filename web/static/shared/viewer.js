@@ -145,7 +145,7 @@ export class Viewer {
 
     const { zoom } = this.#framing;
     const isZoomed = zoom > 1.005;
-    if (isZoomed) setText(this.#unzoom, `${zoom.toFixed(1)}× · Show everything`);
+    if (isZoomed) setText(this.#unzoom, `${zoom.toFixed(1)}× · Show all`);
     this.#unzoom.hidden = !isZoomed;
     this.#element.classList.toggle("viewer-is-zoomed", isZoomed);
 
