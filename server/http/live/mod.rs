@@ -172,7 +172,9 @@ impl<A: Audience> Desk<A> {
                 },
                 Ok(()) = self.sessions.changed() => self.session(),
                 Ok(()) = self.statuses.changed() => self.status(),
-                next = Self::next_frame(&mut self.watcher, &mut self.coming, self.due), if self.in_flight.is_none() => self.take(next),
+                next = Self::next_frame(&mut self.watcher, &mut self.coming, self.due), if self.in_flight.is_none() => {
+                    self.take(next)
+                }
                 _ = self.heartbeat.tick() => self.beat()?,
             };
 
