@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::trial::protocol::Record;
 
-/// How recording stands. Nothing in it depends on the policy.
+/// How recording stands. Sizes depend on the picture alone, which the operator sees anyway.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct RecordingStatus {
     /// Why the operator cannot record, where it is so.

@@ -960,7 +960,7 @@ export interface components {
             /** @description Whether mosaics are to be recorded. */
             record: boolean;
         };
-        /** @description How recording stands. Nothing in it depends on the policy. */
+        /** @description How recording stands. Sizes depend on the picture alone, which the operator sees anyway. */
         RecordingStatus: {
             /** @description Whether the session's protocol asked for it. */
             by_protocol: boolean;
