@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use parfocal::clock::{Clock, SystemClock};
 use parfocal::recording::{Ended, Recording};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -30,13 +31,13 @@ async fn order(server: &Server, record: bool) -> (StatusCode, Value) {
 
 /// Asks how recording stands until it stands as `wanted`.
 async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
-    let limit = Instant::now() + Duration::from_secs(60);
+    let limit = SystemClock.now() + Duration::from_mins(1);
     loop {
         let status: Value = server.get_as("operator", PATH).send().await.unwrap().json().await.unwrap();
         if wanted(&status) {
             return status;
         }
-        assert!(Instant::now() < limit, "{status}");
+        assert!(SystemClock.now() < limit, "{status}");
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
 }
