@@ -78,7 +78,14 @@ impl Theatre {
     /// The operator prepares a session of `participant`, who is new, by `protocol`, and starts it.
     pub async fn begin(&self, participant: &str, protocol: &str) {
         let operator = &self.operator;
-        operator.click("#add-participant").await;
+        // The page may still be growing above the button, so that a click meets something else.
+        until("the dialog for a new participant", || async {
+            operator.is("#participant-dialog", "open").await || {
+                operator.try_click("#add-participant").await;
+                false
+            }
+        })
+        .await;
         operator.type_into("#code", participant).await;
         operator.click("#participant-dialog [type=submit]").await;
         operator.sees_no("#participant-dialog").await;
