@@ -6,9 +6,9 @@ use std::sync::Arc;
 use super::CameraError;
 use crate::imaging::MosaicFrame;
 
-/// Mosaics remembered. The camera fills one, and each of control loop, imaging thread and the threads of the two larger
-/// sizes works on one while its slot holds the next; a recorder that falls behind holds about ten. Beyond that the camera
-/// still gets memory, new from the system.
+/// Mosaics remembered. The camera fills one, and each of control loop, imaging thread and the threads of the two
+/// larger sizes works on one while its slot holds the next; a recorder that falls behind holds about ten. Beyond
+/// that the camera still gets memory, new from the system.
 const MOST: usize = 20;
 
 /// Frames of one size, handed out shared and taken back when the last other holder drops them.
