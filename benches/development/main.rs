@@ -1,11 +1,14 @@
 //! Development at each size on one thread, in copies of the mosaic: each round times a plain copy
-//! and everything else, and the table has the medians over the rounds. Times are the thread's own,
+//! and everything else, and the table has the medians over the rounds. Then the pictures as JPEG, made
+//! as they are developed for it and from RGB. Times are the thread's own,
 //! without what other programs take meanwhile. `cargo bench --bench development`
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use parfocal::imaging::{Calibration, Developer, GrayImage, MosaicFrame, Reference, RgbImage, Size};
+use parfocal::imaging::{
+    Calibration, Developed, Developer, GrayImage, JpegEncoder, MosaicFrame, Reference, RgbImage, Size,
+};
 use rustix::time::{ClockId, clock_gettime};
 
 const WIDTH: usize = 2048;
@@ -65,7 +68,7 @@ fn main() {
     let mut copy = vec![0; mosaic.samples().len()];
     let mut by_band = Developer::new(&Calibration::default());
     let mut by_pixel = Developer::new(&per_pixel());
-    let mut rgb = Size::ALL.map(|_| RgbImage::default());
+    let mut pictures = Size::ALL.map(|_| Developed::default());
     let mut gray = GrayImage::default();
 
     let mut copies = Vec::new();
@@ -78,7 +81,9 @@ fn main() {
         for (index, (times, ratios)) in steps.iter_mut().enumerate() {
             let which = index % Size::ALL.len();
             let developer = if index < Size::ALL.len() { &mut by_band } else { &mut by_pixel };
-            let of_step = time(|| developer.develop(black_box(&mosaic), Size::ALL[which], &mut rgb[which], &mut gray));
+            let of_step = time(|| {
+                developer.develop_for_jpeg(black_box(&mosaic), Size::ALL[which], &mut pictures[which], &mut gray);
+            });
             times.push(1e3 * of_step.as_secs_f64());
             ratios.push(of_step.as_secs_f64() / of_copy);
         }
@@ -91,4 +96,35 @@ fn main() {
         let references = if index < Size::ALL.len() { "band" } else { "pixel" };
         println!("| {name}, references per {references} | {:.3} | {:.1} |", median(times), median(ratios));
     }
+
+    println!("\n| JPEG | as developed, ms | from RGB, ms |\n|---|---|---|");
+    for size in Size::ALL {
+        let [developed, from_rgb] = encoding(&mut by_band, &mosaic, size);
+        println!("| {} | {developed:.3} | {from_rgb:.3} |", size.name());
+    }
+}
+
+/// Milliseconds of JPEG encoding: of the picture as it is developed, and from RGB.
+fn encoding(developer: &mut Developer, mosaic: &MosaicFrame, size: Size) -> [f64; 2] {
+    let mut encoder = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY).unwrap();
+    let mut picture = Developed::default();
+    let mut rgb = RgbImage::default();
+    developer.develop_for_jpeg(mosaic, size, &mut picture, &mut GrayImage::default());
+    developer.develop(mosaic, size, &mut rgb, &mut GrayImage::default());
+
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..ROUNDS {
+        let as_developed = time(|| {
+            black_box(match &picture {
+                Developed::Rgb(rgb) => encoder.encode(rgb).unwrap(),
+                Developed::Ycc(ycc) => encoder.encode_ycc(ycc).unwrap(),
+            });
+        });
+        let from_rgb = time(|| {
+            black_box(encoder.encode(&rgb).unwrap());
+        });
+        times[0].push(1e3 * as_developed.as_secs_f64());
+        times[1].push(1e3 * from_rgb.as_secs_f64());
+    }
+    times.each_mut().map(|times| median(times))
 }

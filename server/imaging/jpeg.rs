@@ -1,9 +1,10 @@
 //! JPEG for viewers, by libjpeg-turbo.
 
 use bytes::Bytes;
-use turbojpeg::{Compressor, Image, OutputBuf, PixelFormat, Subsamp};
+use turbojpeg::{Compressor, Image, OutputBuf, PixelFormat, Subsamp, YuvImage};
 
 use super::frame::RgbImage;
+use super::ycc::YccImage;
 
 /// Encodes pictures as JPEG with 4:2:0 chroma. Keep one and reuse it: it keeps its compressor and
 /// memory.
@@ -64,6 +65,26 @@ impl JpegEncoder {
 
         Ok(Bytes::copy_from_slice(&output))
     }
+
+    /// Encodes `ycc`, whose colours need no conversion.
+    ///
+    /// # Errors
+    /// When the picture is empty, or libjpeg-turbo refuses it (a side over 65 500 pixels).
+    pub fn encode_ycc(&mut self, ycc: &YccImage) -> Result<Bytes, JpegError> {
+        let width = ycc.width();
+        let height = ycc.height();
+        let pixels = ycc.planes();
+        if pixels.is_empty() {
+            return Err(JpegError::BadPicture { width, height, bytes: 0 });
+        }
+
+        self.buffer.resize(self.compressor.buf_len(width, height)?, 0);
+        let image = YuvImage { pixels, width, align: 1, height, subsamp: Subsamp::Sub2x2 };
+        let mut output = OutputBuf::borrowed(&mut self.buffer);
+        self.compressor.compress_yuv(image, &mut output)?;
+
+        Ok(Bytes::copy_from_slice(&output))
+    }
 }
 
 #[cfg(test)]
@@ -85,8 +106,27 @@ mod tests {
     }
 
     #[test]
+    fn another_decoder_gets_luma_and_chroma_back() {
+        let mut ycc = YccImage::default();
+        ycc.resize(64, 48);
+        let [luma, blue, red] = ycc.split_mut();
+        luma.fill(81);
+        blue.fill(90);
+        red.fill(240);
+
+        let jpeg = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY).unwrap().encode_ycc(&ycc).unwrap();
+        let decoded = image::load_from_memory_with_format(&jpeg, image::ImageFormat::Jpeg).unwrap().to_rgb8();
+        assert_eq!(decoded.dimensions(), (64, 48));
+        // JFIF 1.02's equations make 238, 14, 14 of it.
+        for pixel in decoded.pixels() {
+            assert!(pixel.0.iter().zip([238, 14, 14]).all(|(one, other)| one.abs_diff(other) <= 6), "{pixel:?}");
+        }
+    }
+
+    #[test]
     fn a_picture_that_is_none_is_an_error() {
         let mut encoder = JpegEncoder::new(80).unwrap();
+        assert!(matches!(encoder.encode_ycc(&YccImage::default()), Err(JpegError::BadPicture { .. })));
         assert!(matches!(encoder.encode(&RgbImage::default()), Err(JpegError::BadPicture { .. })));
         let short = RgbImage { width: 10, height: 10, data: vec![0; 7] };
         assert!(matches!(encoder.encode(&short), Err(JpegError::BadPicture { bytes: 7, .. })));

@@ -17,11 +17,12 @@ mod reduce;
 mod references;
 mod size;
 mod view;
+mod ycc;
 
 pub use calibration::{BANDS, Band, Calibration, Reference};
 pub use calibration_toml::CalibrationError;
 pub use decode::{DecodeError, Picture, SENSOR_SIZE, decode, decode_any, decode_raw, is_mosaic};
-pub use develop::{Developer, Rows};
+pub use develop::{Developed, Developer};
 pub use frame::{CELL, FrameError, GrayImage, MosaicFrame, RgbImage};
 pub use geometry::{ContentArea, PATCH_SIDE, Patch, PatchArea, TooSmall};
 pub use jpeg::{JpegEncoder, JpegError};
@@ -31,3 +32,4 @@ pub use reduce::{fill_block_means, in_blocks, reduced};
 pub use references::{Average, BadReference};
 pub use size::Size;
 pub use view::{Scale, Square, View, WIDER, block_means};
+pub use ycc::YccImage;

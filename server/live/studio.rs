@@ -1,18 +1,16 @@
 //! Makes frames' pictures at one size, reusing its memory for each.
 
-use bytes::Bytes;
-
 use super::{EncodedFrame, Insight, Picture};
 use crate::camera::FrameImage;
 use crate::control::ControlledFrame;
-use crate::imaging::{Developer, GrayImage, JpegEncoder, JpegError, RgbImage, Size, rgb_to_gray};
+use crate::imaging::{Developed, Developer, GrayImage, JpegEncoder, JpegError, Size, rgb_to_gray};
 
 /// A developer and an encoder, and the pictures that pass between them.
 pub(super) struct Studio {
     size: Size,
     developer: Developer,
     encoder: JpegEncoder,
-    rgb: RgbImage,
+    picture: Developed,
     gray: GrayImage,
 }
 
@@ -23,7 +21,7 @@ impl Studio {
     /// When there is no memory for an encoder.
     pub(super) fn new(developer: Developer, size: Size) -> Result<Self, JpegError> {
         let encoder = JpegEncoder::new(JpegEncoder::DEFAULT_QUALITY)?;
-        Ok(Self { size, developer, encoder, rgb: RgbImage::default(), gray: GrayImage::default() })
+        Ok(Self { size, developer, encoder, picture: Developed::default(), gray: GrayImage::default() })
     }
 
     /// The size of its pictures.
@@ -34,7 +32,7 @@ impl Studio {
     /// Makes colour and gray from a mosaic; leaves a colour picture as it is.
     pub(super) fn develop(&mut self, image: &FrameImage) {
         if let FrameImage::Mosaic(mosaic) = image {
-            self.developer.develop(mosaic, self.size, &mut self.rgb, &mut self.gray);
+            self.developer.develop_for_jpeg(mosaic, self.size, &mut self.picture, &mut self.gray);
         }
     }
 
@@ -45,21 +43,22 @@ impl Studio {
     pub(super) fn encode(&mut self, controlled: ControlledFrame) -> Result<EncodedFrame, JpegError> {
         let ControlledFrame { frame, patch, content_area, record, belief } = controlled;
 
-        let (rgb, per_cell, estimated) = match &frame.image {
-            FrameImage::Mosaic(_) => (&self.rgb, self.size.per_cell(), true),
-            FrameImage::Rgb(rgb) => (rgb.as_ref(), 1, false),
+        let (width, height, jpeg) = match (&frame.image, &self.picture) {
+            (FrameImage::Rgb(rgb), _) => (rgb.width, rgb.height, self.encoder.encode(rgb)?),
+            (FrameImage::Mosaic(_), Developed::Rgb(rgb)) => (rgb.width, rgb.height, self.encoder.encode(rgb)?),
+            (FrameImage::Mosaic(_), Developed::Ycc(ycc)) => (ycc.width(), ycc.height(), self.encoder.encode_ycc(ycc)?),
         };
-        let jpeg: Bytes = self.encoder.encode(rgb)?;
+        let developed = matches!(frame.image, FrameImage::Mosaic(_));
 
         Ok(EncodedFrame {
             picture: Picture {
                 number: frame.number,
                 exposed_at: frame.exposed_at,
-                width: rgb.width,
-                height: rgb.height,
-                per_cell,
+                width,
+                height,
+                per_cell: if developed { self.size.per_cell() } else { 1 },
                 jpeg,
-                estimated,
+                estimated: developed,
                 patch,
                 content_area,
             },

@@ -26,20 +26,10 @@ fn developed_by(developer: &mut Developer, mosaic: &MosaicFrame, size: Size) -> 
 
 /// The luminance of each pixel, 0 to 1.
 fn luminance(mosaic: &MosaicFrame, size: Size) -> Vec<f32> {
-    let mut developer = Developer::new(&Calibration::default());
-    let mut cells = GrayImage::default();
-    let (width, height) = size.of(mosaic);
-    let mut pixels = vec![0; 3 * width * size.per_cell()];
-    let mut gray = vec![0.0; width * height];
-
-    let mut rows = developer.rows(mosaic, size, &mut cells);
-    let mut lines = gray.chunks_exact_mut(width);
-    while rows.next_into(&mut pixels) {
-        for row in 0..size.per_cell() {
-            rows.gray_into(row, lines.next().unwrap());
-        }
-    }
-    gray.iter().map(|value| value / 255.0).collect()
+    let mut gray = GrayImage::default();
+    Developer::new(&Calibration::default()).luminance(mosaic, size, &mut gray);
+    assert_eq!((gray.width, gray.height), size.of(mosaic));
+    gray.data.iter().map(|value| value / 255.0).collect()
 }
 
 /// `picture`, one value a cell, enlarged `scale` times by cubic interpolation (Catmull and Rom).
@@ -350,23 +340,5 @@ fn a_developer_remembers_nothing_of_other_frames_and_sizes() {
         (&large, Size::Full),
     ] {
         assert_eq!(developed_by(&mut developer, seen, size), developed(seen, size), "{size:?}");
-    }
-}
-
-#[test]
-fn rows_are_those_of_the_whole_picture() {
-    let seen = Scene::leaves(110).mosaic(3);
-    let mut developer = Developer::new(&Calibration::default());
-    for size in Size::ALL {
-        let (whole, whole_gray) = developed(&seen, size);
-        let mut gray = GrayImage::default();
-        let mut pixels = vec![0; 3 * whole.width * size.per_cell()];
-        let mut found = Vec::new();
-
-        let mut rows = developer.rows(&seen, size, &mut gray);
-        while rows.next_into(&mut pixels) {
-            found.extend_from_slice(&pixels);
-        }
-        assert_eq!((found, gray), (whole.data, whole_gray), "{size:?}");
     }
 }

@@ -4,37 +4,55 @@
 //! that would look like colour. So the samples are first brought to their cell's mean luminance.
 //! Differences below three sixteenths of that mean stay, so that where there is no strong edge the
 //! colours are the cells' own; from nine sixteenths on nothing stays.
+//!
+//! A pixel gets its surroundings' colour, made lighter or darker. sRGB's encoding of light c is
+//! 1.055 c^(1/2.4) - 0.055, but for the darkest colours: light times r makes the encoding, plus an
+//! offset, times r^(1/2.4). So luma plus that offset, and chroma, each divided by the encoding of
+//! the cell's luminance, are what a cell's pixels have in common, and what is enlarged; times the
+//! encoding of a pixel's own luminance they give the pixel.
 
 use multiversion::multiversion;
 
+use super::lanes::{LANES, Lanes, between, mixed, upper_half};
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
-use super::luminance::{Luminance, between, expand, mixed, mixed_row};
+use super::luminance::{Luminance, expand};
 use super::ring::Ring;
 use crate::imaging::calibration::{BANDS, Calibration};
 use crate::imaging::colour::Encoder;
 use crate::imaging::frame::CELL;
 use crate::imaging::reconstruct::{Mixes, picture_row, quarters, weights};
+use crate::imaging::ycc::{CHROMA, LUMA};
 
 /// Rows of cells that are kept.
 const KEPT: usize = 4;
 
-/// sRGB's encoding of c is 1.055 c^(1/2.4) - 0.055, but for the darkest colours. So light times r
-/// makes the encoding plus this offset (of 255) times r^(1/2.4).
-const ENCODING_OFFSET: u16 = 14;
+/// The offset of sRGB's encoding, of 255.
+const ENCODING_OFFSET: i16 = 14;
 
-/// Parts of an 8-bit step in which the cells' colours are kept.
-const PARTS: u16 = 64;
+/// Parts of an 8-bit step in which luma and chroma are found.
+const PARTS: i16 = 8;
 
-/// A gain of 1.
-const UNITY: f32 = 16_384.0;
+/// The encoding of white, with its offset, in [`PARTS`].
+const ENCODED_WHITE: f32 = 8.0 * (255.0 + ENCODING_OFFSET as f32);
 
-/// Level, below black, from which ratios are taken: they would be noise in the dark.
+/// The number that stands for a share of 1: times an encoding, of 65536, it leaves [`PARTS`].
+const SHARE: f32 = 8192.0;
+
+/// The number that stands for the encoding of white.
+const ENCODED: f32 = ENCODED_WHITE * 65_536.0 / SHARE;
+
+/// Level, below black, from which light is counted: ratios would be noise in the dark.
 const FLOOR: f32 = BLACK as f32 - 0.004 * SPAN;
+
+/// Luma and both chromas.
+const COMPONENTS: usize = 3;
 
 /// Colours a picture.
 #[derive(Debug, Clone)]
 pub(super) struct Colour {
     mixes: Mixes,
+    /// Pixels between chroma values.
+    step: usize,
     /// Levels of a row of cells, brought to their cells' means: four rows one after another.
     levelled: Vec<u16>,
     /// How much to subtract from each level for that.
@@ -43,13 +61,15 @@ pub(super) struct Colour {
     rgb: Vec<u8>,
     gray: Vec<f32>,
     colours: [Vec<f32>; 3],
-    cells: Vec<u16>,
-    /// Red, green, blue and mean of all bands, enlarged across; a row of cells each.
-    planes: [Ring<u16>; 4],
-    /// Mean of all bands of the cells around each pixel of a row, and the pixel's gain.
-    means: Vec<u16>,
-    gains: Vec<u16>,
-    components: [Vec<u8>; 3],
+    /// Shares of luma and chroma, a value a cell, and one more on either side.
+    cells: [Vec<i16>; COMPONENTS],
+    /// The same, enlarged across; a row of cells each.
+    shares: [Ring<i16>; COMPONENTS],
+    /// Encoded luminance of two rows of pixels.
+    encoded: Ring<i16>,
+    /// For each chroma value of a row: the encoding, and how far from gray it may be.
+    of_chroma: Ring<i16>,
+    limits: Ring<i16>,
 }
 
 impl Colour {
@@ -57,32 +77,40 @@ impl Colour {
         let levels = |level: u16| [f32::from(level); BANDS];
         Self {
             mixes: Mixes::new(weights(calibration), &levels(BLACK), &levels(WHITE)),
+            step: 1,
             levelled: Vec::new(),
             excess: Vec::new(),
             rgb: Vec::new(),
             gray: Vec::new(),
             colours: Default::default(),
-            cells: Vec::new(),
-            planes: Default::default(),
-            means: Vec::new(),
-            gains: Vec::new(),
-            components: Default::default(),
+            cells: Default::default(),
+            shares: Default::default(),
+            encoded: Ring::default(),
+            of_chroma: Ring::default(),
+            limits: Ring::default(),
         }
     }
 
-    /// Makes ready for pictures of `cells` cells a row, `per_cell` pixels each.
-    pub(super) fn resize(&mut self, cells: usize, per_cell: usize) {
+    /// Makes ready for pictures of `cells` cells a row, `per_cell` pixels each, and a chroma value
+    /// for every `step` of them, 1 or 2, along either side.
+    pub(super) fn resize(&mut self, cells: usize, per_cell: usize, step: usize) {
+        self.step = step;
         let width = cells * per_cell;
         self.levelled.resize(CELL * CELL * cells, 0);
         self.excess.resize(width, 0);
         self.rgb.resize(3 * cells, 0);
         self.gray.resize(cells, 0.0);
         self.colours.iter_mut().for_each(|line| line.resize(cells, 0.0));
-        self.cells.resize(cells + 2, 0);
-        self.planes.iter_mut().for_each(|plane| plane.resize(width, KEPT));
-        self.means.resize(width, 0);
-        self.gains.resize(width, 0);
-        self.components.iter_mut().for_each(|line| line.resize(width, 0));
+        self.cells.iter_mut().for_each(|line| line.resize(cells + 2, 0));
+
+        let [luma, blue, red] = &mut self.shares;
+        luma.resize(width, KEPT);
+        blue.resize(width / step, KEPT);
+        red.resize(width / step, KEPT);
+
+        self.encoded.resize(width, 2);
+        self.of_chroma.resize(width / step, 1);
+        self.limits.resize(width / step, 1);
     }
 
     /// Makes the colours of the row of cells `y` from its `levels`, the `means` of its cells, and
@@ -100,11 +128,11 @@ impl Colour {
         for (row, levelled) in self.levelled.chunks_exact_mut(width).enumerate() {
             // With two by two pixels a cell, two rows of samples share one row of pixels.
             if per_cell == CELL {
-                excess_row::<CELL>(luminance.row(CELL * y + row), means, &mut self.excess);
-                level_row::<1>(levels.row(CELL * y + row), &self.excess, levelled);
+                excess_of_four(luminance.row(CELL * y + row), means, &mut self.excess);
+                level_singles(levels.row(CELL * y + row), &self.excess, levelled);
             } else {
-                excess_row::<2>(luminance.row(2 * y + row / 2), means, &mut self.excess);
-                level_row::<2>(levels.row(CELL * y + row), &self.excess, levelled);
+                excess_of_two(luminance.row(2 * y + row / 2), means, &mut self.excess);
+                level_pairs(levels.row(CELL * y + row), &self.excess, levelled);
             }
         }
 
@@ -112,36 +140,59 @@ impl Colour {
         colour_cells(&self.mixes, rows, encoder, &mut self.colours, &mut self.rgb, &mut self.gray);
 
         let count = means.len();
-        for (component, plane) in self.planes.iter_mut().enumerate() {
-            let cells = &mut self.cells[1..=count];
-            match component {
-                3 => mean_cells(&self.gray, cells),
-                _ => component_cells(&self.rgb, component, cells),
-            }
-            expand(&mut self.cells, per_cell, plane.row_mut(y));
-        }
+        let cells = self.cells.each_mut().map(|cells| &mut cells[1..=count]);
+        share_cells(&self.rgb, &self.gray, cells);
+
+        let [luma, blue, red] = &mut self.cells;
+        expand(luma, per_cell, self.shares[0].row_mut(y));
+        expand(blue, per_cell / self.step, self.shares[1].row_mut(y));
+        expand(red, per_cell / self.step, self.shares[2].row_mut(y));
     }
 
-    /// Makes the pixels of row `row` of the row of cells `y`, of `cells` such rows; needs the
-    /// colours of the next.
-    pub(super) fn row(
+    /// Makes luma of row `row` of the pixels of the row of cells `y`, of `cells` such rows; needs
+    /// the colours of the next. Rows must be made one after another.
+    pub(super) fn make_luma(
         &mut self,
         (y, cells): (usize, usize),
         row: usize,
         per_cell: usize,
-        luminance: &[u16],
-        rgb: &mut [u8],
+        luminance: &Luminance,
+        luma: &mut [u8],
     ) {
-        let (near, weights) = between(row, per_cell, y, cells);
-        let [red, green, blue, means] = self.planes.each_ref().map(|plane| [plane.row(y), plane.row(near)]);
+        let place = per_cell * y + row;
+        let (near, eighths) = between(row, per_cell, y, cells);
+        let shares = [self.shares[0].lanes(y), self.shares[0].lanes(near)];
+        luma_row(shares, eighths, luminance.lanes(place), self.encoded.lanes_mut(place), luma);
+    }
 
-        mixed_row(means, weights, &mut self.means);
-        gain_row(luminance, &self.means, &mut self.gains);
-        for (plane, component) in [red, green, blue].into_iter().zip(&mut self.components) {
-            component_row(plane, weights, (&self.gains, luminance), component);
+    /// Makes blue's and red's chroma of the same row, and of the one above it if two rows share
+    /// chroma; after their luma.
+    pub(super) fn make_chroma(
+        &mut self,
+        (y, cells): (usize, usize),
+        row: usize,
+        per_cell: usize,
+        luminance: &Luminance,
+        chroma: [&mut [u8]; 2],
+    ) {
+        let place = per_cell * y + row;
+        let light = luminance.lanes(place);
+
+        if self.step == 1 {
+            self.of_chroma.lanes_mut(0).copy_from_slice(self.encoded.lanes(place));
+            self.limits.lanes_mut(0).copy_from_slice(light);
+        } else {
+            let rows = [place - 1, place];
+            pair_rows(rows.map(|row| self.encoded.row(row)), self.of_chroma.row_mut(0));
+            pair_rows(rows.map(|row| luminance.row(row)), self.limits.row_mut(0));
         }
+        limit_row(self.limits.lanes_mut(0));
 
-        interleave(self.components.each_ref().map(Vec::as_slice), rgb);
+        let (near, eighths) = between(row / self.step, per_cell / self.step, y, cells);
+        for (shares, out) in self.shares[1..].iter().zip(chroma) {
+            let shares = [shares.lanes(y), shares.lanes(near)];
+            chroma_row(shares, eighths, [self.of_chroma.lanes(0), self.limits.lanes(0)], out);
+        }
     }
 }
 
@@ -157,46 +208,26 @@ fn colour_cells(
     picture_row(mixes, rows, encoder, colours, rgb, gray);
 }
 
-/// The levels of gray values.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn mean_cells(gray: &[f32], cells: &mut [u16]) {
-    for (cell, gray) in cells.iter_mut().zip(gray) {
-        *cell = (gray * (SPAN / 255.0) + f32::from(BLACK) + LOW_BITS).to_bits() as u16;
-    }
-}
-
-/// One component of pixels, with its offset, in [`PARTS`].
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn component_cells(rgb: &[u8], component: usize, cells: &mut [u16]) {
-    for (cell, &value) in cells.iter_mut().zip(rgb.iter().skip(component).step_by(3)) {
-        *cell = (u16::from(value) + ENCODING_OFFSET) * PARTS + 2;
-    }
-}
-
 /// How far the luminance of each pixel lies from its cell's mean, where that is far.
-fn excess_row<const PER_CELL: usize>(luminance: &[u16], means: &[u16], excess: &mut [i16]) {
-    if PER_CELL == CELL { excess_of_four(luminance, means, excess) } else { excess_of_two(luminance, means, excess) }
-}
-
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn excess_of_four(luminance: &[u16], means: &[u16], excess: &mut [i16]) {
+fn excess_of_four(luminance: &[i16], means: &[u16], excess: &mut [i16]) {
     excess_of(luminance.as_chunks::<4>().0, means, excess.as_chunks_mut::<4>().0);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn excess_of_two(luminance: &[u16], means: &[u16], excess: &mut [i16]) {
+fn excess_of_two(luminance: &[i16], means: &[u16], excess: &mut [i16]) {
     excess_of(luminance.as_chunks::<2>().0, means, excess.as_chunks_mut::<2>().0);
 }
 
 #[inline(always)]
-fn excess_of<const PER_CELL: usize>(luminance: &[[u16; PER_CELL]], means: &[u16], excess: &mut [[i16; PER_CELL]]) {
+fn excess_of<const PER_CELL: usize>(luminance: &[[i16; PER_CELL]], means: &[u16], excess: &mut [[i16; PER_CELL]]) {
     for ((excess, luminance), &mean) in excess.iter_mut().zip(luminance).zip(means) {
         let above_black = mean.saturating_sub(BLACK);
         // Three sixteenths: more than noise and most texture.
         let limit = ((above_black >> 3) + (above_black >> 4)) as i16;
 
         for (excess, &luminance) in excess.iter_mut().zip(luminance) {
-            let difference = luminance as i16 - mean as i16;
+            let difference = luminance - mean as i16;
             let size = difference.abs();
             let left_alone = size.min(limit).min((3 * limit - size).max(0));
             *excess = if difference < 0 { left_alone - size } else { size - left_alone };
@@ -204,11 +235,7 @@ fn excess_of<const PER_CELL: usize>(luminance: &[[u16; PER_CELL]], means: &[u16]
     }
 }
 
-/// Subtracts from each level its excess, which `SAMPLES` neighbours share.
-fn level_row<const SAMPLES: usize>(levels: &[u16], excess: &[i16], out: &mut [u16]) {
-    if SAMPLES == 1 { level_singles(levels, excess, out) } else { level_pairs(levels, excess, out) }
-}
-
+/// Subtracts from each level its excess.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn level_singles(levels: &[u16], excess: &[i16], out: &mut [u16]) {
     for ((out, &level), &excess) in out.iter_mut().zip(levels).zip(excess) {
@@ -216,6 +243,7 @@ fn level_singles(levels: &[u16], excess: &[i16], out: &mut [u16]) {
     }
 }
 
+/// Subtracts from each level its excess, which two neighbours share.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn level_pairs(levels: &[u16], excess: &[i16], out: &mut [u16]) {
     let pairs = out.as_chunks_mut::<2>().0.iter_mut().zip(levels.as_chunks::<2>().0);
@@ -226,55 +254,173 @@ fn level_pairs(levels: &[u16], excess: &[i16], out: &mut [u16]) {
     }
 }
 
-/// The gain of each pixel's encoded colour: r^(1/2.4), of [`UNITY`], for a pixel r times as bright
-/// as its surroundings.
+/// What the pixels of each cell have in common: luma with its offset, and chroma, each beside the encoding of the cell's
+/// luminance.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn gain_row(luminance: &[u16], means: &[u16], gains: &mut [u16]) {
-    // A quotient of two quadratics that is within 0.8 % of r^(1/2.4) from 1/20 to 6, and 1 at 1.
-    const ABOVE: [f32; 3] = [0.166_25, 3.680_4, 2.407_6];
-    const BELOW: [f32; 3] = [1.0, 4.604_25, 0.65];
+fn share_cells(rgb: &[u8], gray: &[f32], cells: [&mut [i16]; COMPONENTS]) {
+    let [luma_shares, blue_shares, red_shares] = cells;
+    let shares = luma_shares.iter_mut().zip(blue_shares).zip(red_shares);
 
-    for (gain, (&luminance, &mean)) in gains.iter_mut().zip(luminance.iter().zip(means)) {
-        let mean = (f32::from(mean) - FLOOR).max(1.0);
-        let here = (f32::from(luminance) - FLOOR).max(0.0).min(6.0 * mean);
-        let found = UNITY * quadratic(ABOVE, mean, here) / quadratic(BELOW, mean, here);
-        *gain = (found + LOW_BITS).to_bits() as u16;
+    for ((((luma_share, blue_share), red_share), pixel), gray) in shares.zip(rgb.as_chunks::<3>().0).zip(gray) {
+        let [red, green, blue] = pixel.map(f32::from);
+        let luma = LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue;
+
+        let light = (gray * (SPAN / 255.0) + f32::from(BLACK) - FLOOR).max(0.0);
+        let beside = SHARE / ENCODED_WHITE * f32::from(PARTS) / encoding(light);
+        *luma_share = nearest(beside * (luma + f32::from(ENCODING_OFFSET)));
+        *blue_share = nearest(beside * CHROMA[0] * (blue - luma));
+        *red_share = nearest(beside * CHROMA[1] * (red - luma));
     }
 }
 
 #[inline(always)]
-fn quadratic([a, b, c]: [f32; 3], mean: f32, here: f32) -> f32 {
-    (a * mean + b * here) * mean + c * (here * here)
+fn nearest(share: f32) -> i16 {
+    (share.clamp(-32_767.0, 32_767.0) + 1.5 * LOW_BITS).to_bits() as i16
 }
 
-/// One component of a row of pixels: the cells' colours, enlarged, times the gains.
+/// x^(1/2.4) of light above [`FLOOR`], 1 for white: a quotient of two quadratics that is within
+/// 1.1 % of it from 1/250 of white on, and 0.06 for no light. What error it has in common at a
+/// cell and at a pixel cancels out.
+#[inline(always)]
+fn encoding(light: f32) -> f32 {
+    const ABOVE: [f32; 3] = [0.061_615, 13.9994 / SPAN, 70.8435 / (SPAN * SPAN)];
+    const BELOW: [f32; 3] = [1.0, 42.9598 / SPAN, 41.1044 / (SPAN * SPAN)];
+
+    let quadratic = |[a, b, c]: [f32; 3]| (c * light + b) * light + a;
+    quadratic(ABOVE) / quadratic(BELOW)
+}
+
+/// Luma of a row of pixels: the cells' share of it, enlarged, times the pixels' own encodings, which
+/// are kept in `encoded`.
 ///
 /// A place whose mean of all bands is white reflects all bands, whatever colour the cells around it
-/// have: towards white every component is lifted to it.
+/// have: towards white luma is lifted to it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn component_row(plane: [&[u16]; 2], weights: [u16; 2], (gains, luminance): (&[u16], &[u16]), out: &mut [u8]) {
-    // Colour and gain together have 64 * 16384 / 65536 = 16 parts a step.
-    const OFFSET: u16 = 16 * ENCODING_OFFSET - 8;
-    // Two levels a step, up to white.
-    const LIFTED: u16 = WHITE - 2 * 255;
-
-    let count = out.len();
-    let gains = &gains[..count];
-    let luminance = &luminance[..count];
-    let plane = plane.map(|values| &values[..count]);
-
-    for (x, out) in out.iter_mut().enumerate() {
-        let colour = mixed([plane[0][x], plane[1][x]], weights);
-        let lit = ((u32::from(colour) * u32::from(gains[x])) >> 16) as u16;
-        let least = luminance[x].saturating_sub(LIFTED) >> 1;
-        *out = (lit.saturating_sub(OFFSET) >> 4).max(least).min(255) as u8;
+fn luma_row(
+    shares: [&[Lanes<i16>]; 2],
+    eighths: u8,
+    luminance: &[Lanes<i16>],
+    encoded: &mut [Lanes<i16>],
+    luma: &mut [u8],
+) {
+    match eighths {
+        1 => luma_lanes::<1>(shares, luminance, encoded, luma),
+        2 => luma_lanes::<2>(shares, luminance, encoded, luma),
+        _ => luma_lanes::<3>(shares, luminance, encoded, luma),
     }
 }
 
+#[inline(always)]
+fn luma_lanes<const EIGHTHS: u8>(
+    [own, near]: [&[Lanes<i16>]; 2],
+    luminance: &[Lanes<i16>],
+    encoded: &mut [Lanes<i16>],
+    luma: &mut [u8],
+) {
+    let (whole, rest) = luma.as_chunks_mut();
+    let count = whole.len();
+    for (x, out) in whole.iter_mut().enumerate() {
+        luma_vector::<EIGHTHS>([&own[x], &near[x]], &luminance[x], &mut encoded[x], out);
+    }
+
+    if !rest.is_empty() {
+        let mut last = [0; LANES];
+        luma_vector::<EIGHTHS>([&own[count], &near[count]], &luminance[count], &mut encoded[count], &mut last);
+        rest.copy_from_slice(&last[..rest.len()]);
+    }
+}
+
+#[inline(always)]
+fn luma_vector<const EIGHTHS: u8>(
+    [own, near]: [&Lanes<i16>; 2],
+    luminance: &Lanes<i16>,
+    encoded: &mut Lanes<i16>,
+    luma: &mut Lanes<u8>,
+) {
+    // A half is added, to round.
+    const OFFSET: i16 = PARTS * ENCODING_OFFSET - PARTS / 2;
+
+    for lane in 0..LANES {
+        let light = (f32::from(luminance[lane]) - FLOOR).max(0.0);
+        encoded[lane] = (ENCODED * encoding(light) + LOW_BITS).to_bits() as i16;
+    }
+    for lane in 0..LANES {
+        let lit = upper_half(mixed::<EIGHTHS>(own[lane], near[lane]), encoded[lane]);
+        let found = (lit - OFFSET) >> 3;
+        luma[lane] = found.max(least(luminance[lane])).clamp(0, 255) as u8;
+    }
+}
+
+/// The least luma of a pixel of this luminance: two levels a step, up to white.
+#[inline(always)]
+fn least(luminance: i16) -> i16 {
+    (luminance - (WHITE as i16 - 2 * 255)) >> 1
+}
+
+/// Chroma of a row: the cells' share of it, enlarged, times the encoding, within limits.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn interleave([red, green, blue]: [&[u8]; 3], rgb: &mut [u8]) {
-    let components = red.iter().zip(green).zip(blue);
-    for (pixel, ((&red, &green), &blue)) in rgb.as_chunks_mut::<3>().0.iter_mut().zip(components) {
-        *pixel = [red, green, blue];
+fn chroma_row(shares: [&[Lanes<i16>]; 2], eighths: u8, light: [&[Lanes<i16>]; 2], chroma: &mut [u8]) {
+    match eighths {
+        0 => chroma_lanes::<0>(shares, light, chroma),
+        1 => chroma_lanes::<1>(shares, light, chroma),
+        2 => chroma_lanes::<2>(shares, light, chroma),
+        _ => chroma_lanes::<3>(shares, light, chroma),
+    }
+}
+
+#[inline(always)]
+fn chroma_lanes<const EIGHTHS: u8>([own, near]: [&[Lanes<i16>]; 2], light: [&[Lanes<i16>]; 2], chroma: &mut [u8]) {
+    let [encoded, limits] = light;
+    let (whole, rest) = chroma.as_chunks_mut();
+    let count = whole.len();
+    for (x, out) in whole.iter_mut().enumerate() {
+        chroma_vector::<EIGHTHS>([&own[x], &near[x]], &encoded[x], &limits[x], out);
+    }
+
+    if !rest.is_empty() {
+        let mut last = [0; LANES];
+        chroma_vector::<EIGHTHS>([&own[count], &near[count]], &encoded[count], &limits[count], &mut last);
+        rest.copy_from_slice(&last[..rest.len()]);
+    }
+}
+
+#[inline(always)]
+fn chroma_vector<const EIGHTHS: u8>(
+    [own, near]: [&Lanes<i16>; 2],
+    encoded: &Lanes<i16>,
+    limits: &Lanes<i16>,
+    chroma: &mut Lanes<u8>,
+) {
+    for lane in 0..LANES {
+        let lit = upper_half(mixed::<EIGHTHS>(own[lane], near[lane]), encoded[lane]);
+        let found = (lit + PARTS / 2) >> 3;
+        let limit = limits[lane];
+        chroma[lane] = (found.min(limit).max(-limit) + 128) as u8;
+    }
+}
+
+/// Means of two by two values.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn pair_rows(rows: [&[i16]; 2], out: &mut [i16]) {
+    let [upper, lower] = rows.map(|row| row.as_chunks::<2>().0);
+    for (out, (upper, lower)) in out.iter_mut().zip(upper.iter().zip(lower)) {
+        *out = mean(mean(upper[0], lower[0]), mean(upper[1], lower[1]));
+    }
+}
+
+/// The mean of two values, rounded down. Encodings add up to more than 16 bits.
+#[inline(always)]
+fn mean(one: i16, other: i16) -> i16 {
+    one + ((other - one) >> 1)
+}
+
+/// From luminance to how far chroma may be from gray: towards white there is no colour.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn limit_row(limits: &mut [Lanes<i16>]) {
+    for limits in limits {
+        for limit in limits {
+            let headroom = 255 - least(*limit);
+            *limit = ((headroom >> 1) + (headroom >> 3)).clamp(0, 127);
+        }
     }
 }

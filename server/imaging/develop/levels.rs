@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::lanes::{LANES, Lanes};
 use super::ring::Ring;
 use crate::imaging::calibration::{BANDS, Calibration};
 use crate::imaging::frame::{CELL, GrayImage, MosaicFrame};
@@ -28,56 +29,82 @@ const FROM_BALANCED: (f32, f32) =
     (SPAN / (balance::WHITE - balance::DARK), BLACK as f32 - SPAN / (balance::WHITE - balance::DARK) * balance::DARK);
 
 /// The gray value (0..=255) of a level.
-pub(super) fn gray(level: u16) -> f32 {
+pub(super) fn gray(level: i16) -> f32 {
     (255.0 / SPAN * (f32::from(level) - f32::from(BLACK))).clamp(0.0, 255.0)
 }
 
 /// Turns samples into levels, by references per band or per pixel, and sums them up cell by cell.
 #[derive(Debug, Clone)]
 pub(super) struct Levels {
-    /// Gain and offset of each band, by references per band.
-    of_bands: [(f32, f32); BANDS],
-    /// The same for each sample of four rows.
-    gains: [Vec<f32>; CELL],
-    offsets: [Vec<f32>; CELL],
+    /// For each row of a cell: how its bands, by turns, become levels.
+    of_bands: [BandBalance; CELL],
+    /// Samples of a row of cells beyond its last whole vector.
+    rest: [Lanes<u16>; CELL],
     /// Sums of four levels, one below another, as they count for gray and as they are developed.
-    of_gray: Vec<u16>,
-    sums: Vec<u16>,
+    of_gray: Ring<u16>,
+    sums: Ring<u16>,
+}
+
+/// A vector's balance by references per band, in whole numbers: a level is
+/// `((min(sample, most) - least) * factor * gain >> 16) + summand`.
+#[derive(Debug, Clone, Copy)]
+struct BandBalance {
+    most: Lanes<u16>,
+    least: Lanes<u16>,
+    /// A power of two that brings the samples to 16 bits.
+    factor: Lanes<u16>,
+    gain: Lanes<u16>,
+    summand: Lanes<u16>,
+}
+
+impl BandBalance {
+    /// The balance for a row of samples of the bands given by `dark` and `white`, by turns.
+    fn new(dark: [f32; CELL], white: [f32; CELL]) -> Self {
+        let mut balance =
+            Self { most: [0; LANES], least: [0; LANES], factor: [1; LANES], gain: [0; LANES], summand: [0; LANES] };
+
+        for lane in 0..LANES {
+            let gain = SPAN / (white[lane % CELL] - dark[lane % CELL]);
+            let offset = f32::from(BLACK) - dark[lane % CELL] * gain;
+
+            // The first sample that makes a level above 0, and the last that stays in range however
+            // the numbers below are rounded.
+            let highest = f32::from(HIGHEST_OF_GRAY - 2);
+            let least = (-offset / gain).clamp(0.0, 65_535.0).ceil() as u16;
+            let most = ((highest - offset) / gain).clamp(f32::from(least), 65_535.0).floor() as u16;
+            let span = (most - least).max(1);
+
+            // The product is rounded down, on average by half a level.
+            let summand = (f32::from(least) * gain + offset + 0.5).clamp(0.0, highest);
+
+            balance.least[lane] = least;
+            balance.most[lane] = most;
+            balance.factor[lane] = 1 << span.leading_zeros();
+            balance.gain[lane] = (gain * 65_536.0 / f32::from(balance.factor[lane])).round() as u16;
+            balance.summand[lane] = summand.round() as u16;
+        }
+        balance
+    }
 }
 
 impl Levels {
     pub(super) fn new(calibration: &Calibration) -> Self {
         let dark = calibration.dark.band_means();
         let white = calibration.white.band_means();
+        let row = |row: usize, of: [f32; BANDS]| std::array::from_fn(|column| of[CELL * row + column]);
 
-        let of_band = |band: usize| {
-            let gain = SPAN / (white[band] - dark[band]);
-            (gain, f32::from(BLACK) - dark[band] * gain)
-        };
         Self {
-            of_bands: std::array::from_fn(of_band),
-            gains: Default::default(),
-            offsets: Default::default(),
-            of_gray: Vec::new(),
-            sums: Vec::new(),
+            of_bands: std::array::from_fn(|index| BandBalance::new(row(index, dark), row(index, white))),
+            rest: [[0; LANES]; CELL],
+            of_gray: Ring::default(),
+            sums: Ring::default(),
         }
     }
 
     /// Makes ready for mosaics of `width` samples a row.
     pub(super) fn resize(&mut self, width: usize) {
-        if self.sums.len() == width {
-            return;
-        }
-
-        self.sums.resize(width, 0);
-        self.of_gray.resize(width, 0);
-        for (row, (gains, offsets)) in self.gains.iter_mut().zip(&mut self.offsets).enumerate() {
-            let balances = (0..width).map(|x| self.of_bands[CELL * row + x % CELL]);
-            gains.clear();
-            gains.extend(balances.clone().map(|(gain, _)| gain));
-            offsets.clear();
-            offsets.extend(balances.map(|(_, offset)| offset));
-        }
+        self.of_gray.resize(width, 1);
+        self.sums.resize(width, 1);
     }
 
     /// Makes the levels of the row of cells `y`, its cells' mean levels into `means`, and its part of
@@ -91,27 +118,48 @@ impl Levels {
         means: &mut [u16],
         gray: &mut GrayImage,
     ) {
-        self.of_gray.fill(0);
-        self.sums.fill(0);
+        let width = mosaic.width();
+        let rows = |row: usize| &mosaic.samples()[(CELL * y + row) * width..][..width];
 
-        for row in 0..CELL {
-            let samples = &mosaic.samples()[(CELL * y + row) * mosaic.width()..][..mosaic.width()];
-            let out = levels.row_mut(CELL * y + row);
-
-            match balance {
-                Some(balance) => {
+        match balance {
+            Some(balance) => {
+                for row in 0..CELL {
                     let (gains, offsets) = balance.row(CELL * y + row);
-                    balance_pixels(samples, gains, offsets, out);
+                    balance_pixels(rows(row), gains, offsets, levels.row_mut(CELL * y + row));
                 }
-                None => balance_bands(samples, &self.gains[row], &self.offsets[row], out),
+                cut_rows(levels.four_mut(CELL * y), self.of_gray.lanes_mut(0), self.sums.lanes_mut(0));
             }
-
-            cut_row(out, &mut self.of_gray, &mut self.sums);
+            None => self.balance_bands([0, 1, 2, 3].map(rows), levels.four_mut(CELL * y)),
+        }
+        for row in 0..CELL {
             levels.fill_margins(CELL * y + row, CELL);
         }
 
         let width = mosaic.band_width();
-        cell_means(&self.of_gray, &self.sums, means, &mut gray.data[y * width..][..width]);
+        cell_means(self.of_gray.row(0), self.sums.row(0), means, &mut gray.data[y * width..][..width]);
+    }
+
+    /// Turns four rows of samples into levels by references per band, and sums them up.
+    fn balance_bands(&mut self, samples: [&[u16]; CELL], levels: [&mut [Lanes<u16>]; CELL]) {
+        let of_gray = self.of_gray.lanes_mut(0);
+        let sums = self.sums.lanes_mut(0);
+        let whole = samples.map(|row| row.as_chunks().0);
+        let [first, second, third, fourth] = levels;
+        balance_rows(&self.of_bands, whole, [first, second, third, fourth], (of_gray, sums));
+
+        let count = whole[0].len();
+        if count == sums.len() {
+            return;
+        }
+
+        // What is left of a vector, filled up.
+        for (row, rest) in samples.iter().zip(&mut self.rest) {
+            let left = row.as_chunks::<LANES>().1;
+            rest[..left.len()].copy_from_slice(left);
+        }
+        let rest = self.rest.each_ref().map(std::slice::from_ref);
+        let last = [&mut first[count..], &mut second[count..], &mut third[count..], &mut fourth[count..]];
+        balance_rows(&self.of_bands, rest, last, (&mut of_gray[count..], &mut sums[count..]));
     }
 }
 
@@ -124,11 +172,47 @@ fn balance_pixels(samples: &[u16], gains: &[f32], offsets: &[f32], levels: &mut 
     }
 }
 
+/// Balances four rows of samples by references per band, and sums up their levels for gray and, cut
+/// at [`HIGHEST`], as they are developed.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn balance_bands(samples: &[u16], gains: &[f32], offsets: &[f32], levels: &mut [u16]) {
-    let balances = gains.iter().zip(offsets);
-    for ((level, &sample), (gain, offset)) in levels.iter_mut().zip(samples).zip(balances) {
-        *level = rounded(f32::from(sample) * gain + offset);
+fn balance_rows(
+    balances: &[BandBalance; CELL],
+    samples: [&[Lanes<u16>]; CELL],
+    levels: [&mut [Lanes<u16>]; CELL],
+    (of_gray, sums): (&mut [Lanes<u16>], &mut [Lanes<u16>]),
+) {
+    let count = samples[0].len();
+    let samples = samples.map(|row| &row[..count]);
+    let [first, second, third, fourth] = levels.map(|row| &mut row[..count]);
+    let of_gray = &mut of_gray[..count];
+    let sums = &mut sums[..count];
+
+    for x in 0..count {
+        let of_gray = &mut of_gray[x];
+        let sums = &mut sums[x];
+        *of_gray = [0; LANES];
+        *sums = [0; LANES];
+        balance_vector(&balances[0], &samples[0][x], &mut first[x], (of_gray, sums));
+        balance_vector(&balances[1], &samples[1][x], &mut second[x], (of_gray, sums));
+        balance_vector(&balances[2], &samples[2][x], &mut third[x], (of_gray, sums));
+        balance_vector(&balances[3], &samples[3][x], &mut fourth[x], (of_gray, sums));
+    }
+}
+
+#[inline(always)]
+fn balance_vector(
+    balance: &BandBalance,
+    samples: &Lanes<u16>,
+    levels: &mut Lanes<u16>,
+    (of_gray, sums): (&mut Lanes<u16>, &mut Lanes<u16>),
+) {
+    for lane in 0..LANES {
+        let above = samples[lane].min(balance.most[lane]).saturating_sub(balance.least[lane]);
+        let scaled = above.wrapping_mul(balance.factor[lane]);
+        let level = ((u32::from(scaled) * u32::from(balance.gain[lane])) >> 16) as u16 + balance.summand[lane];
+        of_gray[lane] += level;
+        levels[lane] = level.min(HIGHEST);
+        sums[lane] += levels[lane];
     }
 }
 
@@ -155,13 +239,23 @@ fn cell_means(of_gray: &[u16], sums: &[u16], means: &mut [u16], gray: &mut [f32]
     }
 }
 
-/// Adds a row of levels to the sums for gray, cuts it at [`HIGHEST`], and adds it to the others.
+/// Sums four rows of levels for gray, cuts them at [`HIGHEST`], and sums what is left.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn cut_row(levels: &mut [u16], of_gray: &mut [u16], sums: &mut [u16]) {
-    for (level, (of_gray, sum)) in levels.iter_mut().zip(of_gray.iter_mut().zip(sums)) {
-        *of_gray += *level;
-        *level = (*level).min(HIGHEST);
-        *sum += *level;
+fn cut_rows(levels: [&mut [Lanes<u16>]; CELL], of_gray: &mut [Lanes<u16>], sums: &mut [Lanes<u16>]) {
+    let count = sums.len();
+    let [first, second, third, fourth] = levels.map(|row| &mut row[..count]);
+
+    for (index, (of_gray, sums)) in of_gray.iter_mut().zip(sums).enumerate() {
+        let rows = [&mut first[index], &mut second[index], &mut third[index], &mut fourth[index]];
+        *of_gray = [0; LANES];
+        *sums = [0; LANES];
+        for row in rows {
+            for lane in 0..LANES {
+                of_gray[lane] += row[lane];
+                row[lane] = row[lane].min(HIGHEST);
+                sums[lane] += row[lane];
+            }
+        }
     }
 }
 

@@ -16,8 +16,9 @@
 
 use multiversion::multiversion;
 
+use super::lanes::{LANES, Lanes, between, mixed, upper_half};
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
-use super::ring::{MARGIN, Ring, same_bands};
+use super::ring::{Ring, same_bands};
 
 /// How much of the mean of all bands stands beside a band's own mean as that to which a band's
 /// deviation is in proportion. At 0 a band deviates in proportion to its level; at infinity all
@@ -51,33 +52,32 @@ pub(super) struct Luminance {
     doubt: f32,
     /// The mean of all bands around each value.
     mean: Ring<u16>,
-    /// What a value says beyond that mean.
+    /// Levels and means, smoothed across over the same band's values.
+    smooth_levels: Ring<u16>,
+    smooth_means: Ring<u16>,
+    /// What a value says beyond that mean, and the same smoothed across.
     detail: Ring<i16>,
+    smooth_detail: Ring<i16>,
     /// The mean with the coarse part of the detail.
     coarse: Ring<i16>,
     /// The rest of the detail.
     fine: Ring<i16>,
     /// The share of the fine detail that is kept, a row of cells each.
-    trust: Ring<u16>,
-    result: Ring<u16>,
+    trust: Ring<i16>,
+    result: Ring<i16>,
     lines: Lines,
 }
 
-/// Working memory of one row.
+/// Working memory of a row of cells.
 #[derive(Debug, Clone, Default)]
 struct Lines {
-    /// Sums down the columns, with margins.
-    levels: Vec<u16>,
-    means: Vec<u16>,
-    details: Vec<i16>,
-    /// Smooth levels of each sample's band, and smooth means of all bands.
-    band: Vec<u16>,
-    all: Vec<u16>,
+    /// Sums of levels down the columns, for each row of values.
+    levels: Ring<u16>,
     /// Absolute detail summed down the columns of a row of cells.
-    coarse: Vec<u16>,
-    fine: Vec<u16>,
+    coarse: Ring<u16>,
+    fine: Ring<u16>,
     /// A value a cell, and one more on either side.
-    cells: Vec<u16>,
+    cells: Vec<i16>,
 }
 
 impl Luminance {
@@ -90,67 +90,73 @@ impl Luminance {
         self.doubt = if cell == 4 { 0.6 } else { 0.15 };
 
         self.mean.resize(width, KEPT * cell);
+        self.smooth_levels.resize(width, KEPT * cell);
+        self.smooth_means.resize(width, KEPT * cell);
         self.detail.resize(width, KEPT * cell);
+        self.smooth_detail.resize(width, KEPT * cell);
         self.coarse.resize(width, 2 * cell);
         self.fine.resize(width, 2 * cell);
         self.trust.resize(width, KEPT);
         self.result.resize(width, 2 * cell);
 
-        let padded = width + 2 * MARGIN;
-        self.lines.levels.resize(padded, 0);
-        self.lines.means.resize(padded, 0);
-        self.lines.details.resize(padded, 0);
-        self.lines.band.resize(width, 0);
-        self.lines.all.resize(width, 0);
-        self.lines.coarse.resize(width, 0);
-        self.lines.fine.resize(width, 0);
-        self.lines.cells.resize(width / cell + 2, 0);
+        let Lines { levels, coarse, fine, cells } = &mut self.lines;
+        levels.resize(width, cell);
+        coarse.resize(width, 1);
+        fine.resize(width, 1);
+        cells.resize(width / cell + 2, 0);
     }
 
     /// Row `y` of the luminance, in levels.
-    pub(super) fn row(&self, y: usize) -> &[u16] {
+    pub(super) fn row(&self, y: usize) -> &[i16] {
         self.result.row(y)
+    }
+
+    /// The vectors of row `y` of the luminance, in levels.
+    pub(super) fn lanes(&self, y: usize) -> &[Lanes<i16>] {
+        self.result.lanes(y)
     }
 
     /// Makes the means around the row of cells `y`; needs the levels of the next.
     pub(super) fn make_means(&mut self, levels: &Ring<u16>, y: usize) {
-        for row in self.cell * y..self.cell * (y + 1) {
-            let near = |offset: isize| levels.padded(same_bands(row as isize + offset, self.height, self.cell));
-            let sums = &mut self.lines.levels;
+        let cell = self.cell;
+        let step = cell as isize;
+        let across = [-step, 0, step];
+        let sums = &mut self.lines.levels;
 
-            if self.cell == 4 {
-                mean_of_five([-2, -1, 0, 1, 2].map(near), sums);
-                let sums: &[u16] = sums;
-                let across = [0, 1, 2, 3, 4].map(|offset| &sums[MARGIN + offset - 2..][..self.width]);
-                mean_of_five(across, self.mean.row_mut(row));
+        if cell == 4 {
+            let first = 4 * y as isize - 2;
+            let near = |by: isize| levels.padded_lanes(same_bands(first + by, self.height, cell));
+            sum_rows([0, 1, 2, 3, 4, 5, 6, 7].map(near), sums.four_padded_mut(0));
+        }
+
+        for row in cell * y..cell * (y + 1) {
+            if cell == 4 {
+                mean_of_five([-2, -1, 0, 1, 2].map(|by| sums.shifted(row, by)), self.mean.lanes_mut(row));
             } else {
-                mean_of_three([-1, 0, 1].map(near), sums);
-                let sums: &[u16] = sums;
-                let across = [0, 1, 2].map(|offset| &sums[MARGIN + offset - 1..][..self.width]);
-                mean_of_three(across, self.mean.row_mut(row));
+                let near = |by: isize| levels.padded_lanes(same_bands(row as isize + by, self.height, cell));
+                smooth([-1, 0, 1].map(near), sums.padded_lanes_mut(row));
+                smooth([-1, 0, 1].map(|by| sums.shifted(row, by)), self.mean.lanes_mut(row));
             }
 
-            self.mean.fill_margins(row, self.cell);
+            self.mean.fill_margins(row, cell);
+            smooth(across.map(|by| levels.shifted(row, by)), self.smooth_levels.lanes_mut(row));
+            smooth(across.map(|by| self.mean.shifted(row, by)), self.smooth_means.lanes_mut(row));
         }
     }
 
     /// Makes the detail of the row of cells `y`; needs the means of the next.
     pub(super) fn make_detail(&mut self, levels: &Ring<u16>, y: usize) {
         let cell = self.cell;
+        let step = cell as isize;
 
         for row in cell * y..cell * (y + 1) {
-            let near = [-1, 0, 1].map(|cells| same_bands(row as isize + cells * cell as isize, self.height, cell));
-            smooth(near.map(|row| levels.padded(row)), &mut self.lines.levels);
-            smooth(near.map(|row| self.mean.padded(row)), &mut self.lines.means);
-
-            let places = [MARGIN - cell, MARGIN, MARGIN + cell];
-            let across = places.map(|place| &self.lines.levels[place..][..self.width]);
-            smooth(across, &mut self.lines.band);
-            let across = places.map(|place| &self.lines.means[place..][..self.width]);
-            smooth(across, &mut self.lines.all);
-            let smooth = (&self.lines.band[..], &self.lines.all[..]);
-            detail_row(levels.row(row), self.mean.row(row), smooth, self.detail.row_mut(row));
+            let near = [-step, 0, step].map(|by| same_bands(row as isize + by, self.height, cell));
+            let band = near.map(|row| self.smooth_levels.lanes(row));
+            let all = near.map(|row| self.smooth_means.lanes(row));
+            detail_row(levels.lanes(row), self.mean.lanes(row), band, all, self.detail.lanes_mut(row));
             self.detail.fill_margins(row, 1);
+            let across = [-1, 0, 1].map(|by| self.detail.shifted(row, by));
+            smooth_detail(across, self.smooth_detail.lanes_mut(row));
         }
     }
 
@@ -158,141 +164,168 @@ impl Luminance {
     /// the fine part; needs the detail of the next.
     pub(super) fn part(&mut self, y: usize) {
         let cell = self.cell;
-        self.lines.coarse.fill(0);
-        self.lines.fine.fill(0);
+        let Lines { coarse, fine, cells, .. } = &mut self.lines;
+        coarse.lanes_mut(0).fill([0; LANES]);
+        fine.lanes_mut(0).fill([0; LANES]);
 
         for row in cell * y..cell * (y + 1) {
             let near = [row.saturating_sub(1), row, (row + 1).min(self.height - 1)];
-            smooth_detail(near.map(|row| self.detail.padded(row)), &mut self.lines.details);
-
-            let places = [MARGIN - 1, MARGIN, MARGIN + 1];
-            let around = places.map(|place| &self.lines.details[place..][..self.width]);
-            let parts = (self.coarse.row_mut(row), self.fine.row_mut(row));
-            let sums = (&mut self.lines.coarse[..], &mut self.lines.fine[..]);
-            part_row(around, self.detail.row(row), self.mean.row(row), parts, sums);
+            let around = near.map(|row| self.smooth_detail.lanes(row));
+            let parts = (self.coarse.lanes_mut(row), self.fine.lanes_mut(row));
+            let sums = (coarse.lanes_mut(0), fine.lanes_mut(0));
+            part_row(around, self.detail.lanes(row), self.mean.lanes(row), parts, sums);
         }
 
-        let cells = self.width / cell;
-        trust_row(cell, self.doubt, &self.lines.coarse, &self.lines.fine, &mut self.lines.cells[1..=cells]);
-        expand(&mut self.lines.cells, cell, self.trust.row_mut(y));
+        let count = self.width / cell;
+        trust_row(cell, self.doubt, coarse.row(0), fine.row(0), &mut cells[1..=count]);
+        expand(cells, cell, self.trust.row_mut(y));
     }
 
     /// Makes the luminance of the row of cells `y`; needs the parts of the next.
     pub(super) fn join(&mut self, y: usize) {
         for row in 0..self.cell {
             let place = self.cell * y + row;
-            let (near, weights) = between(row, self.cell, y, self.height / self.cell);
-            let trust = [self.trust.row(y), self.trust.row(near)];
-            join_row(self.coarse.row(place), self.fine.row(place), trust, weights, self.result.row_mut(place));
+            let (near, eighths) = between(row, self.cell, y, self.height / self.cell);
+            let trust = [self.trust.lanes(y), self.trust.lanes(near)];
+            let parts = [self.coarse.lanes(place), self.fine.lanes(place)];
+            join_row(parts, trust, eighths, self.result.lanes_mut(place));
         }
     }
 }
 
-/// For row `row` of the row of cells `y`: the nearest other row of cells, and the weights (of
-/// 65536) of the own one and of that, by their centres' distances.
-pub(super) fn between(row: usize, cell: usize, y: usize, cells: usize) -> (usize, [u16; 2]) {
-    let near = if row < cell / 2 { y.saturating_sub(1) } else { (y + 1).min(cells - 1) };
-    // At least 1, so that the own weight fits 16 bits.
-    let distance = (2 * row + 1).abs_diff(cell);
-    let other = 65_536 * distance / (2 * cell);
-    (near, [(65_536 - other) as u16, other as u16])
-}
-
-/// A value between two, by weights of 65536.
-#[inline(always)]
-pub(super) fn mixed(values: [u16; 2], weights: [u16; 2]) -> u16 {
-    let own = (u32::from(values[0]) * u32::from(weights[0])) >> 16;
-    let other = (u32::from(values[1]) * u32::from(weights[1])) >> 16;
-    own as u16 + other as u16
-}
-
-/// A row between two.
+/// Enlarges a row of one value a cell to `per_cell` values a cell, 1, 2 or 4, linearly between the
+/// cells' centres. The first and last of `cells` are beside the row, and are set here.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn mixed_row([own, near]: [&[u16]; 2], weights: [u16; 2], out: &mut [u16]) {
-    for (out, (&own, &near)) in out.iter_mut().zip(own.iter().zip(near)) {
-        *out = mixed([own, near], weights);
-    }
-}
-
-/// Enlarges a row of one value a cell to `cell` values a cell, linearly between the cells' centres.
-/// The first and last of `cells` are beside the row, and are set here.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn expand(cells: &mut [u16], cell: usize, out: &mut [u16]) {
+pub(super) fn expand(cells: &mut [i16], per_cell: usize, out: &mut [i16]) {
     let count = cells.len() - 2;
     cells[0] = cells[1];
     cells[count + 1] = cells[count];
     let neighbours = cells[..count].iter().zip(&cells[1..=count]).zip(&cells[2..]);
 
-    if cell == 4 {
-        for (((&left, &here), &right), out) in neighbours.zip(out.as_chunks_mut::<4>().0) {
-            let (left, here, right) = (u32::from(left), u32::from(here), u32::from(right));
-            *out = [
-                ((3 * left + 5 * here + 4) >> 3) as u16,
-                ((left + 7 * here + 4) >> 3) as u16,
-                ((7 * here + right + 4) >> 3) as u16,
-                ((5 * here + 3 * right + 4) >> 3) as u16,
-            ];
+    match per_cell {
+        1 => out.copy_from_slice(&cells[1..=count]),
+        2 => {
+            for (((&left, &here), &right), out) in neighbours.zip(out.as_chunks_mut::<2>().0) {
+                *out = [mixed::<2>(here, left), mixed::<2>(here, right)];
+            }
         }
-    } else {
-        for (((&left, &here), &right), out) in neighbours.zip(out.as_chunks_mut::<2>().0) {
-            let (left, here, right) = (u32::from(left), u32::from(here), u32::from(right));
-            *out = [((left + 3 * here + 2) >> 2) as u16, ((3 * here + right + 2) >> 2) as u16];
+        _ => {
+            for (((&left, &here), &right), out) in neighbours.zip(out.as_chunks_mut::<4>().0) {
+                let before = [mixed::<3>(here, left), mixed::<1>(here, left)];
+                let after = [mixed::<1>(here, right), mixed::<3>(here, right)];
+                *out = [before[0], before[1], after[0], after[1]];
+            }
         }
     }
 }
 
 /// The mean of five neighbours that covers four samples: the outer two count half.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn mean_of_five(near: [&[u16]; 5], out: &mut [u16]) {
+fn mean_of_five(near: [&[Lanes<u16>]; 5], out: &mut [Lanes<u16>]) {
     let near = near.map(|values| &values[..out.len()]);
     for (x, out) in out.iter_mut().enumerate() {
-        let outer = (near[0][x] + near[4][x] + 1) >> 1;
-        *out = (outer + near[1][x] + near[2][x] + near[3][x] + 2) >> 2;
+        for lane in 0..LANES {
+            let inner = near[1][x][lane] + near[2][x][lane] + near[3][x][lane];
+            out[lane] = mean_of(near[0][x][lane], inner, near[4][x][lane]);
+        }
     }
 }
 
-/// The mean of three neighbours that covers two samples.
+/// The same down the columns, for four rows from the eight around them.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn mean_of_three(near: [&[u16]; 3], out: &mut [u16]) {
-    let near = near.map(|values| &values[..out.len()]);
-    for (x, out) in out.iter_mut().enumerate() {
-        *out = (near[0][x] + 2 * near[1][x] + near[2][x] + 2) >> 2;
+fn sum_rows(near: [&[Lanes<u16>]; 8], out: [&mut [Lanes<u16>]; 4]) {
+    let count = out[0].len();
+    let near = near.map(|values| &values[..count]);
+    let [first, second, third, fourth] = out.map(|values| &mut values[..count]);
+
+    for x in 0..count {
+        for lane in 0..LANES {
+            let inner = [
+                near[1][x][lane] + near[2][x][lane] + near[3][x][lane],
+                near[2][x][lane] + near[3][x][lane] + near[4][x][lane],
+                near[3][x][lane] + near[4][x][lane] + near[5][x][lane],
+                near[4][x][lane] + near[5][x][lane] + near[6][x][lane],
+            ];
+            first[x][lane] = mean_of(near[0][x][lane], inner[0], near[4][x][lane]);
+            second[x][lane] = mean_of(near[1][x][lane], inner[1], near[5][x][lane]);
+            third[x][lane] = mean_of(near[2][x][lane], inner[2], near[6][x][lane]);
+            fourth[x][lane] = mean_of(near[3][x][lane], inner[3], near[7][x][lane]);
+        }
     }
 }
 
-/// The mean of three values, the middle one of which counts twice.
+/// The mean of five values, given the sum of the inner three.
+#[inline(always)]
+fn mean_of(first: u16, inner: u16, last: u16) -> u16 {
+    (((first + last + 1) >> 1) + inner + 2) >> 2
+}
+
+/// The mean of three values, the middle one of which counts twice. Of neighbours it covers two
+/// values.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn smooth(near: [&[u16]; 3], out: &mut [u16]) {
+fn smooth(near: [&[Lanes<u16>]; 3], out: &mut [Lanes<u16>]) {
     let near = near.map(|values| &values[..out.len()]);
     for (x, out) in out.iter_mut().enumerate() {
-        *out = (near[0][x] + 2 * near[1][x] + near[2][x] + 2) >> 2;
+        for lane in 0..LANES {
+            out[lane] = (near[0][x][lane] + 2 * near[1][x][lane] + near[2][x][lane] + 2) >> 2;
+        }
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn smooth_detail(near: [&[i16]; 3], out: &mut [i16]) {
+fn smooth_detail(near: [&[Lanes<i16>]; 3], out: &mut [Lanes<i16>]) {
     let near = near.map(|values| &values[..out.len()]);
     for (x, out) in out.iter_mut().enumerate() {
-        *out = (near[0][x] + 2 * near[1][x] + near[2][x] + 2) >> 2;
+        for lane in 0..LANES {
+            out[lane] = smooth_of([near[0][x][lane], near[1][x][lane], near[2][x][lane]]);
+        }
     }
 }
 
-/// The detail of a row: how far the mean of all bands at each value lies from that around it, from
-/// the smooth levels of the value's band and of all bands.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn detail_row(levels: &[u16], around: &[u16], (band, all): (&[u16], &[u16]), detail: &mut [i16]) {
-    let values = levels.iter().zip(around).zip(band.iter().zip(all));
-    for (detail, ((&level, &around), (&band_mean, &mean))) in detail.iter_mut().zip(values) {
-        let deviation = f32::from(level as i16 - band_mean as i16);
-        let of_band = f32::from(band_mean as i16 - BLACK as i16);
-        let of_all = f32::from(mean as i16 - BLACK as i16);
-        let divisor = (of_band + SHARE_OF_MEAN * of_all).max(LEAST);
-        let here = (1.0 + SHARE_OF_MEAN) * of_all * deviation / divisor;
-        let found = here + f32::from(mean as i16 - around as i16);
+#[inline(always)]
+fn smooth_of([left, here, right]: [i16; 3]) -> i16 {
+    (left + 2 * here + right + 2) >> 2
+}
 
-        let least = if level >= SATURATED { 0.0 } else { -MOST_DETAIL };
-        *detail = rounded(found.clamp(-MOST_DETAIL, MOST_DETAIL).max(least));
+/// The detail of a row: how far the mean of all bands at each value lies from that around it. `band`
+/// and `all` are the levels of the value's band and the means of all bands, smoothed across, in the
+/// row of cells above, here and below.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn detail_row(
+    levels: &[Lanes<u16>],
+    around: &[Lanes<u16>],
+    band: [&[Lanes<u16>]; 3],
+    all: [&[Lanes<u16>]; 3],
+    detail: &mut [Lanes<i16>],
+) {
+    let count = detail.len();
+    let (levels, around) = (&levels[..count], &around[..count]);
+    let band = band.map(|row| &row[..count]);
+    let all = all.map(|row| &row[..count]);
+
+    for (x, detail) in detail.iter_mut().enumerate() {
+        for lane in 0..LANES {
+            let level = levels[x][lane];
+            let of_band = smooth_level([band[0][x][lane], band[1][x][lane], band[2][x][lane]]);
+            let of_all = smooth_level([all[0][x][lane], all[1][x][lane], all[2][x][lane]]);
+
+            let deviation = f32::from(level as i16 - of_band);
+            let light_of_band = f32::from(of_band - BLACK as i16);
+            let light = f32::from(of_all - BLACK as i16);
+            let divisor = (light_of_band + SHARE_OF_MEAN * light).max(LEAST);
+            let here = (1.0 + SHARE_OF_MEAN) * light * deviation / divisor;
+            let found = here + f32::from(of_all - around[x][lane] as i16);
+
+            let least = if level >= SATURATED { 0.0 } else { -MOST_DETAIL };
+            detail[lane] = rounded(found.clamp(-MOST_DETAIL, MOST_DETAIL).max(least));
+        }
     }
+}
+
+/// The mean of three levels, the middle one of which counts twice.
+#[inline(always)]
+fn smooth_level([above, here, below]: [u16; 3]) -> i16 {
+    ((above + 2 * here + below + 2) >> 2) as i16
 }
 
 /// The nearest whole number to one within 16 bits, without the cost of a cast, which must handle
@@ -304,15 +337,15 @@ fn rounded(value: f32) -> i16 {
 }
 
 /// Parts a row's detail into a smooth part, added to the mean, and the rest, and adds the absolute
-/// values of both to `sums`. `around` are sums down the columns, to the left, here and to the
-/// right.
+/// values of both to `sums`. `around` is the detail smoothed across, in the rows above, here and
+/// below.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn part_row(
-    around: [&[i16]; 3],
-    detail: &[i16],
-    mean: &[u16],
-    (coarse, fine): (&mut [i16], &mut [i16]),
-    (coarse_sum, fine_sum): (&mut [u16], &mut [u16]),
+    around: [&[Lanes<i16>]; 3],
+    detail: &[Lanes<i16>],
+    mean: &[Lanes<u16>],
+    (coarse, fine): (&mut [Lanes<i16>], &mut [Lanes<i16>]),
+    (coarse_sum, fine_sum): (&mut [Lanes<u16>], &mut [Lanes<u16>]),
 ) {
     let count = coarse.len();
     let around = around.map(|values| &values[..count]);
@@ -320,19 +353,21 @@ fn part_row(
     let (coarse_sum, fine_sum) = (&mut coarse_sum[..count], &mut fine_sum[..count]);
 
     for x in 0..count {
-        let smooth = (around[0][x] + 2 * around[1][x] + around[2][x] + 2) >> 2;
-        let rest = detail[x] - smooth;
-        coarse[x] = mean[x] as i16 + smooth;
-        fine[x] = rest;
-        coarse_sum[x] += smooth.unsigned_abs();
-        fine_sum[x] += rest.unsigned_abs();
+        for lane in 0..LANES {
+            let smooth = smooth_of([around[0][x][lane], around[1][x][lane], around[2][x][lane]]);
+            let rest = detail[x][lane] - smooth;
+            coarse[x][lane] = mean[x][lane] as i16 + smooth;
+            fine[x][lane] = rest;
+            coarse_sum[x][lane] += smooth.unsigned_abs();
+            fine_sum[x][lane] += rest.unsigned_abs();
+        }
     }
 }
 
 /// How far fine detail is trusted in each cell, of 32767: the energy of the coarse detail beside
 /// that of both.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn trust_row(cell: usize, doubt: f32, coarse: &[u16], fine: &[u16], trust: &mut [u16]) {
+fn trust_row(cell: usize, doubt: f32, coarse: &[u16], fine: &[u16], trust: &mut [i16]) {
     let least = (NOISE * (cell * cell) as f32).powi(2);
     if cell == 4 {
         trust_cells(doubt, least, coarse.as_chunks::<4>().0, fine.as_chunks::<4>().0, trust);
@@ -347,7 +382,7 @@ fn trust_cells<const CELL: usize>(
     least: f32,
     coarse: &[[u16; CELL]],
     fine: &[[u16; CELL]],
-    trust: &mut [u16],
+    trust: &mut [i16],
 ) {
     for ((trust, coarse), fine) in trust.iter_mut().zip(coarse).zip(fine) {
         let mut sums = [0.0, 0.0];
@@ -358,19 +393,34 @@ fn trust_cells<const CELL: usize>(
 
         let coarse = sums[0] * sums[0];
         let share = coarse / (coarse + doubt * sums[1] * sums[1] + least);
-        *trust = (32_767.0 * share + LOW_BITS).to_bits() as u16;
+        *trust = (32_767.0 * share + LOW_BITS).to_bits() as i16;
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn join_row(coarse: &[i16], fine: &[i16], trust: [&[u16]; 2], weights: [u16; 2], out: &mut [u16]) {
+fn join_row(parts: [&[Lanes<i16>]; 2], trust: [&[Lanes<i16>]; 2], eighths: u8, out: &mut [Lanes<i16>]) {
+    match eighths {
+        1 => join_lanes::<1>(parts, trust, out),
+        2 => join_lanes::<2>(parts, trust, out),
+        _ => join_lanes::<3>(parts, trust, out),
+    }
+}
+
+#[inline(always)]
+fn join_lanes<const EIGHTHS: u8>(
+    [coarse, fine]: [&[Lanes<i16>]; 2],
+    trust: [&[Lanes<i16>]; 2],
+    out: &mut [Lanes<i16>],
+) {
     let count = out.len();
     let (coarse, fine) = (&coarse[..count], &fine[..count]);
     let trust = trust.map(|values| &values[..count]);
 
     for (x, out) in out.iter_mut().enumerate() {
-        let trust = mixed([trust[0][x], trust[1][x]], weights) as i16;
-        let kept = ((i32::from(2 * fine[x]) * i32::from(trust)) >> 16) as i16;
-        *out = coarse[x].saturating_add(kept).clamp(0, HIGHEST as i16) as u16;
+        for lane in 0..LANES {
+            let trust = mixed::<EIGHTHS>(trust[0][x][lane], trust[1][x][lane]);
+            let kept = upper_half(2 * fine[x][lane], trust);
+            out[lane] = coarse[x][lane].saturating_add(kept).clamp(0, HIGHEST as i16);
+        }
     }
 }

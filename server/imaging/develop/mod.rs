@@ -1,10 +1,12 @@
 //! Development: a mosaic's picture at any [`Size`].
 //!
 //! At the size of the cells, [`Reconstructor`] makes it. At the larger ones luminance comes from
-//! every sample, colour from the cells. Everything is made in one pass from top to bottom, a row of
-//! cells at a time, and keeps only the rows that the next ones need.
+//! every sample, colour from the cells, and the picture is made as JPEG stores it, so that neither
+//! red, green and blue of each pixel are made nor turned back. Everything is made in one pass from
+//! top to bottom, a row of cells at a time, and keeps only the rows that the next ones need.
 
 mod colour;
+mod lanes;
 mod levels;
 mod luminance;
 mod ring;
@@ -13,6 +15,7 @@ use super::calibration::Calibration;
 use super::frame::{CELL, GrayImage, MosaicFrame, RgbImage};
 use super::reconstruct::Reconstructor;
 use super::size::Size;
+use super::ycc::{YccImage, row_in_rgb};
 use colour::Colour;
 use levels::Levels;
 use luminance::Luminance;
@@ -20,8 +23,9 @@ use ring::Ring;
 
 /// Rows of cells of which levels are kept: those that one step reads, and the one that it makes.
 const KEPT: usize = 6;
-/// Rows of cells that must be begun before one is finished.
-const AHEAD: usize = 5;
+/// Rows of cells that must be begun before the luminance of one is finished, and its pixels.
+const AHEAD_OF_LUMINANCE: usize = 4;
+const AHEAD_OF_PIXELS: usize = 5;
 
 /// Develops mosaics by one calibration. Keep one and reuse it: its buffers stay from frame to
 /// frame.
@@ -37,6 +41,30 @@ pub struct Developer {
     means: Ring<u16>,
     luminance: Luminance,
     colour: Colour,
+    line: RowsOfBytes,
+}
+
+/// A developed picture as it is best encoded as JPEG: the form in which it was made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Developed {
+    /// Of [`Size::Cell`].
+    Rgb(RgbImage),
+    /// Of the larger sizes.
+    Ycc(YccImage),
+}
+
+impl Default for Developed {
+    fn default() -> Self {
+        Self::Rgb(RgbImage::default())
+    }
+}
+
+/// Rows of luma, and of both chromas where a row has its own, on their way to RGB.
+#[derive(Debug, Clone, Default)]
+struct RowsOfBytes {
+    luma: Vec<u8>,
+    blue: Vec<u8>,
+    red: Vec<u8>,
 }
 
 impl Developer {
@@ -52,6 +80,7 @@ impl Developer {
             means: Ring::default(),
             luminance: Luminance::default(),
             colour: Colour::new(calibration),
+            line: RowsOfBytes::default(),
         }
     }
 
@@ -72,33 +101,99 @@ impl Developer {
             return self.reconstructor.reconstruct(mosaic, rgb, gray);
         }
 
-        (rgb.width, rgb.height) = size.of(mosaic);
-        rgb.data.resize(3 * rgb.width * rgb.height, 0);
+        let (width, height) = size.of(mosaic);
+        rgb.width = width;
+        rgb.height = height;
+        rgb.data.resize(3 * width * height, 0);
 
-        let length = 3 * rgb.width * size.per_cell();
-        let mut rows = self.rows(mosaic, size, gray);
-        for pixels in rgb.data.chunks_exact_mut(length) {
-            rows.next_into(pixels);
+        let mut line = std::mem::take(&mut self.line);
+        for bytes in [&mut line.luma, &mut line.blue, &mut line.red] {
+            bytes.resize(width, 0);
+        }
+
+        let mut rows = self.begin(mosaic, size, 1, gray);
+        for pixels in rgb.data.chunks_exact_mut((3 * width).max(1)) {
+            rows.next_into(&mut line.luma, Some([&mut line.blue, &mut line.red]));
+            row_in_rgb(&line.luma, [&line.blue, &line.red], pixels);
+        }
+        self.line = line;
+    }
+
+    /// Makes the same pictures, but that of a larger size as JPEG stores it: with a chroma value for
+    /// two by two pixels. It costs half as much as one in RGB.
+    pub fn develop_for_jpeg(
+        &mut self,
+        mosaic: &MosaicFrame,
+        size: Size,
+        picture: &mut Developed,
+        gray: &mut GrayImage,
+    ) {
+        *picture = match (std::mem::take(picture), size) {
+            (Developed::Rgb(rgb), Size::Cell) => Developed::Rgb(self.make_rgb(mosaic, rgb, gray)),
+            (Developed::Ycc(_), Size::Cell) => Developed::Rgb(self.make_rgb(mosaic, RgbImage::default(), gray)),
+            (Developed::Ycc(ycc), _) => Developed::Ycc(self.make_ycc(mosaic, size, ycc, gray)),
+            (Developed::Rgb(_), _) => Developed::Ycc(self.make_ycc(mosaic, size, YccImage::default(), gray)),
+        };
+    }
+
+    /// Makes the gray picture of `mosaic` (0..=255) at `size`: luminance, the mean of all bands.
+    pub fn luminance(&mut self, mosaic: &MosaicFrame, size: Size, luminance: &mut GrayImage) {
+        if size == Size::Cell {
+            self.reconstructor.reconstruct(mosaic, &mut RgbImage::default(), luminance);
+            return;
+        }
+
+        let (width, height) = size.of(mosaic);
+        luminance.width = width;
+        luminance.height = height;
+        luminance.data.resize(width * height, 0.0);
+
+        self.resize(mosaic, size, 1);
+        let mut cells = cell_gray(mosaic, GrayImage::default());
+        let per_cell = size.per_cell();
+
+        for y in 0..mosaic.band_height() + AHEAD_OF_LUMINANCE {
+            self.step(mosaic, per_cell, y, &mut cells);
+            let Some(done) = y.checked_sub(AHEAD_OF_LUMINANCE) else { continue };
+            for row in per_cell * done..per_cell * (done + 1) {
+                let values = &mut luminance.data[row * width..][..width];
+                for (value, &level) in values.iter_mut().zip(self.luminance.row(row)) {
+                    *value = levels::gray(level);
+                }
+            }
         }
     }
 
-    /// Makes the same pictures row by row; see [`Rows`]. `gray` is complete when the last row is
-    /// made.
-    pub fn rows<'a>(&'a mut self, mosaic: &'a MosaicFrame, size: Size, gray: &'a mut GrayImage) -> Rows<'a> {
-        let cells = mosaic.band_width();
-        gray.width = cells;
-        gray.height = mosaic.band_height();
-        gray.data.resize(gray.width * gray.height, 0.0);
+    fn make_rgb(&mut self, mosaic: &MosaicFrame, mut rgb: RgbImage, gray: &mut GrayImage) -> RgbImage {
+        self.reconstructor.reconstruct(mosaic, &mut rgb, gray);
+        rgb
+    }
 
-        let per_cell = size.per_cell();
-        if size != Size::Cell {
-            self.resize(mosaic, size);
+    fn make_ycc(&mut self, mosaic: &MosaicFrame, size: Size, mut ycc: YccImage, gray: &mut GrayImage) -> YccImage {
+        let (width, height) = size.of(mosaic);
+        ycc.resize(width, height);
+        let [luma, blue, red] = ycc.split_mut();
+        let of_chroma = (width / 2).max(1);
+        let mut chroma_rows = blue.chunks_exact_mut(of_chroma).zip(red.chunks_exact_mut(of_chroma));
+
+        let mut rows = self.begin(mosaic, size, 2, gray);
+        for (y, luma) in luma.chunks_exact_mut(width.max(1)).enumerate() {
+            // Chroma of two rows is made with the second one.
+            let chroma = if y % 2 == 1 { chroma_rows.next() } else { None };
+            rows.next_into(luma, chroma.map(|(blue, red)| [blue, red]));
         }
-        Rows { developer: self, mosaic, per_cell, gray, begun: 0, done: 0 }
+        ycc
+    }
+
+    /// Begins a picture with a chroma value for every `step` pixels along either side.
+    fn begin<'a>(&'a mut self, mosaic: &'a MosaicFrame, size: Size, step: usize, gray: &'a mut GrayImage) -> Rows<'a> {
+        *gray = cell_gray(mosaic, std::mem::take(gray));
+        self.resize(mosaic, size, step);
+        Rows { developer: self, mosaic, per_cell: size.per_cell(), gray, begun: 0, done: 0 }
     }
 
     /// Makes room for `mosaic` at one of the larger sizes.
-    fn resize(&mut self, mosaic: &MosaicFrame, size: Size) {
+    fn resize(&mut self, mosaic: &MosaicFrame, size: Size, step: usize) {
         let cells = mosaic.band_width();
         let (width, height) = size.of(mosaic);
         self.levels.resize(mosaic.width());
@@ -106,10 +201,11 @@ impl Developer {
         self.blocks.resize(mosaic.width() / 2, KEPT * CELL / 2);
         self.means.resize(cells, KEPT);
         self.luminance.resize(size.per_cell(), width, height);
-        self.colour.resize(cells, size.per_cell());
+        self.colour.resize(cells, size.per_cell(), step);
     }
 
-    /// Begins the row of cells `y`, and moves those above it on, each as far as that allows.
+    /// Begins the row of cells `y`, and brings the luminance of those above it as far as that allows:
+    /// that of the row [`AHEAD_OF_LUMINANCE`] above it is finished.
     fn step(&mut self, mosaic: &MosaicFrame, per_cell: usize, y: usize, gray: &mut GrayImage) {
         let rows = mosaic.band_height();
         let above = |by: usize| y.checked_sub(by).filter(|&row| row < rows);
@@ -132,76 +228,60 @@ impl Developer {
         if let Some(row) = above(3) {
             self.luminance.part(row);
         }
-        if let Some(row) = above(4) {
+        if let Some(row) = above(AHEAD_OF_LUMINANCE) {
             self.luminance.join(row);
-            let means = self.means.row(row);
-            let encoder = self.reconstructor.encoder();
-            self.colour.make_cells(row, per_cell, &self.samples, means, &self.luminance, encoder);
         }
+    }
+
+    /// Makes the colours of the row of cells that [`Self::step`] at `y` has finished.
+    fn colour_cells(&mut self, mosaic: &MosaicFrame, per_cell: usize, y: usize) {
+        let finished = y.checked_sub(AHEAD_OF_LUMINANCE).filter(|&row| row < mosaic.band_height());
+        let Some(row) = finished else { return };
+
+        let means = self.means.row(row);
+        let encoder = self.reconstructor.encoder();
+        self.colour.make_cells(row, per_cell, &self.samples, means, &self.luminance, encoder);
     }
 }
 
-/// A picture in the making, from top to bottom.
-///
-/// Each call of [`Rows::next_into`] makes the pixels of one row of cells.
-#[derive(Debug)]
-pub struct Rows<'a> {
+/// A picture of a larger size in the making, from top to bottom.
+struct Rows<'a> {
     developer: &'a mut Developer,
     mosaic: &'a MosaicFrame,
     per_cell: usize,
     gray: &'a mut GrayImage,
     /// Rows of cells begun.
     begun: usize,
-    /// Rows of cells made.
+    /// Rows of pixels made.
     done: usize,
 }
 
 impl Rows<'_> {
-    /// Makes the pixels of the next row of cells into `rgb`: as many rows of the picture as a cell
-    /// has at this size, one after another. Returns whether there was such a row of cells.
-    /// Allocates nothing.
-    pub fn next_into(&mut self, rgb: &mut [u8]) -> bool {
-        let y = self.done;
-        let cells = self.mosaic.band_height();
-        if y >= cells {
-            return false;
-        }
-
+    /// Makes luma of the next row, and chroma of all rows since it was last made.
+    fn next_into(&mut self, luma: &mut [u8], chroma: Option<[&mut [u8]; 2]>) {
+        let y = self.done / self.per_cell;
+        let row = self.done % self.per_cell;
         self.done += 1;
-        if self.per_cell == 1 {
-            let cells = self.mosaic.band_width();
-            let gray = &mut self.gray.data[y * cells..][..cells];
-            self.developer.reconstructor.reconstruct_rows(self.mosaic, y, rgb, gray);
-            return true;
-        }
 
-        while self.begun <= y + AHEAD {
+        while self.begun <= y + AHEAD_OF_PIXELS {
             self.developer.step(self.mosaic, self.per_cell, self.begun, self.gray);
+            self.developer.colour_cells(self.mosaic, self.per_cell, self.begun);
             self.begun += 1;
         }
 
-        let width = self.per_cell * self.mosaic.band_width();
-        for (row, pixels) in rgb.chunks_exact_mut(3 * width).take(self.per_cell).enumerate() {
-            let luminance = self.developer.luminance.row(self.per_cell * y + row);
-            self.developer.colour.row((y, cells), row, self.per_cell, luminance, pixels);
-        }
-
-        true
-    }
-    /// The gray levels (0..=255) of row `row` of the pixels just made: luminance, the mean of all
-    /// bands, at the picture's own size.
-    pub fn gray_into(&self, row: usize, gray: &mut [f32]) {
-        let Some(y) = self.done.checked_sub(1) else { return };
-
-        if self.per_cell == 1 {
-            let width = self.gray.width;
-            gray.copy_from_slice(&self.gray.data[y * width..][..width]);
-            return;
-        }
-
-        let levels = self.developer.luminance.row(self.per_cell * y + row);
-        for (gray, &level) in gray.iter_mut().zip(levels) {
-            *gray = levels::gray(level);
+        let Developer { colour, luminance, .. } = &mut *self.developer;
+        let place = (y, self.mosaic.band_height());
+        colour.make_luma(place, row, self.per_cell, luminance, luma);
+        if let Some(chroma) = chroma {
+            colour.make_chroma(place, row, self.per_cell, luminance, chroma);
         }
     }
+}
+
+/// Room in `gray` for a value of each cell.
+fn cell_gray(mosaic: &MosaicFrame, mut gray: GrayImage) -> GrayImage {
+    gray.width = mosaic.band_width();
+    gray.height = mosaic.band_height();
+    gray.data.resize(gray.width * gray.height, 0.0);
+    gray
 }

@@ -1,9 +1,14 @@
 //! The latest rows of a picture, each with a margin on either side.
 
+use super::lanes::{LANES, Lanes};
+
 /// Values beside a row, on either side, that filters may read.
-pub(super) const MARGIN: usize = 16;
+pub(super) const MARGIN: usize = LANES / 2;
 
 /// The latest rows of a picture that is made from top to bottom.
+///
+/// Rows are made and read in whole vectors, so some values beyond a row's end are made too. Nothing
+/// depends on them: filters read the margins, which are filled afterwards.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ring<T> {
     values: Vec<T>,
@@ -16,7 +21,17 @@ impl<T: Copy + Default> Ring<T> {
     pub(super) fn resize(&mut self, width: usize, rows: usize) {
         self.width = width;
         self.rows = rows;
-        self.values.resize((width + 2 * MARGIN) * rows, T::default());
+        self.values.resize(self.stride() * rows, T::default());
+    }
+
+    /// Values from one row to the next: whole vectors, and half a vector on either side.
+    const fn stride(&self) -> usize {
+        self.whole() + 2 * MARGIN
+    }
+
+    /// Values of the whole vectors that hold a row.
+    const fn whole(&self) -> usize {
+        self.width.next_multiple_of(LANES)
     }
 
     /// Row `y` of the picture, without its margins.
@@ -30,27 +45,74 @@ impl<T: Copy + Default> Ring<T> {
         &mut self.padded_mut(y)[MARGIN..][..width]
     }
 
-    /// Row `y` with its margins.
-    pub(super) fn padded(&self, y: usize) -> &[T] {
-        let length = self.width + 2 * MARGIN;
-        &self.values[y % self.rows * length..][..length]
+    /// The vectors of row `y`.
+    pub(super) fn lanes(&self, y: usize) -> &[Lanes<T>] {
+        self.shifted(y, 0)
+    }
+
+    /// The vectors of row `y`.
+    pub(super) fn lanes_mut(&mut self, y: usize) -> &mut [Lanes<T>] {
+        let whole = self.whole();
+        self.padded_mut(y)[MARGIN..][..whole].as_chunks_mut().0
+    }
+
+    /// The vectors of row `y`, begun `by` values further right, at most [`MARGIN`] to either side.
+    pub(super) fn shifted(&self, y: usize, by: isize) -> &[Lanes<T>] {
+        self.padded(y)[MARGIN.saturating_add_signed(by)..][..self.whole()].as_chunks().0
+    }
+
+    /// The vectors of row `y` with its margins.
+    pub(super) fn padded_lanes(&self, y: usize) -> &[Lanes<T>] {
+        self.padded(y).as_chunks().0
+    }
+
+    /// The vectors of row `y` with its margins.
+    pub(super) fn padded_lanes_mut(&mut self, y: usize) -> &mut [Lanes<T>] {
+        self.padded_mut(y).as_chunks_mut().0
+    }
+
+    /// The vectors of the four rows from `y` on. Both `y` and the ring's number of rows are
+    /// multiples of four.
+    pub(super) fn four_mut(&mut self, y: usize) -> [&mut [Lanes<T>]; 4] {
+        let whole = self.whole();
+        self.four_rows_mut(y).map(|row| row[MARGIN..][..whole].as_chunks_mut().0)
+    }
+
+    /// The same with their margins.
+    pub(super) fn four_padded_mut(&mut self, y: usize) -> [&mut [Lanes<T>]; 4] {
+        self.four_rows_mut(y).map(|row| row.as_chunks_mut().0)
+    }
+
+    fn four_rows_mut(&mut self, y: usize) -> [&mut [T]; 4] {
+        let stride = self.stride();
+        let rows = &mut self.values[y % self.rows * stride..][..4 * stride];
+
+        let (upper, lower) = rows.split_at_mut(2 * stride);
+        let (first, second) = upper.split_at_mut(stride);
+        let (third, fourth) = lower.split_at_mut(stride);
+        [first, second, third, fourth]
+    }
+
+    fn padded(&self, y: usize) -> &[T] {
+        let stride = self.stride();
+        &self.values[y % self.rows * stride..][..stride]
     }
 
     fn padded_mut(&mut self, y: usize) -> &mut [T] {
-        let length = self.width + 2 * MARGIN;
-        &mut self.values[y % self.rows * length..][..length]
+        let stride = self.stride();
+        &mut self.values[y % self.rows * stride..][..stride]
     }
 
     /// Fills the margins of row `y` with the row's first and last `period` values, over and over.
     ///
-    /// With the side of a mosaic cell as its period, a place in the margin gets a value of the band
+    /// `period` divides [`MARGIN`]. With the side of a mosaic cell as its period, a place in the margin gets a value of the band
     /// that would be there.
     pub(super) fn fill_margins(&mut self, y: usize, period: usize) {
-        let width = self.width;
+        let end = MARGIN + self.width;
         let row = self.padded_mut(y);
-        for place in 0..MARGIN {
-            row[place] = row[MARGIN + place % period];
-            row[MARGIN + width + place] = row[MARGIN + width - period + place % period];
+        for place in (0..MARGIN).step_by(period) {
+            row.copy_within(MARGIN..MARGIN + period, place);
+            row.copy_within(end - period..end, end + place);
         }
     }
 }
