@@ -15,7 +15,7 @@ use crate::camera::recorded::ScanFolder;
 use crate::evaluation::evaluate;
 use crate::evaluation::report::Subject;
 use crate::evaluation::shard::{MergeError, Part, PartOf, Shard, merge};
-use crate::evaluation::stacks::{FIRST_SEED, SEEDS, evaluate_stacks};
+use crate::evaluation::stacks::{FIRST_SEED, SEEDS, Told, evaluate_stacks};
 use crate::files::replace;
 use crate::notices::tell;
 use crate::scans::ScanSet;
@@ -252,10 +252,14 @@ fn stacks(arguments: &Arguments) -> Result<(), Failure> {
     let sources: Vec<StackSource> = arguments.stacks.iter().map(|text| StackSource::parse(text)).collect();
 
     let seed = arguments.seed.unwrap_or(FIRST_SEED);
-    let measured = matches!(arguments.blur, Some(Blur::Measured));
+    let told = match arguments.blur {
+        None => Told::Nothing,
+        Some(Blur::Rate(rate)) => Told::Rate(rate),
+        Some(Blur::Measured) => Told::Measured,
+    };
 
     let bar = progress(policies.len() * sources.len() * 2 * SEEDS);
-    let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, (seed, measured), &|name| {
+    let (report, outcomes) = evaluate_stacks(&registry, &policies, &sources, seed, told, &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;

@@ -32,17 +32,34 @@ struct Item {
     scale: &'static str,
     planes: usize,
     scans: StackScans,
+    /// What the policies are told of how fast the optic blurs.
     blur: Option<BlurRate>,
 }
 
+/// What the policies are told of how fast the optic blurs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Told {
+    /// Nothing.
+    Nothing,
+    /// This rate, whatever the stack.
+    Rate(BlurRate),
+    /// The rate that is measured on each stack.
+    Measured,
+}
+
 /// Lays three courses over `source` at each scale.
-fn items(source: &StackSource, first_seed: u64) -> Result<Vec<Item>, UnfitStack> {
+fn items(source: &StackSource, first_seed: u64, told: Told) -> Result<Vec<Item>, UnfitStack> {
     let item = |scaled: ScaledStack| {
         let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
         let courses: Option<Vec<_>> = (0..SEEDS).map(|index| course(first_seed.wrapping_add(index as u64))).collect();
         let too_small = || UnfitStack::TooSmall { folder: source.folder.clone(), planes: scaled.planes };
         let scans = StackScans(courses.ok_or_else(too_small)?);
-        Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans, blur: scaled.blur })
+        let blur = match told {
+            Told::Nothing => None,
+            Told::Rate(rate) => Some(rate),
+            Told::Measured => scaled.blur_rate(),
+        };
+        Ok(Item { stack: source.name(), scale: scaled.scale, planes: scaled.planes, scans, blur })
     };
 
     let (scaled, doubts) = source.at_scales()?;
@@ -98,8 +115,8 @@ pub struct StackReport {
     pub standings: Vec<Standing>,
 }
 
-/// Evaluates `policies` on the stacks of `sources`, the oracle and the baseline beside them. The
-/// policies are told how fast each stack's optic blurs where `measured` says so.
+/// Evaluates `policies` on the stacks of `sources`, the oracle and the baseline beside them; `seed` is
+/// the first of the courses' seeds.
 ///
 /// # Errors
 /// When a stack cannot be read or scanned, or a policy cannot run.
@@ -107,7 +124,8 @@ pub fn evaluate_stacks(
     registry: &Registry,
     policies: &[PolicyName],
     sources: &[StackSource],
-    (seed, measured): (u64, bool),
+    seed: u64,
+    told: Told,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(StackReport, Vec<Vec<Outcome>>), StackReportError> {
     let mut policies = policies.to_vec();
@@ -116,17 +134,16 @@ pub fn evaluate_stacks(
         policies.insert(0, baseline);
     }
 
-    let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed)).collect::<Result<_, _>>()?;
+    let items: Vec<Vec<Item>> = sources.par_iter().map(|source| items(source, seed, told)).collect::<Result<_, _>>()?;
     let mut stacks = Vec::new();
     let mut all = Vec::new();
 
     for item in items.into_iter().flatten() {
-        let told = if measured { item.blur } else { None };
-        let registry = if told.is_some() { registry.clone().knowing(told) } else { registry.clone() };
+        let registry = if item.blur.is_some() { registry.clone().knowing(item.blur) } else { registry.clone() };
         let outcomes = evaluate(&registry, &policies, &item.scans, progress)?;
 
         let rows = outcomes.iter().map(Outcome::row).collect();
-        let blur = told.map(BlurRate::get);
+        let blur = item.blur.map(BlurRate::get);
         stacks.push(StackResult { stack: item.stack, scale: item.scale, planes: item.planes, blur, rows });
         all.push(outcomes);
     }

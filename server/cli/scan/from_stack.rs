@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use sha2::{Digest, Sha256};
 
-use super::info;
+use super::{info, poses};
 use crate::camera::recorded::{LEAST_SIDE, MOST_POSES};
 use crate::cli::output::{Failure, bar, print};
 use crate::notices::tell;
@@ -81,9 +81,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = arguments.out.display();
     print(&format!(
         "{taken} pictures of {width}x{height} pixels\n\
-         {}{} poses of {} planes in {out}; check them with `parfocal scan info {out}`\n",
+         {}{} of {} planes in {out}; check them with `parfocal scan info {out}`\n",
         info::optics(&Optics::of(&stack), "position"),
-        cut.poses,
+        poses(cut.poses),
         cut.planes,
     ))
 }

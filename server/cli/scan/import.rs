@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::poses;
 use crate::cli::output::{Failure, bar, print};
 use crate::scans::recording::{Imported, import};
 
@@ -30,5 +31,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     import(&imported, &camera, &arguments.out, &|| progress.inc(1))?;
     progress.finish_and_clear();
     let out = arguments.out.display();
-    print(&format!("{} poses in {out}; check them with `parfocal scan info {out}`\n", imported.len()))
+    print(&format!("{} in {out}; check them with `parfocal scan info {out}`\n", poses(imported.len())))
 }

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
+use super::poses;
 use crate::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
 use crate::camera::{self, CameraSettings, calibration};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
@@ -78,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = arguments.out.display();
 
     match outcome {
-        Ok(()) => print(&format!("{done} poses in {out}; check them with `parfocal scan info {out}`\n")),
+        Ok(()) => print(&format!("{} in {out}; check them with `parfocal scan info {out}`\n", poses(done))),
         // The stepper's command is interrupted by the same key.
         Err(RecordError::Stopped | RecordError::Stepper(_)) if interrupt.asked() => print(&format!(
             "stopped: {done} of {} poses are saved in {out}; run the same command again to continue\n",

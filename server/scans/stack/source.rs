@@ -59,8 +59,17 @@ pub struct ScaledStack {
     pub planes: usize,
     /// The pictures; their positions count the planes from 0.
     pub pictures: Arc<PlaneStack>,
-    /// How fast the optic blurs over that range, where the pictures show it.
-    pub blur: Option<BlurRate>,
+    /// The same pictures.
+    stack: FocalStack,
+}
+
+impl ScaledStack {
+    /// How fast the optic blurs over the range, where the pictures show it. Measuring takes seconds.
+    #[must_use]
+    pub fn blur_rate(&self) -> Option<BlurRate> {
+        let rate = Optics::of_focus(&self.stack).blur_per_unit?;
+        BlurRate::new(rate * (self.planes - 1) as f64)
+    }
 }
 
 impl StackSource {
@@ -100,9 +109,8 @@ impl StackSource {
             let pictures = Arc::new(PlaneStack::new(&numbered).map_err(unfit)?);
 
             let plane = |(at, picture): (f32, GrayImage)| Plane { name: at.to_string(), position: at.into(), picture };
-            let optics = Optics::of_focus(&FocalStack::new(numbered.into_iter().map(plane).collect())?);
-            let blur = optics.blur_per_unit.and_then(|rate| BlurRate::new(rate * (planes - 1) as f64));
-            Ok(ScaledStack { scale, planes, pictures, blur })
+            let stack = FocalStack::new(numbered.into_iter().map(plane).collect())?;
+            Ok(ScaledStack { scale, planes, pictures, stack })
         };
         let scaled = SCALES.into_iter().map(scaled).collect::<Result<_, UnfitStack>>()?;
         let named = |doubt: String| format!("{}: {doubt}", self.folder.display());
