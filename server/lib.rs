@@ -33,6 +33,7 @@ pub mod store;
 
 pub mod conductor;
 
+pub mod playback;
 pub mod recorder;
 
 pub mod http;

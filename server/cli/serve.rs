@@ -27,9 +27,10 @@ use crate::http::keys::Keys;
 use crate::http::{self, App};
 use crate::imaging::{Calibration, Developer, Reconstructor, Size};
 use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
+use crate::playback::Player;
 use crate::recorder::{self, Recordings};
 use crate::store::{self, Store, device_log, telemetry};
-use crate::{lens, live, priority};
+use crate::{lens, live, priority, recording};
 
 /// Arguments of `parfocal serve`.
 #[derive(Debug, Args)]
@@ -91,9 +92,6 @@ Real-time priority:
 
 /// Open connections get this long to end by themselves, and then the disk as long to take what is left.
 const GRACE: Duration = Duration::from_millis(700);
-
-/// Folder of the recordings, in the data folder.
-const RECORDINGS: &str = "recordings";
 
 /// The disk gets this long to take the rest of a recording.
 const RECORDING: Duration = Duration::from_secs(3);
@@ -177,14 +175,17 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     })
     .await?;
 
+    let folder = arguments.data_dir.join(recording::FOLDER);
+    let player = Player::new(conductor.clone(), folder.clone())?;
     let recordings = Recordings::new(recorder::Parts {
         clock: Arc::clone(&clock),
+        run: store.run(),
         tap: control.tap.clone(),
         status: control.status.clone(),
         controls: control.camera.clone(),
         live: live.clone(),
         conductor: conductor.clone(),
-        folder: arguments.data_dir.join(RECORDINGS),
+        folder,
         calibration: calibration.clone(),
         size: mosaics,
     });
@@ -199,6 +200,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         live,
         store: store.clone(),
         recordings: recordings.clone(),
+        player,
         surgeon_view: conductor.surgeon_view(),
         operator_view: conductor.operator_view(),
         conductor,

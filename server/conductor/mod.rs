@@ -27,7 +27,7 @@ use tokio::sync::{Mutex, Notify, watch};
 pub use error::ConductError;
 pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
-pub use timeline::{PauseSpan, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint};
+pub use timeline::{PauseSpan, Played, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint};
 
 use crate::autofocus::Registry;
 use crate::clock::Clock;

@@ -1,5 +1,6 @@
 //! A session over time: when each setting was inspected, the focal path, and what was said.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
@@ -8,11 +9,15 @@ use utoipa::ToSchema;
 
 use super::course::Course;
 use super::{ConductError, Conductor};
+use crate::clock::Moment;
 use crate::ids::SessionId;
 use crate::store::{Answer, PathPoint, RunClocks, standings};
 use crate::trial::event::{Event, EventKind};
+use crate::trial::permission;
+use crate::trial::protocol::Record;
 use crate::trial::question::AnswerValue;
 use crate::trial::remark::Said;
+use crate::trial::role::Role;
 use crate::trial::standing::Standing;
 
 /// A session over time. Seconds count from its start by the server's clocks, pauses included.
@@ -67,6 +72,8 @@ pub struct TimelinePoint {
     pub measured: Option<f64>,
     /// The optimum, 0..=1, where a simulation knows it.
     pub optimal: Option<f64>,
+    /// The policy's focus metric, by a scale of its own; only once the session was unblinded.
+    pub metric: Option<f64>,
 }
 
 /// A comment on the timeline.
@@ -111,19 +118,19 @@ pub struct SetAside {
 }
 
 impl Conductor {
-    /// Session `session` over time, its focal path thinned to about `points` a setting.
+    /// Session `session` over time as `by` may see it, its focal path thinned to about `points` a setting.
     ///
     /// # Errors
     /// When there is none, or the database failed.
-    pub async fn timeline(&self, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
+    pub async fn timeline(&self, by: Role, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
         let course = self.shared.load(session).await?;
+        let with_metric = permission::may_see_metric(by, course.state.unblinded());
         let reader = self.shared.store.reader();
         let runs = &self.shared.run_clock.clocks;
         let events = reader.events(session).await?;
         let events: Vec<(Timestamp, Event)> =
             events.into_iter().map(|(run, event)| (runs.wall(run, event.at), event)).collect();
-        let started = events.iter().find(|(_, event)| event.kind == EventKind::Started);
-        let start = started.map_or(course.made.stamp.wall, |(at, _)| *at);
+        let start = start(&course, &events);
         let point = |point: PathPoint| TimelinePoint {
             seconds: seconds(start, runs.wall(point.run, point.exposed)),
             setting: point.setting,
@@ -131,6 +138,7 @@ impl Conductor {
             asked: point.asked,
             measured: point.measured,
             optimal: point.optimal,
+            metric: point.metric.filter(|_| with_metric),
         };
 
         let comments = reader.comments(session).await?;
@@ -153,6 +161,59 @@ impl Conductor {
             points,
             comments: comments.collect(),
             set_aside: set_aside(&course, &answers, runs, start),
+        })
+    }
+}
+
+/// When the session's seconds begin: at its start, or when it was made if it has not started.
+fn start(course: &Course, events: &[(Timestamp, Event)]) -> Timestamp {
+    let started = events.iter().find(|(_, event)| event.kind == EventKind::Started);
+    started.map_or(course.made.stamp.wall, |(at, _)| *at)
+}
+
+/// What playing the recordings of a session needs to know of it.
+#[derive(Debug, Clone)]
+pub struct Played {
+    start: Timestamp,
+    clocks: Arc<RunClocks>,
+    /// What its protocol has recorded.
+    pub asked: Record,
+    /// Whether it has ended.
+    pub ended: bool,
+}
+
+impl Played {
+    /// Seconds from the session's start to the moment `monotonic_ns` of run `run`; negative before the start.
+    #[must_use]
+    pub fn seconds_at(&self, run: i64, monotonic_ns: i64) -> f64 {
+        let at = Moment::from_nanos(u64::try_from(monotonic_ns).unwrap_or(0));
+        seconds(self.start, self.clocks.wall(run, at))
+    }
+
+    /// Seconds from the session's start to `wall`, by the wall clock alone.
+    #[must_use]
+    pub fn seconds_of(&self, wall: Timestamp) -> f64 {
+        seconds(self.start, wall)
+    }
+}
+
+impl Conductor {
+    /// What playing the recordings of `session` needs to know of it.
+    ///
+    /// # Errors
+    /// When `by` may not play them (yet), there is no such session, or the database failed.
+    pub async fn to_play(&self, by: Role, session: SessionId) -> Result<Played, ConductError> {
+        let course = self.shared.load(session).await?;
+        permission::check_playing(by, course.state.unblinded())?;
+
+        let clocks = Arc::clone(&self.shared.run_clock.clocks);
+        let events = self.shared.store.reader().events(session).await?;
+        let events: Vec<_> = events.into_iter().map(|(run, event)| (clocks.wall(run, event.at), event)).collect();
+        Ok(Played {
+            start: start(&course, &events),
+            clocks,
+            asked: course.protocol.record,
+            ended: course.state.phase().has_ended(),
         })
     }
 }
@@ -272,7 +333,15 @@ mod tests {
         ];
 
         let events: Vec<(f64, &EventKind)> = events.iter().map(|(at, kind)| (*at, kind)).collect();
-        let at = |seconds| TimelinePoint { setting: 1, seconds, frame: 1, asked: 0.5, measured: None, optimal: None };
+        let at = |seconds| TimelinePoint {
+            setting: 1,
+            seconds,
+            frame: 1,
+            asked: 0.5,
+            measured: None,
+            optimal: None,
+            metric: None,
+        };
         let spans = |points: &[TimelinePoint]| -> Vec<(f64, Option<f64>)> {
             pauses(&events, points).iter().map(|span| (span.from, span.to)).collect()
         };

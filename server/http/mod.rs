@@ -15,6 +15,7 @@ mod mjpeg;
 mod openapi;
 mod operator;
 mod places;
+mod playback;
 mod recording;
 mod researcher;
 pub mod roles;
@@ -57,6 +58,7 @@ pub fn router(app: AppState) -> Router {
         .merge(camera::routes())
         .merge(recording::routes())
         .merge(researcher::routes())
+        .merge(playback::routes())
         .merge(export::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())

@@ -198,7 +198,7 @@ async fn course(
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
 ) -> Result<Json<Timeline>, Error> {
-    let timeline = app.conductor.timeline(id, POINTS).await?;
+    let timeline = app.conductor.timeline(Role::Researcher, id, POINTS).await?;
     Ok(Json(Timeline { points: Vec::new(), ..timeline }))
 }
 
@@ -211,7 +211,7 @@ async fn timeline(
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
 ) -> Result<Json<Timeline>, Error> {
-    let timeline = app.conductor.timeline(id, POINTS).await?;
+    let timeline = app.conductor.timeline(Role::Researcher, id, POINTS).await?;
     app.conductor.recorder(Role::Researcher).record(&Access::PathViewed(id)).await.map_err(ConductError::from)?;
     Ok(Json(timeline))
 }

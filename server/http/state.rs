@@ -13,6 +13,7 @@ use crate::clock::Clock;
 use crate::conductor::Conductor;
 use crate::control::ControlObserver;
 use crate::live::LiveHandle;
+use crate::playback::Player;
 use crate::recorder::Recordings;
 use crate::store::Store;
 use crate::trial::permission::{CurrentSession, may_see_focal_power};
@@ -31,8 +32,10 @@ pub struct App {
     pub store: Store,
     /// Trial sessions.
     pub conductor: Conductor,
-    /// Recordings.
+    /// What is being recorded.
     pub recordings: Recordings,
+    /// What was recorded.
+    pub player: Player,
     /// The session under way as surgeons may see it.
     pub surgeon_view: watch::Receiver<Option<Arc<SurgeonView>>>,
     /// The session under way as the operator sees it.

@@ -3,15 +3,19 @@
 
 mod area;
 mod counts;
+mod follow;
 mod larger;
+mod lead;
 mod outlet;
 mod picture;
 mod studio;
 mod thread;
 
+pub use area::AreaWatch;
 pub use counts::Counts;
+pub use follow::Follower;
 pub use picture::{EncodedFrame, Insight, Picture};
-pub use thread::start;
+pub use thread::{DETECT_EVERY, start};
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -19,6 +23,7 @@ use std::sync::atomic::Ordering;
 use tokio::sync::watch;
 
 use crate::imaging::Size;
+use lead::{Lead, Leaders};
 
 /// The latest frame of one size.
 type Latest = watch::Receiver<Option<Arc<EncodedFrame>>>;
@@ -29,12 +34,23 @@ pub struct LiveHandle {
     /// By [`Size`], up to the largest that the camera's pictures have.
     frames: Arc<[Latest]>,
     counts: Arc<Counts>,
+    leaders: watch::Sender<Leaders>,
 }
 
 impl LiveHandle {
     /// Joins the viewers of `size`, or of the largest size there is. A size without viewers is not made.
     #[must_use]
     pub fn watch(&self, size: Size) -> Watcher {
+        self.join(size, false)
+    }
+
+    /// Joins the viewers of `size` as one who leads: whoever follows gets pictures of this size too.
+    #[must_use]
+    pub fn lead(&self, size: Size) -> Watcher {
+        self.join(size, true)
+    }
+
+    fn join(&self, size: Size, leads: bool) -> Watcher {
         let size = size.min(self.largest());
         self.counts.of(size).viewers.fetch_add(1, Ordering::Relaxed);
         let mut frames = self.frames[size as usize].clone();
@@ -42,7 +58,8 @@ impl LiveHandle {
         // A frame made earlier is stale by the time somebody joins.
         frames.mark_unchanged();
 
-        Watcher { size, frames, counts: Arc::clone(&self.counts) }
+        let lead = leads.then(|| Lead::new(size, self.leaders.clone()));
+        Watcher { size, frames, counts: Arc::clone(&self.counts), _lead: lead }
     }
 
     /// The largest size of the camera's pictures.
@@ -64,6 +81,8 @@ pub struct Watcher {
     size: Size,
     frames: Latest,
     counts: Arc<Counts>,
+    /// Set where others follow.
+    _lead: Option<Lead>,
 }
 
 impl Watcher {

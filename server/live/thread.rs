@@ -18,7 +18,7 @@ use crate::imaging::{Developer, Size, content_area};
 
 /// Interval of the search for the content area, frames: it moves as slowly as a hand lets an eyepiece
 /// slip.
-const DETECT_EVERY: u64 = 10;
+pub const DETECT_EVERY: u64 = 10;
 
 /// Longest wait for a frame before checking whether more will come.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -48,7 +48,7 @@ pub fn start(
     }
 
     let studio = Studio::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
-    let handle = LiveHandle { frames: frames.into(), counts: Arc::clone(&counts) };
+    let handle = LiveHandle { frames: frames.into(), counts: Arc::clone(&counts), leaders: watch::Sender::default() };
     let worker = Worker { control, outlet: cells, counts, studio, larger, areas: AreaWatch::default(), looked: None };
     let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || worker.run())?;
 

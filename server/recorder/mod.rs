@@ -48,9 +48,16 @@ struct State {
     /// The session whose recording was started last, so that one that ended early stays ended.
     followed: Option<SessionId>,
     /// What the operator is to know of the last recording.
-    notice: Option<String>,
+    notice: Option<Notice>,
     /// Bytes of a frame, as measured last.
     frame_bytes: Option<u64>,
+}
+
+/// What became of a recording.
+struct Notice {
+    text: String,
+    /// Whether something went wrong.
+    warns: bool,
 }
 
 /// A recording under way.
@@ -117,7 +124,8 @@ impl Recordings {
 
         let mut told = RecordingStatus {
             unavailable: parts.size.is_none().then(|| StartError::NoMosaics.to_string()),
-            notice: state.notice.clone(),
+            notice: state.notice.as_ref().map(|notice| notice.text.clone()),
+            notice_warns: state.notice.as_ref().is_some_and(|notice| notice.warns),
             free_bytes: room.map(|room| room.available),
             reserve_bytes: room.map(|room| room.reserve),
             ..RecordingStatus::default()
@@ -157,7 +165,8 @@ impl Recordings {
                 self.end().await;
                 if let Err(error) = self.begin(what, Some(session)).await {
                     tracing::error!(%error, "a session is not being recorded");
-                    self.0.state().notice = Some(format!("This session is not being recorded. {error}"));
+                    let text = format!("This session is not being recorded. {error}");
+                    self.0.state().notice = Some(Notice { text, warns: true });
                 }
             }
             None if followed.is_some() => {
@@ -206,7 +215,9 @@ impl Recordings {
             }
             Some(Ended::Failed(problem)) => format!(" The recording stopped: {problem}. The trial goes on."),
         };
-        self.0.state().notice = Some(format!("{} frames are saved in {folder}.{because}{lost}", progress.frames));
+        let warns = !(because.is_empty() && lost.is_empty());
+        let text = format!("{} frames are saved in {folder}.{because}{lost}", progress.frames);
+        self.0.state().notice = Some(Notice { text, warns });
     }
 
     /// Compresses a frame, to know how many bytes one takes.

@@ -16,6 +16,8 @@ use crate::live::LiveHandle;
 pub struct Parts {
     /// Both clocks.
     pub clock: Arc<dyn Clock>,
+    /// This start of the server.
+    pub run: i64,
     /// Where frames leave the control loop.
     pub tap: Tap,
     /// The loop's state.

@@ -8,10 +8,9 @@ use super::view::ViewRecorder;
 use crate::camera::calibration;
 use crate::clock::Moment;
 use crate::ids::SessionId;
-use crate::imaging::Size;
 use crate::recording::{
-    CALIBRATION, FORMAT, Header, Recorder, RecordingError, Room, VERSION, VIEW_FORMAT, ViewHeader, ViewWriter, Writer,
-    room,
+    CALIBRATION, FORMAT, Header, Recorder, RecordingError, Room, VERSION, VIEW_FORMAT, VIEW_VERSION, ViewHeader,
+    ViewWriter, Writer, room,
 };
 use crate::trial::protocol::Record;
 
@@ -99,6 +98,8 @@ fn record_mosaics(
         calibration: calibration.title(),
         camera_settings: controls.as_ref().map(|controls| controls.offered().by_name()).unwrap_or_default(),
         session,
+        run: Some(parts.run),
+        monotonic_ns: Some(began.as_nanos().cast_signed()),
         frames_lost: 0,
         ended: None,
     };
@@ -117,14 +118,15 @@ fn record_view(
 ) -> Result<ViewRecorder, StartError> {
     let header = ViewHeader {
         format: VIEW_FORMAT.to_owned(),
-        version: 1,
+        version: VIEW_VERSION,
         software: SOFTWARE.to_owned(),
         started: parts.clock.wall(),
         camera: parts.status.borrow().camera.name.to_string(),
         session,
+        run: Some(parts.run),
+        monotonic_ns: Some(began.as_nanos().cast_signed()),
         ended: None,
     };
     let writer = ViewWriter::create(folder, header)?;
-    // One size throughout, and the one that every frame is made at, whatever screens come and go.
-    Ok(ViewRecorder::start(writer, parts.live.watch(Size::Cell), began)?)
+    Ok(ViewRecorder::start(writer, parts.live.follow(), began)?)
 }

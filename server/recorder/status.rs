@@ -34,4 +34,6 @@ pub struct RecordingStatus {
     pub seconds_left: Option<f64>,
     /// What became of the last recording.
     pub notice: Option<String>,
+    /// Whether that is a warning: frames were lost, or a recording did not begin or ended by itself.
+    pub notice_warns: bool,
 }

@@ -1,4 +1,5 @@
-//! Keeps the pictures that viewers get, on a thread of its own: a slow disk misses pictures, as a slow viewer does.
+//! Keeps the pictures that the surgeon's page gets, on a thread of its own: a slow disk misses pictures, as a slow
+//! viewer does.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,7 +9,7 @@ use tokio::runtime::Handle;
 use tokio::sync::Notify;
 
 use crate::clock::Moment;
-use crate::live::Watcher;
+use crate::live::Follower;
 use crate::priority;
 use crate::recording::{Ended, Progress, RecordingError, Room, ViewWriter, room};
 
@@ -21,17 +22,17 @@ pub struct ViewRecorder {
 }
 
 impl ViewRecorder {
-    /// Records what `watcher` sees into `writer`. Times count from `start`.
+    /// Records what `follower` sees into `writer`. Times count from `start`.
     ///
     /// # Errors
     /// When the system has no thread left.
-    pub fn start(writer: ViewWriter, watcher: Watcher, start: Moment) -> Result<Self, RecordingError> {
+    pub fn start(writer: ViewWriter, follower: Follower, start: Moment) -> Result<Self, RecordingError> {
         let folder = writer.folder().to_owned();
         let progress = Arc::new(Mutex::new(Progress::default()));
         let stop = Arc::new(Notify::new());
 
         let runtime = Handle::current();
-        let worker = Worker { writer, watcher, start, progress: Arc::clone(&progress), stop: Arc::clone(&stop) };
+        let worker = Worker { writer, follower, start, progress: Arc::clone(&progress), stop: Arc::clone(&stop) };
         let thread = std::thread::Builder::new().name("recording-view".into()).spawn(move || {
             priority::lower();
             runtime.block_on(worker.run());
@@ -75,7 +76,7 @@ impl Drop for ViewRecorder {
 
 struct Worker {
     writer: ViewWriter,
-    watcher: Watcher,
+    follower: Follower,
     start: Moment,
     progress: Arc<Mutex<Progress>>,
     stop: Arc<Notify>,
@@ -86,7 +87,7 @@ impl Worker {
         let ended = loop {
             let frame = tokio::select! {
                 () = self.stop.notified() => break Ended::Stopped,
-                frame = self.watcher.next() => frame,
+                frame = self.follower.next() => frame,
             };
             let Some(frame) = frame else { break Ended::Stopped };
             let picture = &frame.picture;
@@ -97,7 +98,8 @@ impl Worker {
             }
 
             let time = picture.exposed_at.since(self.start).as_nanos() as u64;
-            if let Err(error) = self.writer.add(picture.number, time, &picture.jpeg) {
+            let size = (picture.width, picture.height);
+            if let Err(error) = self.writer.add(picture.number, time, size, &picture.jpeg) {
                 break Ended::Failed(error.to_string());
             }
             let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);

@@ -14,6 +14,14 @@ pub enum RecordingError {
     /// There is no recording there.
     #[error("{} is not a recording: it has no zarr.json of the format {FORMAT}", .0.display())]
     NoRecording(PathBuf),
+    /// It holds the view, where mosaics are needed.
+    #[error(
+        "{} holds pictures of the view and no mosaics; `parfocal recording info` reads it, \
+         and `ffmpeg -f mjpeg -i {}/view.mjpeg` makes a video of it",
+        .0.display(),
+        .0.display()
+    )]
+    View(PathBuf),
     /// It was made by another version of the format.
     #[error(
         "{} is a recording of format version {found}, but this parfocal reads version {VERSION}; \
@@ -139,6 +147,9 @@ pub enum Damage {
     /// A frame does not match its checksum.
     #[error("frame {0} does not match its checksum")]
     Frame(usize),
+    /// A picture of the view is cut off, or is not a JPEG picture.
+    #[error("picture {0} is cut off, or is not a JPEG picture")]
+    Picture(usize),
     /// Values that stand beside the frames do not match their checksum.
     #[error("the values of `{0}` are missing or do not match their checksum")]
     Column(&'static str),

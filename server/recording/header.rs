@@ -36,6 +36,12 @@ pub struct Header {
     pub camera_settings: BTreeMap<String, f64>,
     /// The trial session that it was made in, if one was under way.
     pub session: Option<String>,
+    /// The start of the server that recorded it, as exports count them; none of a recording made without a server.
+    #[serde(default)]
+    pub run: Option<i64>,
+    /// The monotonic clock at `started`, nanoseconds; comparable with the times of an export within a run.
+    #[serde(default)]
+    pub monotonic_ns: Option<i64>,
     /// Frames that the camera delivered but the recorder was too slow for.
     pub frames_lost: u64,
     /// How it ended; none while it is under way, and where it was cut short.

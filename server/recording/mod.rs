@@ -9,8 +9,10 @@ mod header;
 mod layout;
 mod reading;
 mod recorder;
+mod session;
 mod shard;
 mod view;
+mod view_reading;
 mod writing;
 
 pub use columns::FrameRow;
@@ -20,5 +22,10 @@ pub use header::{CALIBRATION, Ended, FORMAT, Header, VERSION};
 pub use layout::{SHARD_FRAMES, by_wavelength};
 pub use reading::Recording;
 pub use recorder::{Intake, Progress, Recorder, Shot, compressed_size};
-pub use view::{VIEW_FORMAT, ViewHeader, ViewWriter};
+pub use session::{AnyRecording, Found, Kind, belonging, of_session};
+pub use view::{VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewWriter};
+pub use view_reading::{ViewRecording, ViewRow};
 pub use writing::Writer;
+
+/// Folder of the server's recordings, in its data folder.
+pub const FOLDER: &str = "recordings";

@@ -13,6 +13,7 @@ use super::error::{Damage, RecordingError};
 use super::header::{CALIBRATION, FORMAT, Header, VERSION};
 use super::layout::{DESCRIPTION, MOSAIC, SHARD_FRAMES};
 use super::shard::Index;
+use super::view;
 use crate::imaging::{CELL, MosaicFrame};
 
 /// Largest side of a mosaic that is believed, samples.
@@ -38,6 +39,7 @@ impl Recording {
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         let path = folder.join(DESCRIPTION);
         let text = fs::read(&path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound if folder.join(view::HEADER).exists() => RecordingError::View(folder.to_owned()),
             ErrorKind::NotFound | ErrorKind::NotADirectory => RecordingError::NoRecording(folder.to_owned()),
             _ => RecordingError::unreadable(&path)(error),
         })?;

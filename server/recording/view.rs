@@ -1,5 +1,5 @@
-//! A recording of the view: the JPEG pictures as viewers got them. Two files that any tool reads: the pictures one
-//! after another, and a table of their places. `docs/recordings.md` describes them.
+//! A recording of the view: the JPEG pictures as the surgeon's page got them. Two files that any tool reads: the
+//! pictures one after another, and a table of their places. `docs/recordings.md` describes them.
 
 use std::fs::File;
 use std::io::Write;
@@ -16,20 +16,23 @@ use crate::files::replace;
 /// Value of [`ViewHeader::format`].
 pub const VIEW_FORMAT: &str = "parfocal-view";
 /// The pictures, one after another: what `ffmpeg -f mjpeg` reads.
-const PICTURES: &str = "view.mjpeg";
+pub const PICTURES: &str = "view.mjpeg";
 /// A line for each picture.
-const INDEX: &str = "view.csv";
+pub const INDEX: &str = "view.csv";
 /// How it was made.
-const HEADER: &str = "view.json";
-/// First line of the index.
-const COLUMNS: &str = "frame_number,time_ns,offset,length\n";
+pub const HEADER: &str = "view.json";
+/// First line of the index. Width and height came later: they stand at the end, so that programs that count columns go
+/// on reading it.
+const COLUMNS: &str = "frame_number,time_ns,offset,length,width,height\n";
+/// Value of [`ViewHeader::version`].
+pub const VIEW_VERSION: u64 = 1;
 
 /// How a recording of the view was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ViewHeader {
     /// Always [`VIEW_FORMAT`].
     pub format: String,
-    /// Always 1.
+    /// Always [`VIEW_VERSION`].
     pub version: u64,
     /// The program that made it, and its version.
     pub software: String,
@@ -39,6 +42,12 @@ pub struct ViewHeader {
     pub camera: String,
     /// The trial session that it was made in, if one was under way.
     pub session: Option<String>,
+    /// The start of the server that recorded it, as exports count them.
+    #[serde(default)]
+    pub run: Option<i64>,
+    /// The monotonic clock at `started`, nanoseconds; comparable with the times of an export within a run.
+    #[serde(default)]
+    pub monotonic_ns: Option<i64>,
     /// How it ended; none while it is under way, and where it was cut short.
     pub ended: Option<Ended>,
 }
@@ -76,13 +85,20 @@ impl ViewWriter {
         &self.folder
     }
 
-    /// Adds a picture of frame `number`, whose exposure ended `time` nanoseconds after the start.
+    /// Adds a picture of frame `number`, `size` (width and height) pixels large, whose exposure ended `time`
+    /// nanoseconds after the start.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn add(&mut self, number: u64, time: u64, jpeg: &[u8]) -> Result<(), RecordingError> {
+    pub fn add(
+        &mut self,
+        number: u64,
+        time: u64,
+        (width, height): (usize, usize),
+        jpeg: &[u8],
+    ) -> Result<(), RecordingError> {
         // The picture first: a line in the index stands for a picture that is there.
-        let line = format!("{number},{time},{},{}\n", self.bytes, jpeg.len());
+        let line = format!("{number},{time},{},{},{width},{height}\n", self.bytes, jpeg.len());
         let written = self.pictures.write_all(jpeg).and_then(|()| self.index.write_all(line.as_bytes()));
         written.map_err(|error| RecordingError::unwritable(&self.folder, self.stored, error))?;
 

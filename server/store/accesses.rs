@@ -1,6 +1,6 @@
 //! Who looked at the evidence: each access is a record of its own, and is chained.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -21,6 +21,8 @@ pub enum Access {
     Entered,
     /// Looked at the focal path of a session, which may tell the policies.
     PathViewed(SessionId),
+    /// Looked at the recording of a session.
+    RecordingViewed(SessionId),
     /// Asked for an export of a session.
     Exported {
         /// The session.
@@ -42,6 +44,7 @@ impl Access {
         match self {
             Self::Entered => "entered",
             Self::PathViewed(_) => "path-viewed",
+            Self::RecordingViewed(_) => "recording-viewed",
             Self::Exported { .. } => "exported",
             Self::BackedUp => "backed-up",
             Self::Restored { .. } => "restored",
@@ -50,7 +53,9 @@ impl Access {
 
     const fn session(&self) -> Option<SessionId> {
         match self {
-            Self::PathViewed(session) | Self::Exported { session, .. } => Some(*session),
+            Self::PathViewed(session) | Self::RecordingViewed(session) | Self::Exported { session, .. } => {
+                Some(*session)
+            }
             _ => None,
         }
     }
@@ -68,6 +73,8 @@ impl Access {
 #[derive(Clone)]
 pub struct Recorder {
     way: Way,
+    /// The data folder.
+    folder: PathBuf,
     reader: Reader,
     /// Whose it is; none on the command line.
     role: Option<Role>,
@@ -86,7 +93,8 @@ impl Recorder {
     /// What `role` does within the server.
     #[must_use]
     pub fn of_server(store: &Store, role: Role, clock: Arc<dyn Clock>) -> Self {
-        Self { way: Way::Server(store.clone()), reader: store.reader().clone(), role: Some(role), clock }
+        let folder = store.inner.folder.clone();
+        Self { way: Way::Server(store.clone()), folder, reader: store.reader().clone(), role: Some(role), clock }
     }
 
     /// What is done from the command line with the database of data folder `folder`, whether or not a server has
@@ -107,7 +115,14 @@ impl Recorder {
             .pragma("wal_autocheckpoint", "0")
             .synchronous(SqliteSynchronous::Full);
         let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
-        Ok(Self { way: Way::CommandLine(pool), reader, role: None, clock })
+        let folder = file.parent().map(Path::to_owned).unwrap_or_default();
+        Ok(Self { way: Way::CommandLine(pool), folder, reader, role: None, clock })
+    }
+
+    /// The data folder.
+    #[must_use]
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// For reading.

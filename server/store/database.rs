@@ -56,6 +56,8 @@ pub struct Store {
 
 #[derive(Debug)]
 pub(super) struct Inner {
+    /// The data folder.
+    pub(super) folder: PathBuf,
     pub(super) trial: SqlitePool,
     pub(super) telemetry: SqlitePool,
     pub(super) checkpoints: SqlitePool,
@@ -108,6 +110,7 @@ impl Store {
         let run = begin_run(&trial, run).await?;
 
         let inner = Inner {
+            folder: folder.to_owned(),
             trial,
             telemetry,
             checkpoints,

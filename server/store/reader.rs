@@ -280,5 +280,6 @@ fn path_point(row: &SqliteRow) -> Result<PathPoint, StoreError> {
         asked: row.try_get("asked")?,
         measured: row.try_get("measured")?,
         optimal: row.try_get("optimal")?,
+        metric: row.try_get("metric")?,
     })
 }

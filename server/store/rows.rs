@@ -137,7 +137,7 @@ pub struct SessionLine {
     pub emergency: bool,
 }
 
-/// A point of a session's focal path. No metric and no timing: those differ by policy.
+/// A point of a session's focal path, with the metric, which is for those alone who know the policy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathPoint {
     /// Setting, from 1.
@@ -154,6 +154,8 @@ pub struct PathPoint {
     pub measured: Option<f64>,
     /// The optimum, 0..=1, where a simulation knows it.
     pub optimal: Option<f64>,
+    /// The policy's focus metric, which names the policy by its scale.
+    pub metric: Option<f64>,
 }
 
 /// A device began or ceased to work.

@@ -81,6 +81,28 @@ pub fn may_see_focal_power(role: Role, current: CurrentSession) -> bool {
     role != Role::Surgeon && current == CurrentSession::None
 }
 
+/// Whether `role` may see the focus metric of a session's steps afterwards: its scale names the policy.
+#[must_use]
+pub fn may_see_metric(role: Role, unblinded: bool) -> bool {
+    role == Role::Researcher && unblinded
+}
+
+/// Whether `role` may play a session's recording. The moving picture shows how the policy searched, as the focal path
+/// does; unlike the path, nobody needs it before the policies are told. Practice is no exception, so that one rule
+/// holds for all sessions.
+///
+/// # Errors
+/// When `role` is not the researcher, or the session is still blinded.
+pub fn check_playing(role: Role, unblinded: bool) -> Result<(), Refusal> {
+    match (role, unblinded) {
+        (Role::Researcher, true) => Ok(()),
+        (Role::Researcher, false) => Err(Refusal::conflict(
+            "the picture shows how the policy focused, so a recording is played only once its session is unblinded",
+        )),
+        _ => Err(Refusal::only("the researcher")),
+    }
+}
+
 /// A hold that lasts this long is not a slow start, but a fault that the operator must know of.
 const LASTING: Duration = Duration::from_secs(3);
 
@@ -171,6 +193,17 @@ mod tests {
                 assert!(!may_see_focal_power(role, CurrentSession::of(Some(phase))), "{role:?} {phase:?}");
             }
         }
+    }
+
+    #[test]
+    fn only_the_researcher_plays_a_recording_or_sees_the_metric_and_only_after_unblinding() {
+        for role in ROLES {
+            assert_eq!(check_playing(role, true).is_ok(), role == Role::Researcher, "{role:?}");
+            assert_eq!(may_see_metric(role, true), role == Role::Researcher, "{role:?}");
+            assert!(check_playing(role, false).is_err() && !may_see_metric(role, false), "{role:?}");
+        }
+        let blinded = check_playing(Role::Researcher, false);
+        assert!(matches!(blinded, Err(Refusal::Conflict(text)) if text.contains("once its session is unblinded")));
     }
 
     #[test]

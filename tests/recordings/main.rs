@@ -2,6 +2,8 @@
 //! own libraries.
 
 mod damage;
+mod step;
+mod view;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -92,6 +94,8 @@ fn header() -> Header {
         calibration: Calibration::default().title(),
         camera_settings: [("gain".to_owned(), 2.5)].into(),
         session: None,
+        run: None,
+        monotonic_ns: None,
         frames_lost: 0,
         ended: None,
     }

@@ -86,7 +86,7 @@ async fn the_answer_given_last_counts_and_devices_that_disagree_are_told() {
     let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!((&detail.answers[0].value, detail.answers[0].devices_disagree), (&AnswerValue::Point(5), true));
 
-    let timeline = trial.conductor.timeline(session, 10).await.unwrap();
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!(
         (&aside.value, &aside.counted, aside.late),
@@ -124,7 +124,7 @@ async fn of_two_tabs_the_one_that_answered_last_counts_whatever_the_devices_cloc
     trial.conductor.answer(three).await.unwrap();
 
     assert_eq!(trial.view().answers["sharpness"], AnswerValue::Point(5));
-    assert_eq!(trial.conductor.timeline(session, 10).await.unwrap().set_aside, []);
+    assert_eq!(trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap().set_aside, []);
     assert!(!trial.conductor.session_detail(session).await.unwrap().answers[0].devices_disagree);
 }
 
@@ -171,7 +171,7 @@ async fn what_a_tablet_holds_counts_for_half_an_hour_after_the_end_and_later_arr
 
     let detail = trial.conductor.session_detail(session).await.unwrap();
     assert_eq!(detail.answers.iter().map(|line| &line.value).collect::<Vec<_>>(), [&AnswerValue::Point(5)]);
-    let timeline = trial.conductor.timeline(session, 10).await.unwrap();
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
     let aside = &timeline.set_aside[0];
     assert_eq!((&aside.value, aside.late, timeline.set_aside.len()), (&AnswerValue::Point(1), true, 1));
     assert_eq!(timeline.comments.iter().map(|comment| comment.late).collect::<Vec<_>>(), [false, true]);

@@ -37,7 +37,7 @@ async fn a_comment_that_waited_for_the_network_stands_where_it_was_said() {
     comment.run = Some(99);
     trial.conductor.comment(comment).await.unwrap();
 
-    let timeline = trial.conductor.timeline(session, 100).await.unwrap();
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
     assert_eq!(timeline.comments.len(), 2);
     assert!((timeline.comments[0].seconds - 10.0).abs() < 1e-9, "{:?}", timeline.comments[0]);
 

@@ -32,7 +32,7 @@ async fn a_surgeon_goes_through_six_blinded_settings_and_everything_is_kept() {
     let sus = detail.answers.iter().find(|answer| answer.question == "usability").unwrap();
     assert_eq!(sus.sus_score, Some(67.5));
 
-    let timeline = trial.conductor.timeline(session, 100).await.unwrap();
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 100).await.unwrap();
     let seconds: Vec<f64> = timeline.comments.iter().map(|comment| comment.seconds).collect();
     assert_eq!(seconds, [20.0, 40.0, 60.0, 80.0, 100.0, 120.0], "only inspection takes time on this trial");
     assert_eq!(timeline.comments[2].setting, Some(3));

@@ -20,6 +20,7 @@ const IDLE = {
   reserve_bytes: 1e9,
   seconds_left: 3600,
   notice: null,
+  notice_warns: false,
 };
 
 test("lengths of time and amounts are as exact as it helps", () => {

@@ -281,6 +281,40 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/researcher/sessions/{session}/recordings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The recordings of an unblinded session, with the times of their frames; each look at them is recorded. */
+        get: operations["researcher_recordings"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/sessions/{session}/recordings/{recording}/frames/{frame}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** A frame of a recording of an unblinded session. Frames count from 0. */
+        get: operations["researcher_frame"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/sessions/{session}/timeline": {
         parameters: {
             query?: never;
@@ -786,6 +820,11 @@ export interface components {
          * @description Made by a browser for one comment or answer: the same again is the same thing, however often it is sent.
          */
         IdempotencyKey: string;
+        /**
+         * @description What a recording is made of.
+         * @enum {string}
+         */
+        Kind: "mosaic" | "view";
         /** @description An event in words. */
         LogLine: {
             /** @description When, by the server's wall clock. */
@@ -955,6 +994,20 @@ export interface components {
          * @enum {string}
          */
         Record: "none" | "view" | "mosaic";
+        /** @description When the frames of a recording were exposed. */
+        RecordingCourse: {
+            /**
+             * Format: double
+             * @description Its first frame, in seconds of the session's timeline; negative before the session's start.
+             */
+            from: number;
+            /** @description What it is made of. */
+            kind: components["schemas"]["Kind"];
+            /** @description Its name. */
+            name: string;
+            /** @description Each frame, in whole milliseconds since the first. A frame is named by its place here, from 0. */
+            times_ms: number[];
+        };
         /** @description What is to happen. */
         RecordingOrder: {
             /** @description Whether mosaics are to be recorded. */
@@ -993,6 +1046,8 @@ export interface components {
             lost: number;
             /** @description What became of the last recording. */
             notice?: string | null;
+            /** @description Whether that is a warning: frames were lost, or a recording did not begin or ended by itself. */
+            notice_warns: boolean;
             recording?: components["schemas"]["Record"] | null;
             /**
              * Format: int64
@@ -1095,6 +1150,13 @@ export interface components {
             status: components["schemas"]["SessionStatus"];
             /** @description Whether it was told which policies ran. */
             unblinded: boolean;
+        };
+        /** @description The recordings of a session, as far as they can be played. */
+        SessionRecordings: {
+            /** @description What is wrong with others, or missing from these, in sentences. */
+            problems: string[];
+            /** @description Those that can be played, in the order in which they were made. */
+            recordings: components["schemas"]["RecordingCourse"][];
         };
         /**
          * @description How far a session came.
@@ -1244,6 +1306,11 @@ export interface components {
              * @description Focal power that the frame was exposed at, 0..=1.
              */
             measured?: number | null;
+            /**
+             * Format: double
+             * @description The policy's focus metric, by a scale of its own; only once the session was unblinded.
+             */
+            metric?: number | null;
             /**
              * Format: double
              * @description The optimum, 0..=1, where a simulation knows it.
@@ -3193,6 +3260,231 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_recordings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SessionRecordings"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It has not been unblinded */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_frame: {
+        parameters: {
+            query?: {
+                /** @description How finely mosaics are developed. A recording of the view has its pictures as they were recorded. */
+                size?: "cell" | "half";
+            };
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+                /** @description The recording's name */
+                recording: string;
+                /** @description The frame's place in the recording, from 0 */
+                frame: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The picture */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/jpeg": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session, recording or frame */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It has not been unblinded */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The frame is damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description Too many pages are open at once */

@@ -21,6 +21,7 @@ declare global {
     type Origin = Schemas["Origin"];
     type Outstanding = Schemas["Outstanding"];
     type Question = Schemas["Question"];
+    type RecordingCourse = Schemas["RecordingCourse"];
     type RecordingStatus = Schemas["RecordingStatus"];
     type Said = Schemas["Said"];
     type SetAside = Schemas["SetAside"];

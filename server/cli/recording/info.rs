@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::view_info;
 use crate::cli::output::{Failure, print};
-use crate::recording::{Header, Recording};
+use crate::recording::{AnyRecording, Header, Recording};
 
 /// Bytes of a sample when four of 10 bit are packed into five bytes.
 const PACKED: f64 = 1.25;
@@ -47,13 +48,30 @@ struct Info {
 /// # Errors
 /// When there is no recording; when frames are damaged, after reporting them.
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let recording = Recording::open(&arguments.folder)?;
-    let info = look(arguments, &recording);
+    let folder = &arguments.folder;
+    match AnyRecording::open(folder)? {
+        AnyRecording::Mosaic(recording) => {
+            let info = look(arguments, &recording);
+            tell(arguments, &info, describe, &info.damaged)
+        }
+        AnyRecording::View(recording) => {
+            let info = view_info::look(folder, &recording);
+            tell(arguments, &info, view_info::describe, &info.damaged)
+        }
+    }
+}
 
-    let text = if arguments.json { serde_json::to_string(&info)? + "\n" } else { describe(&info) };
+/// Prints `info` as asked; fails where something is damaged.
+fn tell<I: Serialize>(
+    arguments: &Arguments,
+    info: &I,
+    describe: impl Fn(&I) -> String,
+    damaged: &[String],
+) -> Result<(), Failure> {
+    let text = if arguments.json { serde_json::to_string(info)? + "\n" } else { describe(info) };
     print(&text)?;
 
-    match info.damaged.as_slice() {
+    match damaged {
         [] => Ok(()),
         [only] => Err(only.clone().into()),
         [first, rest @ ..] => Err(format!("{first} (and {} more)", rest.len()).into()),

@@ -3,7 +3,9 @@
 mod cube;
 mod info;
 mod record;
+mod step;
 mod video;
+mod view_info;
 
 use super::output::Failure;
 
@@ -24,6 +26,8 @@ enum Action {
     Cube(cube::Arguments),
     /// Save a recording, or a part of it, as a video or as pictures.
     Video(video::Arguments),
+    /// Step a policy over a recording: a table of what it sees in each frame, and what it asks of the lens.
+    Step(step::Arguments),
 }
 
 /// Does what the arguments say.
@@ -36,5 +40,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Action::Info(arguments) => info::run(arguments),
         Action::Cube(arguments) => cube::run(arguments),
         Action::Video(arguments) => video::run(arguments),
+        Action::Step(arguments) => step::run(arguments),
     }
 }

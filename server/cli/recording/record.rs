@@ -108,6 +108,8 @@ fn start(arguments: &Arguments) -> Result<(ControlLoop, ControlHandle, Recorder)
         calibration: calibration.title(),
         camera_settings: camera.controls().map(|controls| controls.offered().by_name()).unwrap_or_default(),
         session: None,
+        run: None,
+        monotonic_ns: None,
         frames_lost: 0,
         ended: None,
     };

@@ -18,6 +18,9 @@ pub trait Audience: Send + Sync + 'static {
     /// The state of the devices.
     type Status: Serialize + PartialEq + Send;
 
+    /// Whether a recording of the view keeps what this page gets.
+    const LEADS: bool;
+
     /// What goes with `frame`, which is `age_ms` old.
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> Self::Header;
     /// Where the session is followed.

@@ -138,7 +138,7 @@ impl<A: Audience> Desk<A> {
         statuses.mark_changed();
 
         Self {
-            watcher: Some(app.live.watch(Size::Cell)),
+            watcher: Some(join::<A>(&app, Size::Cell)),
             coming: None,
             in_flight: None,
             last: 0,
@@ -202,7 +202,7 @@ impl<A: Audience> Desk<A> {
             Ok(Said::Visible { visible: true }) => {
                 self.in_flight = None;
                 self.due = Instant::now() + link::PATIENCE;
-                self.watcher.get_or_insert_with(|| self.app.live.watch(self.link.size()));
+                self.watcher.get_or_insert_with(|| join::<A>(&self.app, self.link.size()));
             }
             Ok(Said::Screen { width }) => {
                 self.screen = Some(width);
@@ -245,9 +245,9 @@ impl<A: Audience> Desk<A> {
         }
 
         tracing::debug!(size = size.name(), "a viewer's pictures change size");
-        self.coming = (size > watcher.size()).then(|| self.app.live.watch(size));
+        self.coming = (size > watcher.size()).then(|| join::<A>(&self.app, size));
         if size < watcher.size() {
-            *watcher = self.app.live.watch(size);
+            *watcher = join::<A>(&self.app, size);
         }
         self.due = Instant::now() + link::PATIENCE;
     }
@@ -337,6 +337,11 @@ impl<A: Audience> Desk<A> {
         self.next = tell(&Told::<&A::Session, &A::Status>::Beat);
         Ok(Some(Message::Ping(Bytes::new())))
     }
+}
+
+/// Joins the viewers of `size`.
+fn join<A: Audience>(app: &AppState, size: Size) -> Watcher {
+    if A::LEADS { app.live.lead(size) } else { app.live.watch(size) }
 }
 
 /// The next frame of a size that is coming, if one is.

@@ -135,6 +135,8 @@ impl Audience for ForOperator {
     type Session = OperatorView;
     type Status = OperatorStatus;
 
+    const LEADS: bool = false;
+
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> OperatorFrame {
         // Asked once: a session may begin meanwhile.
         let blinded = app.blinded();

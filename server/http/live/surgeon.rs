@@ -103,6 +103,8 @@ impl Audience for ForSurgeon {
     type Session = SurgeonView;
     type Status = SurgeonStatus;
 
+    const LEADS: bool = true;
+
     fn header(frame: &EncodedFrame, age_ms: f64, app: &App) -> SurgeonFrame {
         SurgeonFrame::new(&frame.picture, coarse(age_ms), app)
     }

@@ -6,7 +6,9 @@ use std::collections::BTreeSet;
 use serde_json::{Map, Value, json};
 
 use super::ExportError;
-use super::description::{AnswerRow, ChainRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow};
+use super::description::{
+    AnswerRow, ChainRow, CommentRow, DeviceRow, EventRow, RecordingRow, RunRow, SegmentRow, SessionRow,
+};
 use super::folder::Folder;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
 use crate::ids::{SegmentId, SessionId};
@@ -87,8 +89,13 @@ impl Blinded {
         self.line.session
     }
 
-    /// Writes all its files but the description.
-    pub async fn write(&self, reader: &Reader, folder: &mut Folder) -> Result<(), ExportError> {
+    /// Writes all its files but the description; `recordings` are the session's.
+    pub async fn write(
+        &self,
+        reader: &Reader,
+        recordings: &[RecordingRow],
+        folder: &mut Folder,
+    ) -> Result<(), ExportError> {
         let mut copies = Map::new();
         let runs = reader.export_runs(self.session()).await?;
         let devices = reader.device_events(self.session()).await?;
@@ -101,6 +108,7 @@ impl Blinded {
         copy(folder, &mut copies, &self.answer_rows()).await?;
         copy(folder, &mut copies, &self.event_rows()).await?;
         copy(folder, &mut copies, &device_rows(devices)).await?;
+        copy(folder, &mut copies, recordings).await?;
         copy(folder, &mut copies, &reader.export_accesses(self.session()).await?).await?;
         folder.json("session.json", &Value::Object(copies)).await?;
 

@@ -256,8 +256,41 @@ table! {
 }
 
 table! {
+    name: "recordings",
+    description:
+        "What was recorded of the session, one row a folder; the recordings themselves stay in the data folder",
+    key: [name],
+    row:
+    /// A recording of the session.
+    #[derive(Debug, Clone)]
+    RecordingRow {
+        session: SessionId = SESSION.since(5),
+        name: String = means("Name of the recording").since(5),
+        path: String = means("Its folder, relative to the data folder").since(5),
+        kind: Option<&'static str> =
+            means("mosaic (raw mosaics in Zarr v3) or view (JPEG pictures); empty where it cannot be read").since(5),
+        run: Option<i64> = means("Start of the server that recorded it; see runs").since(5),
+        started: Option<Timestamp> =
+            means("When it began, by the server's wall clock; its frames count from then").in_unit("UTC").since(5),
+        monotonic_ns: Option<i64> =
+            means("The same by the monotonic clock; comparable within a run").in_unit("ns").since(5),
+        first_ns: Option<i64> = means("End of the first frame's exposure, since it began").in_unit("ns").since(5),
+        last_ns: Option<i64> = means("End of the last frame's exposure, since it began").in_unit("ns").since(5),
+        frames: Option<usize> = means("Frames that it holds").since(5),
+        lost: Option<u64> = means(
+            "Frames that the recorder was too slow for; empty of a view, which has the frames that viewers could get",
+        )
+        .since(5),
+        ended: Option<String> =
+            means("How it ended: stopped, or why it stopped by itself; empty if it was cut short or goes on").since(5),
+        description_sha256: Option<String> = means("SHA-256 of its zarr.json or view.json").since(5),
+        problem: Option<String> = means("Why it cannot be read, where it cannot").since(5),
+    }
+}
+
+table! {
     name: "accesses",
-    description: "Who looked at the session's focal path or exported the session, this export included",
+    description: "Who looked at the session's focal path or recordings, or exported the session, this export included",
     key: [number],
     row:
     /// A look at the evidence.
@@ -269,7 +302,7 @@ table! {
             means("Start of the server that recorded it; empty for the command line").since(4),
         monotonic_ns: Option<i64> = MONOTONIC.since(4),
         role: String = means("Who: researcher, or command-line").since(4),
-        kind: String = means("path-viewed or exported").since(4),
+        kind: String = means("path-viewed, recording-viewed or exported").since(4),
         session: SessionId = SESSION.since(4),
         detail: Option<String> = means("Of an export: blinded or unblinded").since(4),
     }
@@ -402,7 +435,7 @@ table! {
 }
 
 /// Every table that an export may have.
-pub const ALL: [Table; 14] = [
+pub const ALL: [Table; 15] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -410,6 +443,7 @@ pub const ALL: [Table; 14] = [
     AnswerRow::TABLE,
     EventRow::TABLE,
     DeviceRow::TABLE,
+    RecordingRow::TABLE,
     AccessRow::TABLE,
     ChainRow::TABLE,
     TelemetryRow::TABLE,

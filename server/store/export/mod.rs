@@ -6,6 +6,7 @@ mod description;
 mod destination;
 mod error;
 mod folder;
+mod recordings;
 mod table;
 mod unblinded;
 pub mod verify;
@@ -23,6 +24,7 @@ pub use self::error::ExportError;
 pub use self::table::{Column, TEXTS_IN_CSV, Table, Type};
 
 use self::blinded::Blinded;
+use self::description::RecordingRow;
 use self::folder::Folder;
 pub use self::folder::folder_name;
 use self::unblinded::Unblinded;
@@ -58,6 +60,7 @@ pub struct Export {
     head: Head,
     blinded: Blinded,
     telling: Option<Unblinded>,
+    recordings: Vec<RecordingRow>,
 }
 
 impl Export {
@@ -68,6 +71,8 @@ impl Export {
     pub async fn prepare(recorder: &Recorder, session: SessionId, unblinded: bool) -> Result<Self, ExportError> {
         // A refused export is not recorded.
         read(recorder.reader(), session, unblinded).await?;
+        // Once: a long recording takes a while to open.
+        let recordings = recordings::rows(recorder.folder(), session).await;
 
         // The export ends with its own record, so that nobody can take away what came before it. Where something else
         // was recorded in between, it is recorded again.
@@ -76,7 +81,7 @@ impl Export {
             // A session may be under way: what is said meanwhile is in all of the files or in none.
             let snapshot = recorder.reader().snapshot().await?;
             match Self::of(&snapshot, head, session, unblinded).await {
-                Ok(Some(export)) => return Ok(export),
+                Ok(Some(export)) => return Ok(Self { recordings, ..export }),
                 Ok(None) => snapshot.close().await,
                 Err(error) => {
                     snapshot.close().await;
@@ -98,7 +103,8 @@ impl Export {
         if snapshot.head().await? != head || !blinded.under_way() && snapshot.has_unsealed(session).await? {
             return Ok(None);
         }
-        Ok(Some(Self { session, snapshot: snapshot.clone(), head, blinded, telling }))
+        let snapshot = snapshot.clone();
+        Ok(Some(Self { session, snapshot, head, blinded, telling, recordings: Vec::new() }))
     }
 
     /// Writes the folder `out`, which must be new or empty. It appears whole or not at all.
@@ -134,7 +140,7 @@ impl Export {
     }
 
     async fn write(&self, mut folder: Folder) -> Result<Vec<String>, ExportError> {
-        self.blinded.write(&self.snapshot, &mut folder).await?;
+        self.blinded.write(&self.snapshot, &self.recordings, &mut folder).await?;
         if let Some(telling) = &self.telling {
             telling.write(&self.snapshot, &mut folder).await?;
         }

@@ -39,10 +39,10 @@ pub struct Column {
     pub since: u64,
 }
 
-/// The format of exports that this version writes. The fourth has the chain. The third tells what the policies
-/// knew of the
-/// optic, the second what was said late and on which device; the first did not name itself.
-pub const FORMAT: u64 = 4;
+/// The format of exports that this version writes. The fifth names the recordings. The fourth has the chain. The third
+/// tells what the policies knew of the optic, the second what was said late and on which device; the first did not name
+/// itself.
+pub const FORMAT: u64 = 5;
 
 /// A table without its rows.
 #[derive(Debug, Clone, Copy)]

@@ -12,6 +12,7 @@ mod full_disk;
 mod killed;
 mod lens_troubles;
 mod outbox;
+mod playback;
 mod proxy;
 mod recording_card;
 mod screenshots;

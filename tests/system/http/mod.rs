@@ -6,6 +6,7 @@ mod evidence;
 mod failing_disk;
 mod finality;
 mod live;
+mod playback;
 mod privacy;
 mod real_time;
 mod recordings;

@@ -1,36 +1,38 @@
 //! Recordings made by the server: by the operator's button, and because a protocol asks for them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use parfocal::clock::{Clock, SystemClock};
-use parfocal::recording::{Ended, Recording};
+use parfocal::recording::{Ended, Recording, ViewRecording, ViewRow};
 use reqwest::StatusCode;
+use rustix::process::Signal;
 use serde_json::{Value, json};
 
+use super::live::Page;
 use crate::support::Server;
 use crate::support::disk::SmallDisk;
 
 const PATH: &str = "/api/operator/recording";
 
-fn start(data: Arc<tempfile::TempDir>) -> Server {
+pub fn start(data: Arc<tempfile::TempDir>) -> Server {
     let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/http");
     Server::on(data, &["--bind", "127.0.0.1:0", "--fps", "10", "--protocols", protocols])
 }
 
-async fn post(server: &Server, path: &str, body: Value) -> (StatusCode, Value) {
+pub async fn post(server: &Server, path: &str, body: Value) -> (StatusCode, Value) {
     let answer = server.post_as("operator", path).json(&body).send().await.unwrap();
     let status = answer.status();
     (status, serde_json::from_str(&answer.text().await.unwrap()).unwrap_or_default())
 }
 
-async fn order(server: &Server, record: bool) -> (StatusCode, Value) {
+pub async fn order(server: &Server, record: bool) -> (StatusCode, Value) {
     post(server, PATH, json!({ "record": record })).await
 }
 
 /// Asks how recording stands until it stands as `wanted`.
-async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
+pub async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
     let limit = SystemClock.now() + Duration::from_mins(1);
     loop {
         let status: Value = server.get_as("operator", PATH).send().await.unwrap().json().await.unwrap();
@@ -43,7 +45,7 @@ async fn until(server: &Server, wanted: impl Fn(&Value) -> bool) -> Value {
 }
 
 /// A session under way by `protocol`: its id.
-async fn begin(server: &Server, protocol: &str) -> String {
+pub async fn begin(server: &Server, protocol: &str) -> String {
     post(server, "/api/operator/participants", json!({"code": "S-05"})).await;
     let (_, made) = post(server, "/api/operator/sessions", json!({"participant": "S-05", "protocol": protocol})).await;
     let session = made["session"].as_str().unwrap().to_owned();
@@ -52,13 +54,13 @@ async fn begin(server: &Server, protocol: &str) -> String {
     session
 }
 
-async fn abort(server: &Server, session: &str) {
+pub async fn abort(server: &Server, session: &str) {
     let action = json!({"session": session, "action": "abort", "reason": "the test is over"});
     let (status, said) = post(server, "/api/operator/actions", action).await;
     assert_eq!(status, StatusCode::OK, "{said}");
 }
 
-fn recordings(server: &Server) -> PathBuf {
+pub fn recordings(server: &Server) -> PathBuf {
     server.data.path().join("recordings")
 }
 
@@ -131,15 +133,18 @@ async fn a_protocol_keeps_the_view_as_it_was_sent() {
     let folder = recordings(&server).join(&session);
     let pictures = std::fs::read(folder.join("view.mjpeg")).unwrap();
     let mut lines = csv::Reader::from_path(folder.join("view.csv")).unwrap();
-    assert_eq!(lines.headers().unwrap(), vec!["frame_number", "time_ns", "offset", "length"], "no focal power");
+    let columns = vec!["frame_number", "time_ns", "offset", "length", "width", "height"];
+    assert_eq!(lines.headers().unwrap(), columns, "no focal power");
 
     let mut end = 0;
     let mut last = (0, 0);
     for line in lines.deserialize() {
-        let (number, time, offset, length): (u64, u64, usize, usize) = line.unwrap();
+        let (number, time, offset, length, width, height): (u64, u64, usize, usize, u32, u32) = line.unwrap();
         assert!((number, time) > last && offset == end, "{number} {time} {offset}");
         let picture = image::load_from_memory(&pictures[offset..offset + length]).unwrap();
+        // Nobody looks: the size that every frame is made at.
         assert_eq!((picture.width(), picture.height()), (512, 272));
+        assert_eq!((width, height), (512, 272));
         last = (number, time);
         end = offset + length;
     }
@@ -147,6 +152,102 @@ async fn a_protocol_keeps_the_view_as_it_was_sent() {
 
     let header: Value = serde_json::from_slice(&std::fs::read(folder.join("view.json")).unwrap()).unwrap();
     assert_eq!((&header["session"], &header["ended"]["why"]), (&session.into(), &"stopped".into()));
+}
+
+/// Draws frames on `page` until the recording of the view in `folder` holds pictures that are `wanted`.
+async fn until_viewed(page: &mut Page, folder: &Path, wanted: impl Fn(&ViewRow) -> bool) -> ViewRow {
+    let limit = SystemClock.now() + Duration::from_mins(1);
+    loop {
+        let rows = ViewRecording::open(folder).map(|view| view.rows().to_vec()).unwrap_or_default();
+        if let Some(row) = rows.iter().rev().find(|row| wanted(row)) {
+            return *row;
+        }
+        assert!(SystemClock.now() < limit, "{:?}", rows.last());
+        page.watch(1).await;
+    }
+}
+
+#[tokio::test]
+async fn the_view_is_kept_at_the_size_that_the_surgeons_page_gets() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "viewed").await;
+    let folder = recordings(&server).join(&session);
+    let mut surgeon = Page::open(&server, "surgeon").await;
+
+    surgeon.say(json!({"type": "screen", "width": 1200})).await;
+    let half = surgeon.watch_until(|header| header["per_cell"] == 2).await;
+    let kept = until_viewed(&mut surgeon, &folder, |row| row.width == Some(1024)).await;
+    assert_eq!(kept.height, Some(544));
+    // Nobody else changes the size: the operator's screen is larger.
+    let mut operator = Page::open(&server, "operator").await;
+    operator.say(json!({"type": "screen", "width": 4000})).await;
+    let full = operator.watch_until(|header| header["per_cell"] == 4).await;
+    let later = until_viewed(&mut surgeon, &folder, |row| row.number >= full.number().max(half.number())).await;
+    assert_eq!(later.width, Some(1024));
+
+    surgeon.say(json!({"type": "screen", "width": 400})).await;
+    let small = surgeon.watch_until(|header| header["per_cell"] == 1).await;
+    let kept = until_viewed(&mut surgeon, &folder, |row| row.number > small.number() + 1).await;
+    assert_eq!(kept.width, Some(512));
+
+    abort(&server, &session).await;
+    until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
+    let view = ViewRecording::open(&folder).unwrap();
+    assert!(view.check().is_empty());
+    for (number, row) in view.rows().iter().enumerate() {
+        let picture = image::load_from_memory(&view.picture(number).unwrap()).unwrap();
+        assert_eq!((Some(picture.width()), Some(picture.height())), (row.width, row.height), "picture {number}");
+    }
+    assert!(view.rows().windows(2).all(|pair| pair[0].number < pair[1].number), "every frame once");
+}
+
+#[tokio::test]
+async fn a_restart_in_mid_session_goes_on_in_a_second_recording() {
+    let mut server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "recorded").await;
+    until(&server, |status| status["frames"].as_u64() >= Some(30)).await;
+    server.end(Signal::KILL);
+
+    let server = start(Arc::clone(&server.data));
+    let again = until(&server, |status| status["frames"].as_u64() >= Some(5)).await;
+    assert_eq!((&again["folder"], &again["by_protocol"]), (&format!("{session}-2").into(), &true.into()));
+    abort(&server, &session).await;
+    until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
+
+    let opened = |name: &str| Recording::open(&recordings(&server).join(name)).unwrap();
+    let first = opened(&session);
+    assert!(first.rows().len() >= 25 && first.check().is_empty());
+    assert_eq!((&first.header().ended, first.header().run), (&None, Some(1)));
+
+    let second = opened(&format!("{session}-2"));
+    assert!(second.rows().len() >= 5 && second.check().is_empty());
+    assert_eq!((&second.header().ended, second.header().run), (&Some(Ended::Stopped), Some(2)));
+    assert_eq!(second.header().session.as_deref(), Some(session.as_str()));
+}
+
+#[tokio::test]
+async fn the_operator_may_stop_what_a_protocol_records_and_the_session_goes_on_without() {
+    let server = start(Arc::new(tempfile::tempdir().unwrap()));
+    let session = begin(&server, "recorded").await;
+    until(&server, |status| status["frames"].as_u64() >= Some(5)).await;
+    let (status, said) = order(&server, false).await;
+    assert_eq!((status, &said["recording"]), (StatusCode::OK, &Value::Null));
+    assert_eq!(said["notice_warns"], false, "it ended as it was meant to: {said}");
+
+    // Looked at every second: by then a recording that were to begin anew would have.
+    let view: Value = server.get_as("operator", "/api/operator/session").send().await.unwrap().json().await.unwrap();
+    assert_eq!((&view["phase"], &view["session"]), (&"notice".into(), &session.clone().into()));
+    let acknowledge = json!({"session": session, "action": "acknowledge", "segment": view["segment"]});
+    let told = server.post_as("surgeon", "/api/surgeon/actions").json(&acknowledge).send().await.unwrap();
+    assert!(told.status().is_success(), "the trial goes on");
+    abort(&server, &session).await;
+    until(&server, |status| status["recording"].is_null() && status["seconds_left"].is_number()).await;
+
+    let mut folders = std::fs::read_dir(recordings(&server)).unwrap();
+    let recording = Recording::open(&folders.next().unwrap().unwrap().path()).unwrap();
+    assert!(recording.rows().len() >= 5 && recording.check().is_empty());
+    assert_eq!(recording.header().ended, Some(Ended::Stopped));
+    assert!(folders.next().is_none(), "it did not begin anew");
 }
 
 #[tokio::test]
@@ -157,6 +258,7 @@ async fn near_the_disks_end_recording_stops_by_itself_and_the_trial_goes_on() {
     let ended = until(&server, |status| status["recording"].is_null() && status["notice"].is_string()).await;
     let notice = ended["notice"].as_str().unwrap();
     assert!(notice.contains("nearly full; the trial goes on") || notice.contains("not being recorded"), "{notice}");
+    assert_eq!(ended["notice_warns"], true);
 
     let comment =
         json!({"key": "00000000-0000-4000-8000-000000000001", "session": session, "kind": "text", "text": "sharp"});

@@ -18,12 +18,24 @@ function draw(status) {
   recording = Boolean(status.recording);
   setText(byId("recording-now"), nowWords(status));
   setText(byId("recording-disk"), diskWords(status));
-  setText(byId("recording-notice"), (!recording && status.notice) || "");
-  byId("recording-notice").hidden = recording || !status.notice;
+  drawNotice(status);
   setText(byId("recording-unavailable"), recording ? "" : (status.unavailable ?? ""));
 
   setText(button, recording ? "Stop recording" : "Record mosaics");
   button.disabled = busy || (!recording && Boolean(status.unavailable));
+}
+
+/**
+ * What became of the last recording: a warning only where something went wrong.
+ *
+ * @param {Api.RecordingStatus} status
+ */
+function drawNotice({ notice, notice_warns: warns }) {
+  const line = byId("recording-notice");
+  line.className = warns ? "notice-line warn" : "notice-line";
+  line.setAttribute("role", warns ? "alert" : "status");
+  setText(line, (!recording && notice) || "");
+  line.hidden = recording || !notice;
 }
 
 async function refresh() {

@@ -1,10 +1,13 @@
-// One session as the researcher sees it: the timeline and the list of comments move together;
-// unblinding asks for a reason.
+// One session as the researcher sees it: the timeline, its recording and the list of comments move
+// together; unblinding asks for a reason.
 
 import { get, inWords, post } from "../shared/api.js";
 import { askReason } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
+import { drawMetric } from "./metric_drawing.js";
+import { Player } from "./player.js";
+import { lastComment, lengthOf, Scale } from "./timeline.js";
 import { drawTimeline } from "./timeline_drawing.js";
 import { commentWords, outstandingWords, setAsideWords } from "./timeline_words.js";
 
@@ -18,8 +21,18 @@ let timeline = null;
 /** @type {string[]} */
 let policies = [];
 let withPath = unblinded;
+/** Plays the recording of an unblinded session that has one. @type {Player | null} */
+let player = null;
 /** Points out a comment on the timeline. @type {(comment: number) => void} */
 let pointOut = () => {};
+/** Moves the playhead on the timeline. @type {(seconds: number) => void} */
+let movePlayhead = () => {};
+/** Turns pixels of the timeline into seconds. @type {Scale | null} */
+let scale = null;
+/** The last comment that playback has come past; -1 before the first. */
+let passed = -1;
+
+const NARROWEST_DRAWING = 320;
 /** @type {HTMLButtonElement[]} */
 let lines = [];
 /** @type {number | null} */
@@ -41,10 +54,57 @@ async function load() {
     }
     listComments(timeline.comments);
     listSetAside(timeline.set_aside);
+    if (unblinded) await openPlayer(timeline);
     new ResizeObserver(draw).observe(byId("timeline"));
   } catch (error) {
     setText(byId("timeline-trouble"), inWords(error));
   }
+}
+
+/**
+ * Offers to play what was recorded. Without a recording, the page is as it would be without this.
+ *
+ * @param {Api.Timeline} shown
+ */
+async function openPlayer(shown) {
+  try {
+    const { recordings, problems } = await get("/api/researcher/sessions/{session}/recordings", { session });
+    const lines = problems.map((problem) => make("p", { className: "notice-line warn" }, problem));
+    byId("recording-problems").replaceChildren(...lines);
+    if (recordings.length === 0) return;
+
+    player = new Player({
+      session,
+      timeline: shown,
+      policies,
+      recordings,
+      length: lengthOf(shown),
+      moved: followPlayhead,
+    });
+    byId("comments-play").hidden = shown.comments.length === 0;
+    byId("timeline").addEventListener("click", seek);
+  } catch (error) {
+    setText(byId("timeline-trouble"), `The recording cannot be played. ${inWords(error)}`);
+  }
+}
+
+/**
+ * Points out comments as playback comes past them.
+ *
+ * @param {number} seconds
+ * @param {boolean} playing
+ */
+function followPlayhead(seconds, playing) {
+  movePlayhead(seconds);
+  const last = lastComment(timeline?.comments ?? [], seconds);
+  if (playing && last > passed) choose(last);
+  passed = last;
+}
+
+/** @param {MouseEvent} event */
+function seek(event) {
+  const x = event.clientX - byId("timeline").getBoundingClientRect().left;
+  if (scale) player?.seek(scale.secondsAt(x));
 }
 
 /** @param {Api.TimelineComment[]} comments */
@@ -56,7 +116,7 @@ function listComments(comments) {
     const where = comment.setting ? `Setting ${comment.setting}` : "";
     return make(
       "button",
-      { type: "button", onclick: () => choose(index), onfocus: () => choose(index) },
+      { type: "button", onclick: () => jump(index), onfocus: () => choose(index) },
       make("span", { className: "when" }, clockText(comment.seconds)),
       make("span", { className: "muted" }, where),
       make("span", { className: "said" }, said, late && " ", late),
@@ -89,13 +149,56 @@ function choose(index) {
     if (other === index) line.setAttribute("aria-current", "true");
     else line.removeAttribute("aria-current");
   }
-  lines[index]?.scrollIntoView({ block: "nearest" });
+  const line = lines[index];
+  if (!line) return;
+  // While the recording plays, the page stays where its picture is.
+  if (player) scrollWithin(byId("comment-list"), line);
+  else line.scrollIntoView({ block: "nearest" });
+}
+
+/**
+ * Brings `line` into sight within `list`, and scrolls nothing else.
+ *
+ * @param {HTMLElement} list
+ * @param {HTMLElement} line
+ */
+function scrollWithin(list, line) {
+  const outer = list.getBoundingClientRect();
+  const inner = line.getBoundingClientRect();
+  if (inner.top < outer.top) list.scrollTop -= outer.top - inner.top;
+  else if (inner.bottom > outer.bottom) list.scrollTop += inner.bottom - outer.bottom;
+}
+
+/**
+ * Points out a comment, and plays what was seen before it.
+ *
+ * @param {number} index
+ */
+function jump(index) {
+  choose(index);
+  const comment = timeline?.comments[index];
+  if (comment) player?.playBefore(comment.seconds);
 }
 
 function draw() {
   if (!timeline) return;
   showKey(timeline);
-  pointOut = drawTimeline(byId("timeline"), timeline, { withPath, policies, choose });
+
+  const figure = byId("timeline");
+  scale = new Scale(lengthOf(timeline), Math.max(figure.clientWidth, NARROWEST_DRAWING));
+  const recorded = player?.spans ?? [];
+  const drawn = drawTimeline(figure, timeline, { scale, withPath, policies, recorded, choose, jump });
+  pointOut = drawn.pointOut;
+
+  const hasMetric = timeline.points.some(({ metric }) => metric != null);
+  byId("metric").hidden = !hasMetric;
+  const moveOnMetric = hasMetric ? drawMetric(byId("metric"), timeline, scale) : () => {};
+  movePlayhead = (seconds) => {
+    drawn.movePlayhead(seconds);
+    moveOnMetric(seconds);
+  };
+
+  if (player) movePlayhead(player.seconds);
   if (chosen !== null) pointOut(chosen);
 }
 
@@ -104,6 +207,8 @@ function showKey({ points, pauses }) {
   byId("key-path").hidden = !withPath;
   byId("key-optimum").hidden = !(withPath && points.some(({ optimal }) => optimal != null));
   byId("key-pause").hidden = pauses.length === 0;
+  byId("key-metric").hidden = !points.some(({ metric }) => metric != null);
+  byId("key-recorded").hidden = player === null;
 }
 
 /** @param {string} moment */

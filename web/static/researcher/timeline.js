@@ -48,6 +48,16 @@ export class Scale {
     return this.left + (seconds / this.total) * (this.right - this.left);
   }
 
+  /**
+   * The seconds at a pixel, within the timeline.
+   *
+   * @param {number} x
+   */
+  secondsAt(x) {
+    const share = (x - this.left) / (this.right - this.left);
+    return Math.min(Math.max(share, 0), 1) * this.total;
+  }
+
   /** @param {number} power focal power, from 0 to 1 */
   y(power) {
     return HEIGHT - EDGE.bottom - power * (HEIGHT - EDGE.top - EDGE.bottom);
@@ -100,13 +110,52 @@ export function powerOf(point) {
  * @param {number} seconds
  */
 export function powerAt(points, seconds) {
+  const nearest = nearestPoint(points, seconds);
+  return nearest ? powerOf(nearest) : MIDDLE;
+}
+
+/**
+ * The point nearest to `seconds`, if there is any.
+ *
+ * @param {Point[]} points
+ * @param {number} seconds
+ */
+export function nearestPoint(points, seconds) {
   const distance = (/** @type {Point} */ point) => Math.abs(point.seconds - seconds);
   /** @type {Point | null} */
   let nearest = null;
   for (const point of points) {
     if (nearest === null || distance(point) < distance(nearest)) nearest = point;
   }
-  return nearest ? powerOf(nearest) : MIDDLE;
+  return nearest;
+}
+
+/**
+ * The setting under way at `seconds`, from 1; null between settings.
+ *
+ * @param {Timeline["settings"]} settings
+ * @param {number} seconds
+ */
+export function settingAt(settings, seconds) {
+  const span = settings.find(
+    ({ from, to }) => from <= seconds && seconds <= (to ?? Number.POSITIVE_INFINITY),
+  );
+  return span?.setting ?? null;
+}
+
+/**
+ * The last comment said by `seconds`, by its place; -1 before the first.
+ *
+ * @param {{ seconds: number }[]} comments in whatever order
+ * @param {number} seconds
+ */
+export function lastComment(comments, seconds) {
+  let last = -1;
+  for (const [index, comment] of comments.entries()) {
+    const later = last < 0 || comment.seconds >= (comments[last]?.seconds ?? 0);
+    if (comment.seconds <= seconds && later) last = index;
+  }
+  return last;
 }
 
 /**
@@ -118,18 +167,59 @@ export function powerAt(points, seconds) {
  * @param {Scale} scale
  */
 export function linePath(points, value, scale) {
+  return brokenLine(
+    points,
+    value,
+    (seconds) => scale.x(seconds),
+    (power) => scale.y(power),
+  );
+}
+
+/**
+ * The line of the metric between `top` and `bottom`, as the `d` of an SVG path. The greatest metric of each setting
+ * lies at the top, 0 at the bottom.
+ *
+ * @param {Point[]} points
+ * @param {Scale} scale
+ * @param {number} top
+ * @param {number} bottom
+ */
+export function metricPath(points, scale, top, bottom) {
+  /** @type {Map<number, number>} */
+  const greatest = new Map();
+  for (const { setting, metric } of points) {
+    greatest.set(setting, Math.max(greatest.get(setting) ?? 0, metric ?? 0));
+  }
+
+  const share = (/** @type {Point} */ { setting, metric }) =>
+    metric == null ? null : metric / (greatest.get(setting) || 1);
+  return brokenLine(
+    points,
+    share,
+    (seconds) => scale.x(seconds),
+    (part) => bottom - part * (bottom - top),
+  );
+}
+
+/**
+ * @param {Point[]} points
+ * @param {(point: Point) => number | null | undefined} value
+ * @param {(seconds: number) => number} x
+ * @param {(value: number) => number} y
+ */
+function brokenLine(points, value, x, y) {
   /** @type {Point | null} */
   let before = null;
   let path = "";
 
   for (const point of points) {
-    const power = value(point);
-    if (power == null) {
+    const found = value(point);
+    if (found == null) {
       before = null;
       continue;
     }
     const goesOn = before !== null && before.setting === point.setting && before.frame < point.frame;
-    path += `${goesOn ? "L" : "M"}${scale.x(point.seconds).toFixed(1)} ${scale.y(power).toFixed(1)}`;
+    path += `${goesOn ? "L" : "M"}${x(point.seconds).toFixed(1)} ${y(found).toFixed(1)}`;
     before = point;
   }
   return path;

@@ -3,11 +3,12 @@
 
 import { make } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
-import { HEIGHT, lengthOf, linePath, powerAt, powerOf, Scale } from "./timeline.js";
+import { movePlayhead, playheadLine, shape } from "./svg.js";
+import { HEIGHT, linePath, powerAt, powerOf, Scale } from "./timeline.js";
 import { commentWords, description, setAsideWords } from "./timeline_words.js";
 
-const SVG = "http://www.w3.org/2000/svg";
-const NARROWEST_DRAWING = 320;
+/** The height of the strip that says what was recorded. */
+const STRIP = 4;
 
 /** A setting narrower than this shows its number alone. */
 const ROOM_FOR_A_NAME = 70;
@@ -17,23 +18,31 @@ const POLICY_NAME_WIDTH = 130;
 /** @typedef {{ group: Element, x: number, y: number }} Marker */
 
 /**
- * Draws `timeline` into `figure`. Returns a function that points out a comment.
+ * Draws `timeline` into `figure`.
  *
  * @param {HTMLElement} figure
  * @param {Timeline} timeline
  * @param {object} options
+ * @param {Scale} options.scale
  * @param {boolean} options.withPath whether to draw the focal path, which may tell policies apart
  * @param {string[]} options.policies the policy of each setting; empty while blinded
- * @param {(comment: number) => void} options.choose called when a comment's marker is pointed at or tapped
- * @returns {(comment: number) => void}
+ * @param {{ from: number, to: number }[]} options.recorded the spans of time that were recorded
+ * @param {(comment: number) => void} options.choose called when a comment's marker is pointed at
+ * @param {(comment: number) => void} options.jump called when a comment's marker is tapped
+ * @returns {{ pointOut: (comment: number) => void, movePlayhead: (seconds: number) => void }}
  */
-export function drawTimeline(figure, timeline, { withPath, policies, choose }) {
-  const scale = new Scale(lengthOf(timeline), Math.max(figure.clientWidth, NARROWEST_DRAWING));
+export function drawTimeline(figure, timeline, { scale, withPath, policies, recorded, choose, jump }) {
   const points = withPath ? timeline.points : [];
   const markers = timeline.comments.map((comment, index) => {
     const x = scale.x(comment.seconds);
     const y = scale.y(powerAt(points, comment.seconds));
-    return { group: commentMarker(comment, x, y, scale.y(0), () => choose(index)), x, y };
+    const group = commentMarker(
+      comment,
+      { x, y, foot: scale.y(0) },
+      () => choose(index),
+      () => jump(index),
+    );
+    return { group, x, y };
   });
 
   const svg = shape("svg", {
@@ -41,31 +50,36 @@ export function drawTimeline(figure, timeline, { withPath, policies, choose }) {
     role: "img",
     "aria-label": description(timeline, withPath),
   });
+  const playhead = playheadLine({ top: scale.y(1), bottom: scale.y(0) });
   svg.append(
     ...timeline.settings.flatMap((setting) => settingShapes(setting, policies, scale)),
     ...pauseShapes(timeline.pauses, scale),
+    ...recorded.map((span) => recordedShape(span, scale)),
     ...axes(scale, withPath),
     shape("path", { class: "optimum", d: linePath(points, ({ optimal }) => optimal, scale) }),
     shape("path", { class: "path", d: linePath(points, powerOf, scale) }),
+    playhead,
     ...markers.map(({ group }) => group),
     ...timeline.set_aside.map((answer) => setAsideMarker(answer, scale)),
   );
 
   const caption = make("figcaption");
   figure.replaceChildren(svg, caption);
-  return (index) => pointOut(figure, caption, markers, timeline.comments, index);
+  return {
+    pointOut: (index) => pointOut(figure, caption, markers, timeline.comments, index),
+    movePlayhead: (seconds) => movePlayhead(playhead, scale.x(seconds)),
+  };
 }
 
 /**
- * @param {string} tag
- * @param {Record<string, string | number>} attributes
- * @param {string} [text]
+ * A strip at the foot of the plot.
+ *
+ * @param {{ from: number, to: number }} span
+ * @param {Scale} scale
  */
-function shape(tag, attributes, text) {
-  const element = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  if (text !== undefined) element.textContent = text;
-  return element;
+function recordedShape(span, scale) {
+  const { x, width } = scale.box(span, 1);
+  return shape("rect", { class: "recorded", x, width, y: scale.y(0) - STRIP, height: STRIP });
 }
 
 /**
@@ -146,20 +160,23 @@ function axes(scale, withPower) {
 
 /**
  * @param {Api.TimelineComment} comment
- * @param {number} cx
- * @param {number} cy
- * @param {number} foot
+ * @param {{ x: number, y: number, foot: number }} place
  * @param {() => void} choose
+ * @param {() => void} jump
  */
-function commentMarker(comment, cx, cy, foot, choose) {
+function commentMarker(comment, { x, y, foot }, choose, jump) {
   const group = shape("g", { class: `marker ${comment.kind}` });
   group.append(
-    shape("line", { class: "stem", x1: cx, x2: cx, y1: cy, y2: foot }),
-    shape("circle", { cx, cy, r: 6 }),
-    shape("circle", { class: "hit", cx, cy, r: 20 }),
+    shape("line", { class: "stem", x1: x, x2: x, y1: y, y2: foot }),
+    shape("circle", { cx: x, cy: y, r: 6 }),
+    shape("circle", { class: "hit", cx: x, cy: y, r: 20 }),
   );
   group.addEventListener("pointerenter", choose);
-  group.addEventListener("click", choose);
+  group.addEventListener("click", (event) => {
+    // The drawing below would seek to the comment itself.
+    event.stopPropagation();
+    jump();
+  });
   return group;
 }
 

@@ -103,6 +103,23 @@ export async function get(path, names = {}) {
 }
 
 /**
+ * Gets the picture that the server has at `path`.
+ *
+ * @param {string} path
+ * @param {Record<string, string>} names what stands in place of each `{name}`
+ * @param {Record<string, string>} query
+ * @param {AbortSignal} signal ends the request when it is needed no longer
+ */
+export async function getPicture(path, names, query, signal) {
+  const response = await fetch(`${fill(path, names)}?${new URLSearchParams(query)}`, {
+    signal: AbortSignal.any([signal, AbortSignal.timeout(PATIENCE_MS)]),
+    cache: "no-store",
+  });
+  if (!response.ok) throw refusal(await response.text(), response.status);
+  return response.blob();
+}
+
+/**
  * Posts `body`, and returns the answer.
  *
  * @template {Api.PostPath} Path

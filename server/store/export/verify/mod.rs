@@ -17,7 +17,7 @@ pub use verdict::Verdict;
 
 use crate::store::Head;
 use crate::store::export::description::{
-    ALL, AccessRow, AnswerRow, CommentRow, DeviceRow, EventRow, RunRow, SegmentRow, SessionRow,
+    ALL, AccessRow, AnswerRow, CommentRow, DeviceRow, EventRow, RecordingRow, RunRow, SegmentRow, SessionRow,
 };
 use crate::store::export::folder::SUMS;
 use crate::store::export::table::{FORMAT, Row, Table};
@@ -197,7 +197,7 @@ const UNBLINDED: [(&str, u64); 5] = [
 ];
 
 /// Tables that session.json repeats.
-const COPIED: [Table; 8] = [
+const COPIED: [Table; 9] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -205,6 +205,7 @@ const COPIED: [Table; 8] = [
     AnswerRow::TABLE,
     EventRow::TABLE,
     DeviceRow::TABLE,
+    RecordingRow::TABLE,
     AccessRow::TABLE,
 ];
 

@@ -1,0 +1,63 @@
+//! `parfocal recording step`: what a policy sees in a recording, and what it would have asked of the lens.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::autofocus::{BlurRate, PolicyName, Registry, scripted, shipped};
+use crate::camera::calibration;
+use crate::cli::output::{Failure, print};
+use crate::files::replace;
+use crate::playback::stepping::Stepping;
+use crate::recording::Recording;
+
+/// Arguments of `parfocal recording step`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the recording.
+    folder: PathBuf,
+    /// The policy: a name of `parfocal policies`, or file:PATH of a TorchScript file.
+    #[arg(long, value_name = "NAME")]
+    policy: String,
+    /// The table to write: a row for each frame.
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+    /// Folder with weights of your own (`NAME.safetensors`) that replace those that ship.
+    #[arg(long, value_name = "DIR")]
+    weights: Option<PathBuf>,
+    /// How fast the optic blurs, for the policies that can use it: pixels for a change of focal power by 1.
+    #[arg(long, value_name = "PIXELS")]
+    blur: Option<BlurRate>,
+}
+
+/// Writes the table.
+///
+/// # Errors
+/// When there is no such recording or policy, a frame is damaged, or the table cannot be written; then there is no
+/// table.
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let recording = Recording::open(&arguments.folder)?;
+    if recording.rows().is_empty() {
+        return Err(format!("{} holds no frame to step a policy over", arguments.folder.display()).into());
+    }
+
+    let calibration = calibration::read(&recording.calibration())?;
+    let name = PolicyName::new(&arguments.policy);
+    let policy = registry(arguments, &name)?.build(&name)?;
+
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for step in Stepping::new(&recording, &calibration, policy) {
+        table.serialize(step?)?;
+    }
+
+    let bytes = table.into_inner().map_err(|error| io::Error::other(error.to_string()))?;
+    replace(&arguments.out, &bytes).map_err(|error| format!("cannot write {}: {error}", arguments.out.display()))?;
+    print(&format!("{} steps of {name} in {}\n", recording.rows().len(), arguments.out.display()))
+}
+
+fn registry(arguments: &Arguments, name: &PolicyName) -> Result<Registry, Failure> {
+    let mut registry = Registry::standard().knowing(arguments.blur);
+    if let Some(folder) = &arguments.weights {
+        registry = shipped::with_folder(registry, folder)?;
+    }
+    Ok(scripted::with_file(registry, name))
+}

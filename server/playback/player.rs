@@ -1,0 +1,175 @@
+//! Finds a session's recordings, and hands out their pictures.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use bytes::Bytes;
+use serde::Serialize;
+use tokio::task::spawn_blocking;
+use utoipa::ToSchema;
+
+use super::error::PlaybackError;
+use super::projector::{Projector, Slide};
+use crate::conductor::{Conductor, Played};
+use crate::ids::SessionId;
+use crate::imaging::Size;
+use crate::recording::{AnyRecording, FOLDER, Found, Kind, RecordingError, belonging, of_session};
+use crate::trial::protocol::Record;
+use crate::trial::role::Role;
+
+/// The recordings of a session, as far as they can be played.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SessionRecordings {
+    /// Those that can be played, in the order in which they were made.
+    pub recordings: Vec<RecordingCourse>,
+    /// What is wrong with others, or missing from these, in sentences.
+    pub problems: Vec<String>,
+}
+
+/// When the frames of a recording were exposed.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RecordingCourse {
+    /// Its name.
+    pub name: String,
+    /// What it is made of.
+    pub kind: Kind,
+    /// Its first frame, in seconds of the session's timeline; negative before the session's start.
+    pub from: f64,
+    /// Each frame, in whole milliseconds since the first. A frame is named by its place here, from 0.
+    pub times_ms: Vec<i64>,
+}
+
+/// Plays the recordings of sessions that were unblinded. Clone freely.
+#[derive(Clone)]
+pub struct Player(Arc<Shared>);
+
+struct Shared {
+    conductor: Conductor,
+    /// The folder of the recordings.
+    folder: PathBuf,
+    projector: Projector,
+    /// Sessions that the researcher may have played. Unblinding is never undone, so nobody need ask again.
+    playable: Mutex<BTreeSet<SessionId>>,
+}
+
+impl Player {
+    /// A player of the recordings in `folder`.
+    ///
+    /// # Errors
+    /// When the system has no thread left.
+    pub fn new(conductor: Conductor, folder: PathBuf) -> std::io::Result<Self> {
+        let projector = Projector::start()?;
+        Ok(Self(Arc::new(Shared { conductor, folder, projector, playable: Mutex::default() })))
+    }
+
+    /// The recordings of `session`, and when their frames were exposed.
+    ///
+    /// # Errors
+    /// When `by` may not play them (yet), there is no such session, or the database failed.
+    pub async fn recordings(&self, by: Role, session: SessionId) -> Result<SessionRecordings, PlaybackError> {
+        let played = self.0.conductor.to_play(by, session).await?;
+        let folder = self.0.folder.clone();
+        let found = spawn_blocking(move || of_session(&folder, &session.to_string()).map(|found| told(found, &played)));
+
+        let found = found.await.map_err(|_| PlaybackError::Ending)?;
+        Ok(found.unwrap_or_else(|error| SessionRecordings {
+            recordings: Vec::new(),
+            problems: vec![format!("The recordings cannot be looked for: {error}.")],
+        }))
+    }
+
+    /// Frame `number` of recording `name` of `session` as JPEG: of the view as it was recorded; of mosaics developed at
+    /// `size`.
+    ///
+    /// # Errors
+    /// When `by` may not play it (yet), there is no such recording or frame, or it is damaged.
+    pub async fn picture(
+        &self,
+        by: Role,
+        session: SessionId,
+        name: &str,
+        number: usize,
+        size: Size,
+    ) -> Result<Bytes, PlaybackError> {
+        self.check(by, session).await?;
+
+        let recordings = self.0.folder.clone();
+        let named = name.to_owned();
+        let folder = spawn_blocking(move || belonging(&recordings, &named, &session.to_string())).await;
+        let folder = folder.map_err(|_| PlaybackError::Ending)?.ok_or_else(|| {
+            PlaybackError::NotFound(format!("the session has no recording {name} in the folder {FOLDER} any more"))
+        })?;
+        self.0.projector.picture(Slide { folder, number, size }).await
+    }
+
+    async fn check(&self, by: Role, session: SessionId) -> Result<(), PlaybackError> {
+        let known = by == Role::Researcher && self.playable().contains(&session);
+        if !known {
+            self.0.conductor.to_play(by, session).await?;
+            self.playable().insert(session);
+        }
+        Ok(())
+    }
+
+    fn playable(&self) -> std::sync::MutexGuard<'_, BTreeSet<SessionId>> {
+        self.0.playable.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What is told of the recordings that were found.
+fn told(found: Vec<Found>, played: &Played) -> SessionRecordings {
+    let mut told = SessionRecordings { recordings: Vec::new(), problems: Vec::new() };
+    if found.is_empty() && played.asked != Record::None {
+        told.problems.push(format!(
+            "The protocol asked for a recording, but there is none of this session in the folder {FOLDER} of the data \
+             folder. It was moved or removed, or never begun."
+        ));
+    }
+
+    for (name, opened) in found {
+        match opened {
+            Ok(recording) => tell(&name, &recording, played, &mut told),
+            Err(error) => told.problems.push(format!("The recording {name} cannot be played. {}", sentence(&error))),
+        }
+    }
+    told.recordings.sort_by(|a, b| a.from.total_cmp(&b.from));
+    told
+}
+
+fn tell(name: &str, recording: &AnyRecording, played: &Played, told: &mut SessionRecordings) {
+    if recording.ended().is_none() && played.ended {
+        told.problems.push(format!("The recording {name} was cut short. What was stored before can be played."));
+    }
+
+    let times = recording.times();
+    let Some(&first) = times.first() else {
+        told.problems.push(format!("The recording {name} holds no frame."));
+        return;
+    };
+
+    // By the monotonic clock where the recording knows it: then nobody who set the clock has moved the pictures.
+    let from = match recording.clock() {
+        Some((run, monotonic_ns)) => played.seconds_at(run, monotonic_ns.saturating_add(first)),
+        None => played.seconds_of(recording.started()) + nanoseconds(first),
+    };
+    told.recordings.push(RecordingCourse {
+        name: name.to_owned(),
+        kind: recording.kind(),
+        from,
+        times_ms: times.iter().map(|time| time.saturating_sub(first) / 1_000_000).collect(),
+    });
+}
+
+/// Nanoseconds in seconds.
+fn nanoseconds(count: i64) -> f64 {
+    count as f64 / 1e9
+}
+
+/// An error as a sentence of its own.
+fn sentence(error: &RecordingError) -> String {
+    let text = error.to_string();
+    let mut letters = text.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
+}

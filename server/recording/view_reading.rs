@@ -1,0 +1,139 @@
+//! Reads a recording of the view, whether it was ended or cut short.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::error::{Damage, RecordingError};
+use super::view::{HEADER, INDEX, PICTURES, VIEW_FORMAT, VIEW_VERSION, ViewHeader};
+
+/// The first and the last two bytes of a JPEG picture.
+const JPEG_BEGINS: [u8; 2] = [0xFF, 0xD8];
+const JPEG_ENDS: [u8; 2] = [0xFF, 0xD9];
+
+/// A picture of the view, and where it lies in the file of pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub struct ViewRow {
+    /// The camera's number of the frame.
+    #[serde(rename = "frame_number")]
+    pub number: u64,
+    /// End of the exposure, nanoseconds since the recording's start.
+    #[serde(rename = "time_ns")]
+    pub time: u64,
+    /// Its first byte.
+    pub offset: u64,
+    /// Its bytes.
+    pub length: u64,
+    /// Its width in pixels; none in recordings of earlier versions.
+    #[serde(default)]
+    pub width: Option<u32>,
+    /// Its height in pixels; none in recordings of earlier versions.
+    #[serde(default)]
+    pub height: Option<u32>,
+}
+
+/// A recording of the view: its description and the places of its pictures, which stay on disk.
+pub struct ViewRecording {
+    folder: PathBuf,
+    header: ViewHeader,
+    rows: Vec<ViewRow>,
+}
+
+impl ViewRecording {
+    /// Opens the recording in `folder`.
+    ///
+    /// # Errors
+    /// When there is none, it is of another version, or its description or index is invalid.
+    pub fn open(folder: &Path) -> Result<Self, RecordingError> {
+        let path = folder.join(HEADER);
+        let text = fs::read(&path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound | ErrorKind::NotADirectory => RecordingError::NoRecording(folder.to_owned()),
+            _ => RecordingError::unreadable(&path)(error),
+        })?;
+
+        let header: ViewHeader = serde_json::from_slice(&text).map_err(|e| RecordingError::nonsense(&path, e))?;
+        if header.format != VIEW_FORMAT {
+            return Err(RecordingError::NoRecording(folder.to_owned()));
+        }
+        if header.version != VIEW_VERSION {
+            return Err(RecordingError::OtherVersion { path: folder.to_owned(), found: header.version });
+        }
+
+        let rows = read_index(folder)?;
+        Ok(Self { folder: folder.to_owned(), header, rows })
+    }
+
+    /// Its folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// How it was made.
+    #[must_use]
+    pub const fn header(&self) -> &ViewHeader {
+        &self.header
+    }
+
+    /// Its pictures, in order.
+    #[must_use]
+    pub fn rows(&self) -> &[ViewRow] {
+        &self.rows
+    }
+
+    /// Bytes of its pictures.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.rows.iter().map(|row| row.length).sum()
+    }
+
+    /// Picture `number`, from 0, as JPEG.
+    ///
+    /// # Errors
+    /// When there is no such picture, or its file cannot be read or is damaged.
+    pub fn picture(&self, number: usize) -> Result<Vec<u8>, RecordingError> {
+        let Some(row) = self.rows.get(number) else {
+            let frames = self.rows.len();
+            return Err(RecordingError::NoFrame { path: self.folder.clone(), frames, asked: number });
+        };
+
+        let path = self.folder.join(PICTURES);
+        let damaged = || RecordingError::Damaged { path: path.clone(), damage: Damage::Picture(number) };
+        let mut file = File::open(&path).map_err(RecordingError::unreadable(&path))?;
+        file.seek(SeekFrom::Start(row.offset)).map_err(RecordingError::unreadable(&path))?;
+
+        let mut jpeg = Vec::new();
+        file.take(row.length).read_to_end(&mut jpeg).map_err(RecordingError::unreadable(&path))?;
+
+        let whole = jpeg.len() as u64 == row.length && jpeg.starts_with(&JPEG_BEGINS) && jpeg.ends_with(&JPEG_ENDS);
+        if whole { Ok(jpeg) } else { Err(damaged()) }
+    }
+
+    /// Reads every picture; what is wrong with each that is not whole.
+    #[must_use]
+    pub fn check(&self) -> Vec<String> {
+        (0..self.rows.len()).filter_map(|number| self.picture(number).err()).map(|error| error.to_string()).collect()
+    }
+}
+
+/// The index's rows up to the last one that is whole and whose picture is there: a program or machine that ended in the
+/// middle may leave a line half written, or pictures that the disk never got.
+fn read_index(folder: &Path) -> Result<Vec<ViewRow>, RecordingError> {
+    let path = folder.join(INDEX);
+    let text = fs::read_to_string(&path).map_err(RecordingError::unreadable(&path))?;
+    let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+
+    let mut rows: Vec<ViewRow> = csv::Reader::from_reader(whole.as_bytes())
+        .deserialize()
+        .collect::<Result<_, csv::Error>>()
+        .map_err(|error| RecordingError::nonsense(&path, error))?;
+
+    let pictures = folder.join(PICTURES);
+    let bytes = fs::metadata(&pictures).map_err(RecordingError::unreadable(&pictures))?.len();
+    let there = |row: &ViewRow| row.offset.checked_add(row.length).is_some_and(|end| end <= bytes);
+    let kept = rows.iter().rposition(there).map_or(0, |last| last + 1);
+    rows.truncate(kept);
+    Ok(rows)
+}

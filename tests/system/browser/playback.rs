@@ -1,0 +1,190 @@
+//! The researcher plays a session's recording: in step with its timeline, from a comment, frame by frame.
+
+use serde_json::{Value, json};
+
+use super::driver::{Browser, Driver};
+use super::screenshots::shoot;
+use super::theatre::Theatre;
+use super::wait::until;
+
+const SCRUB: &str = "#player-scrub";
+
+/// Presses a key on the page, wherever its focus is.
+async fn press(page: &Browser, key: &str) {
+    for kind in ["keyDown", "keyUp"] {
+        let text = if key == " " && kind == "keyDown" { " " } else { "" };
+        page.tools("Input.dispatchKeyEvent", json!({"type": kind, "key": key, "text": text})).await;
+    }
+}
+
+/// Clicks on a place of the page, which must be in sight.
+async fn tap(page: &Browser, x: f64, y: f64) {
+    for kind in ["mousePressed", "mouseReleased"] {
+        let click = json!({"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1});
+        page.tools("Input.dispatchMouseEvent", click).await;
+    }
+}
+
+/// Seconds of the timeline at which the playhead stands.
+async fn playhead(page: &Browser) -> f64 {
+    page.value(SCRUB).await.parse().unwrap()
+}
+
+/// The frame that is drawn, counted over all recordings; -1 before the first is.
+async fn drawn(page: &Browser) -> i64 {
+    let frame = page.attribute("#player-picture", "data-frame").await;
+    frame.and_then(|frame| frame.parse().ok()).unwrap_or(-1)
+}
+
+async fn until_drawn(page: &Browser, frame: i64) {
+    until(&format!("frame {frame} to be drawn"), || async { drawn(page).await == frame }).await;
+}
+
+/// Width of the picture on the page, and its mean brightness from 0 to 255.
+async fn picture(page: &Browser) -> (u64, f64) {
+    let look = "const canvas = document.getElementById('player-picture');
+        const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+        return [canvas.width, data.reduce((sum, value, index) => sum + (index % 4 < 3 ? value : 0), 0)
+            / (0.75 * data.length)];";
+    let found = page.run(look, &[]).await;
+    (found[0].as_u64().unwrap(), found[1].as_f64().unwrap())
+}
+
+/// Where the playhead's line stands on the drawing `css`.
+async fn line(page: &Browser, css: &str) -> f64 {
+    page.attribute(&format!("{css} .playhead"), "x1").await.unwrap().parse().unwrap()
+}
+
+/// A session of two settings with a comment in each, recorded, which has ended.
+async fn session(theatre: &Theatre) {
+    theatre.begin("S-08", "filmed").await;
+    for (setting, comment) in [(1_u32, "Sharp where I look"), (2, "It wanders")] {
+        theatre.tap_notice(setting as usize).await;
+        // Long enough for three seconds before the comment.
+        until("some seconds of recording", || async {
+            let said = theatre.operator.text("#recording-now").await;
+            said.contains("frames") && recorded_seconds(&said) >= 5.0 * f64::from(setting)
+        })
+        .await;
+        theatre.say(comment, setting as usize).await;
+        theatre.finish().await;
+    }
+    theatre.operator.sees("#phase", "Completed").await;
+    theatre.operator.sees("#recording-notice", "frames are saved in").await;
+}
+
+/// The seconds in `Recording mosaics, as the protocol asks: 12 s, 120 frames, 190 MB.`
+fn recorded_seconds(said: &str) -> f64 {
+    let length = said.split(": ").nth(1).and_then(|rest| rest.split(" s,").next());
+    length.and_then(|seconds| seconds.parse().ok()).unwrap_or(0.0)
+}
+
+async fn open_session(theatre: &Theatre) {
+    let page = &theatre.operator;
+    page.open(&theatre.server.url(&format!("/enter?key={}", theatre.server.key("researcher")))).await;
+    page.click("td a.button").await;
+    page.sees("#comment-list", "It wanders").await;
+}
+
+async fn unblind(page: &Browser) {
+    page.click("#unblind").await;
+    page.type_into("#reason", "Analysis begins").await;
+    page.sees("#reason-confirm", "Unblind anyway").await;
+    page.click("#reason-confirmed").await;
+    page.click("#reason-go").await;
+    page.sees(".unblinded", "mgm-hill-climber").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_researcher_plays_a_recording_with_its_timeline_and_comments() {
+    let driver = Driver::start();
+    let theatre = Theatre::open(&driver).await;
+    session(&theatre).await;
+    let page = &theatre.operator;
+
+    open_session(&theatre).await;
+    until("the timeline", || async { page.count("#timeline .segment").await == 2 }).await;
+    assert_eq!(page.count("#player").await, 0, "a blinded session shows no more than before");
+    assert!(page.is("#metric", "hidden").await && page.is("#comments-play", "hidden").await);
+    assert_eq!(page.count("#timeline .recorded").await, 0);
+    page.click("#show-path").await;
+    until("the focal path", || async {
+        page.attribute("#timeline .path", "d").await.is_some_and(|path| path.len() > 100)
+    })
+    .await;
+    assert!(page.is("#metric", "hidden").await, "the path comes without the metric");
+
+    unblind(page).await;
+    until_drawn(page, 0).await;
+    let (width, brightness) = picture(page).await;
+    assert!(width == 512 && brightness > 10.0, "{width} {brightness}");
+    page.sees("#player-values", "Focal power").await;
+    assert!(page.attribute("#metric .metric", "d").await.unwrap().len() > 100);
+    assert!(page.count("#timeline .recorded").await >= 1);
+
+    // Frame by frame, by the buttons and by the keyboard.
+    page.click("#player-forward").await;
+    until_drawn(page, 1).await;
+    press(page, "ArrowRight").await;
+    until_drawn(page, 2).await;
+    press(page, "ArrowLeft").await;
+    until_drawn(page, 1).await;
+
+    // It plays at the recording's pace at most, and the lines on the drawings go with it.
+    let from = playhead(page).await;
+    let before = line(page, "#timeline").await;
+    page.click("#player-play").await;
+    until("playback to come on", || async { drawn(page).await >= 10 }).await;
+    press(page, " ").await;
+    // The button has the focus still, and takes the space as its own.
+    page.sees("#player-play", "Play").await;
+    assert!(playhead(page).await > from);
+    assert!(line(page, "#timeline").await > before);
+    assert!((line(page, "#timeline").await - line(page, "#metric").await).abs() < 0.2);
+
+    // From three seconds before a comment.
+    let comments = comment_seconds(page).await;
+    page.click("#comment-list li:last-child button").await;
+    page.sees("#timeline figcaption", "It wanders").await;
+    page.sees("#player-play", "Pause").await;
+    page.click("#player-play").await;
+    let at = playhead(page).await;
+    let expected = comments[1] - 3.0;
+    assert!(at >= expected - 0.01 && at < comments[1] + 3.0, "{at} after {expected}");
+    page.run("document.activeElement.blur()", &[]).await;
+    page.sees("#player-values", "2, ").await;
+    page.to_top().await;
+    shoot(page, "researcher-6-playback").await;
+
+    // A place on the drawing, and finer pictures.
+    let there = page.area("#timeline").await;
+    tap(page, there.left + 44.0, there.top + 230.0).await;
+    until("the playhead to be at the start", || async { playhead(page).await < 0.5 }).await;
+    page.select("#player-size", "half").await;
+    until("a fine picture", || async { picture(page).await.0 == 1024 }).await;
+
+    assert_eq!(page.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
+
+    // A recording that was moved away.
+    let recordings = theatre.server.data.path().join("recordings");
+    std::fs::rename(&recordings, theatre.server.data.path().join("moved")).unwrap();
+    page.reload().await;
+    page.sees("#recording-problems", "It was moved or removed").await;
+    until("the timeline all the same", || async {
+        page.attribute("#timeline .path", "d").await.is_some_and(|path| path.len() > 100)
+    })
+    .await;
+    page.sees_no("#player").await;
+    page.to_top().await;
+    shoot(page, "researcher-7-recording-gone").await;
+}
+
+/// When the comments were said, by the server's word, in seconds of the timeline.
+async fn comment_seconds(page: &Browser) -> Vec<f64> {
+    let session = page.attribute("#session", "data-session").await.unwrap();
+    let ask = "return fetch(arguments[0]).then((answer) => answer.json())";
+    let path = format!("/api/researcher/sessions/{session}/course");
+    let course: Value = page.run(ask, &[json!(path)]).await;
+    let comments = course["comments"].as_array().unwrap();
+    comments.iter().map(|comment| comment["seconds"].as_f64().unwrap()).collect()
+}

@@ -1,0 +1,44 @@
+// Playback in words.
+
+import { nearestPoint, powerOf, settingAt } from "./timeline.js";
+
+/** Values further than this from the moment on screen say nothing about it. In seconds. */
+const NEAR = 2;
+
+/**
+ * A moment as `1:05.2`.
+ *
+ * @param {number} seconds
+ */
+export function momentText(seconds) {
+  const tenths = Math.floor(Math.abs(seconds) * 10 + 1e-6);
+  const minutes = Math.floor(tenths / 600);
+  const rest = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
+  return `${seconds < 0 && tenths > 0 ? "−" : ""}${minutes}:${rest}`;
+}
+
+/**
+ * What is known of the moment on screen, as names and values.
+ *
+ * @param {Api.Timeline} timeline
+ * @param {string[]} policies
+ * @param {number} seconds
+ * @returns {[string, string][]}
+ */
+export function valuesAt(timeline, policies, seconds) {
+  /** @type {[string, string][]} */
+  const values = [];
+  const setting = settingAt(timeline.settings, seconds);
+  const policy = setting === null ? undefined : policies[setting - 1];
+  const none = "none under way";
+  values.push(["Setting", setting === null ? none : `${setting}${policy ? `, ${policy}` : ""}`]);
+
+  const point = setting === null ? null : nearestPoint(timeline.points, seconds);
+  const near = point && point.setting === setting && Math.abs(point.seconds - seconds) <= NEAR ? point : null;
+  values.push(["Focal power", near ? powerOf(near).toFixed(3) : "–"]);
+  if (timeline.points.some(({ optimal }) => optimal != null)) {
+    values.push(["Optimum", near?.optimal == null ? "–" : near.optimal.toFixed(3)]);
+  }
+  values.push(["Metric", near?.metric == null ? "–" : near.metric.toPrecision(4)]);
+  return values;
+}

@@ -1,0 +1,88 @@
+// The frames of a session's recordings on its timeline: which one was on screen at a moment, and which follow.
+
+/** @typedef {Pick<Api.RecordingCourse, "name" | "kind" | "from" | "times_ms">} Recording */
+
+/** A frame is on screen until the next, but not for longer than this: then nothing was recorded. In seconds. */
+export const LONGEST = 1;
+
+/** The frames of all recordings, in the order in which they were exposed. A frame is named by its place here. */
+export class Track {
+  /** @type {{ seconds: number, recording: Recording, frame: number }[]} */
+  #frames;
+
+  /** @param {Recording[]} recordings */
+  constructor(recordings) {
+    const frames = recordings.flatMap((recording) =>
+      recording.times_ms.map((ms, frame) => ({ seconds: recording.from + ms / 1000, recording, frame })),
+    );
+    this.#frames = frames.sort((a, b) => a.seconds - b.seconds);
+  }
+
+  get length() {
+    return this.#frames.length;
+  }
+
+  /**
+   * When frame `index` was exposed, in seconds of the timeline; the nearest frame's beyond either end.
+   *
+   * @param {number} index
+   */
+  secondsOf(index) {
+    const inside = Math.min(Math.max(index, 0), this.length - 1);
+    return this.#frames[inside]?.seconds ?? 0;
+  }
+
+  /**
+   * The recording of frame `index`, and its place in it.
+   *
+   * @param {number} index
+   */
+  place(index) {
+    return this.#frames[index];
+  }
+
+  /**
+   * The last frame exposed by `seconds`; -1 before the first.
+   *
+   * @param {number} seconds
+   */
+  before(seconds) {
+    let from = 0;
+    let to = this.length;
+    while (from < to) {
+      const middle = (from + to) >> 1;
+      if (this.secondsOf(middle) <= seconds) from = middle + 1;
+      else to = middle;
+    }
+    return from - 1;
+  }
+
+  /**
+   * The frame that was on screen at `seconds`; null where nothing was recorded.
+   *
+   * @param {number} seconds
+   */
+  at(seconds) {
+    const index = this.before(seconds);
+    return index >= 0 && seconds - this.secondsOf(index) <= LONGEST ? index : null;
+  }
+
+  /** Frames a second, as most of them follow one another; 0 of fewer than two. */
+  get rate() {
+    const gaps = this.#frames.slice(1).map(({ seconds }, index) => seconds - this.secondsOf(index));
+    const middle = gaps.sort((a, b) => a - b)[gaps.length >> 1];
+    return middle ? 1 / middle : 0;
+  }
+
+  /** The spans of the timeline that were recorded. */
+  spans() {
+    /** @type {{ from: number, to: number }[]} */
+    const spans = [];
+    for (const { seconds } of this.#frames) {
+      const last = spans.at(-1);
+      if (last && seconds - last.to <= LONGEST) last.to = seconds;
+      else spans.push({ from: seconds, to: seconds });
+    }
+    return spans;
+  }
+}

@@ -1,0 +1,268 @@
+// Playing a recording: which frame is on screen when, how playback moves, and how its pictures come.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Pictures } from "../static/researcher/pictures.js";
+import { momentText, valuesAt } from "../static/researcher/player_words.js";
+import { Playhead } from "../static/researcher/playhead.js";
+import { lastComment, metricPath, Scale, settingAt } from "../static/researcher/timeline.js";
+import { Track } from "../static/researcher/track.js";
+
+/**
+ * A recording of `count` frames, one every `ms` milliseconds.
+ *
+ * @param {string} name
+ * @param {number} from
+ * @param {number} count
+ * @param {number} [ms]
+ * @returns {Api.RecordingCourse}
+ */
+const recording = (name, from, count, ms = 100) => ({
+  name,
+  kind: "mosaic",
+  from,
+  times_ms: Array.from({ length: count }, (_, frame) => frame * ms),
+});
+
+const always = () => true;
+
+test("a frame is on screen from its exposure to the next, and nothing where nothing was recorded", () => {
+  // The later one is listed first: 10 to 10.4 s, and 20 to 20.4 s after a restart.
+  const track = new Track([recording("S-2", 20, 5), recording("S", 10, 5)]);
+  assert.equal(track.length, 10);
+  assert.deepEqual(
+    [9.9, 10, 10.05, 10.1, 10.4, 11.3, 11.5, 20.1].map((seconds) => track.at(seconds)),
+    [null, 0, 0, 1, 4, 4, null, 6],
+  );
+  assert.deepEqual([track.place(0)?.recording.name, track.place(0)?.frame], ["S", 0]);
+  assert.deepEqual([track.place(7)?.recording.name, track.place(7)?.frame], ["S-2", 2]);
+  assert.deepEqual(track.spans(), [
+    { from: 10, to: 10.4 },
+    { from: 20, to: 20.4 },
+  ]);
+  assert.ok(Math.abs(track.rate - 10) < 1e-6);
+});
+
+test("playback keeps the recording's pace, passes over gaps, and stops at the end", () => {
+  const track = new Track([recording("S", 10, 5), recording("S-2", 20, 5)]);
+  const playhead = new Playhead(track);
+  assert.deepEqual([playhead.seconds, playhead.frame], [10, 0]);
+
+  playhead.play();
+  playhead.advance(0.25, always);
+  assert.deepEqual([playhead.seconds, playhead.frame], [10.25, 2]);
+  playhead.speed = 2;
+  playhead.advance(0.05, always);
+  assert.equal(playhead.frame, 3);
+
+  // From 10.35 s, 2 s later: past the end of the first recording.
+  playhead.advance(1, always);
+  assert.deepEqual([playhead.seconds, playhead.frame], [20, 5]);
+  playhead.advance(5, always);
+  assert.deepEqual([playhead.frame, playhead.playing], [9, false]);
+
+  playhead.play();
+  assert.equal(playhead.frame, 0, "from the start again");
+});
+
+test("playback waits for a picture that has not come, and shows what has", () => {
+  const playhead = new Playhead(new Track([recording("S", 0, 100, 40)]));
+  playhead.play();
+  const upToThree = (/** @type {number} */ frame) => frame <= 3;
+  playhead.advance(0.2, upToThree);
+  assert.deepEqual([playhead.frame, playhead.waiting], [3, true]);
+  playhead.advance(0.2, upToThree);
+  assert.deepEqual([playhead.frame, playhead.waiting], [3, true], "and loses no time meanwhile");
+  playhead.advance(0.04, always);
+  assert.deepEqual([playhead.frame, playhead.waiting], [4, false]);
+});
+
+test("steps go frame by frame, over gaps too, and pause", () => {
+  const playhead = new Playhead(new Track([recording("S", 10, 3), recording("S-2", 20, 3)]));
+  playhead.play();
+  playhead.step(1);
+  assert.deepEqual([playhead.frame, playhead.playing], [1, false]);
+  playhead.step(1);
+  playhead.step(1);
+  assert.equal(playhead.frame, 3);
+  playhead.step(-1);
+  assert.equal(playhead.frame, 2);
+  playhead.step(-9);
+  assert.equal(playhead.frame, 0);
+
+  playhead.seek(15);
+  assert.equal(playhead.frame, null);
+  playhead.step(-1);
+  assert.equal(playhead.frame, 2, "the frame before the gap");
+  playhead.seek(15);
+  playhead.step(1);
+  assert.equal(playhead.frame, 3);
+  playhead.seek(5);
+  playhead.step(1);
+  assert.equal(playhead.frame, 0, "before the first frame");
+});
+
+test("fast playback needs no more pictures than can be told apart", () => {
+  // 50 a second, at four times the pace: 200, of which every seventh makes 29 a second.
+  const playhead = new Playhead(new Track([recording("S", 0, 1000, 20)]));
+  playhead.speed = 4;
+  playhead.play();
+  assert.deepEqual(playhead.needed(4), [0, 7, 14, 21]);
+  playhead.pause();
+  playhead.seek(0.1);
+  assert.deepEqual(playhead.needed(4), [5, 6, 4, 7], "the neighbours, where it stands");
+});
+
+/** Loads that a test ends itself. */
+function fakeServer() {
+  /** @type {Map<number, { resolve: (picture: string) => void, reject: (error: unknown) => void }>} */
+  const asked = new Map();
+  /** @type {number[]} */
+  const aborted = [];
+  return {
+    asked,
+    aborted,
+    /** @type {(frame: number, signal: AbortSignal) => Promise<string>} */
+    load: (frame, signal) =>
+      new Promise((resolve, reject) => {
+        asked.set(frame, { resolve, reject });
+        signal.addEventListener("abort", () => {
+          aborted.push(frame);
+          reject(new Error("aborted"));
+        });
+      }),
+  };
+}
+
+const settled = () => new Promise((done) => setImmediate(done));
+
+test("pictures are asked for a few at a time, the most urgent first, and no longer when not needed", async () => {
+  const server = fakeServer();
+  /** @type {number[]} */
+  const arrived = [];
+  const pictures = new Pictures({
+    load: server.load,
+    explain: () => null,
+    arrived: (frame) => arrived.push(frame),
+    failed: (error) => assert.fail(String(error)),
+    atOnce: 2,
+  });
+
+  pictures.want([5, 6, 7]);
+  assert.deepEqual([...server.asked.keys()], [5, 6]);
+  server.asked.get(5)?.resolve("five");
+  await settled();
+  assert.deepEqual([arrived, [...server.asked.keys()]], [[5], [5, 6, 7]]);
+  assert.deepEqual(pictures.get(5), { picture: "five", problem: null });
+
+  pictures.want([40]);
+  await settled();
+  assert.deepEqual(server.aborted, [6, 7]);
+  assert.equal(server.asked.has(40), true);
+});
+
+test("a frame that the server cannot read is told once, and a server that does not answer is no damage", async () => {
+  const server = fakeServer();
+  /** @type {unknown[]} */
+  const failed = [];
+  const pictures = new Pictures({
+    load: server.load,
+    explain: (error) => (error === "damaged" ? "frame 3 is damaged" : null),
+    arrived: () => {},
+    failed: (error) => failed.push(error),
+  });
+
+  pictures.want([3, 4]);
+  server.asked.get(3)?.reject("damaged");
+  server.asked.get(4)?.reject("no answer");
+  await settled();
+  assert.deepEqual(pictures.get(3), { picture: null, problem: "frame 3 is damaged" });
+  assert.equal(pictures.get(4), undefined);
+  assert.deepEqual(failed, ["no answer"]);
+});
+
+test("pictures far behind are forgotten, those that are needed stay", async () => {
+  const server = fakeServer();
+  const pictures = new Pictures({
+    load: async (frame, signal) => {
+      server.load(frame, signal).catch(() => {});
+      return String(frame);
+    },
+    explain: () => null,
+    arrived: () => {},
+    failed: (error) => assert.fail(String(error)),
+    kept: 3,
+  });
+  for (const frames of [[0, 1], [2, 3], [4]]) {
+    pictures.want(frames);
+    await settled();
+  }
+  assert.deepEqual(
+    [0, 1, 2, 3, 4].map((frame) => pictures.get(frame)?.picture),
+    [undefined, undefined, "2", "3", "4"],
+  );
+  pictures.clear();
+  assert.equal(pictures.get(4), undefined);
+});
+
+/** @type {Api.Timeline} */
+const TIMELINE = {
+  comments: [],
+  pauses: [],
+  set_aside: [],
+  settings: [
+    { setting: 1, from: 0, to: 10 },
+    { setting: 2, from: 12, to: 20 },
+  ],
+  points: [
+    { setting: 1, seconds: 0, frame: 1, asked: 0.5, measured: 0.45, metric: 10 },
+    { setting: 1, seconds: 10, frame: 2, asked: 0.6, measured: 0.55, metric: 20 },
+    { setting: 2, seconds: 12, frame: 3, asked: 0.5, metric: 0.5 },
+    { setting: 2, seconds: 20, frame: 4, asked: 0.7, metric: 0.25 },
+  ],
+};
+
+test("the metric's line reaches the top in every setting", () => {
+  // 1000 pixels for 100 seconds, from 44 on; 0 at 88, the greatest of a setting at 8.
+  const scale = new Scale(100, 1056);
+  assert.equal(metricPath(TIMELINE.points, scale, 8, 88), "M44.0 48.0L144.0 8.0M164.0 8.0L244.0 48.0");
+});
+
+test("a pixel of the drawing is a moment, within the timeline", () => {
+  const scale = new Scale(100, 1056);
+  assert.deepEqual(
+    [44, 544, 1044, 0, 9999].map((x) => scale.secondsAt(x)),
+    [0, 50, 100, 0, 100],
+  );
+});
+
+test("the moment on screen is told with its setting, policy and values", () => {
+  assert.equal(settingAt(TIMELINE.settings, 11), null);
+  assert.deepEqual(valuesAt(TIMELINE, ["fixed", "mlr-learned"], 12.5), [
+    ["Setting", "2, mlr-learned"],
+    ["Focal power", "0.500"],
+    ["Metric", "0.5000"],
+  ]);
+  assert.deepEqual(valuesAt(TIMELINE, [], 11), [
+    ["Setting", "none under way"],
+    ["Focal power", "–"],
+    ["Metric", "–"],
+  ]);
+  assert.equal(valuesAt(TIMELINE, [], 5)[1]?.[1], "–", "no value for so long");
+  assert.deepEqual([0, 5.26, 65.2, 600, -0.5].map(momentText), [
+    "0:00.0",
+    "0:05.2",
+    "1:05.2",
+    "10:00.0",
+    "−0:00.5",
+  ]);
+});
+
+test("the last comment is the latest of those said by then, whatever order they were kept in", () => {
+  const comments = [{ seconds: 8 }, { seconds: 3 }, { seconds: 20 }];
+  assert.deepEqual(
+    [2, 3, 10, 30].map((seconds) => lastComment(comments, seconds)),
+    [-1, 1, 0, 2],
+  );
+});
