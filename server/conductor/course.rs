@@ -14,6 +14,7 @@ use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
 use crate::store::{Comment, NewSession, Reader, RunClocks};
 use crate::trial::action::Action;
+use crate::trial::consent::Consent;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
 use crate::trial::phase::Phase;
@@ -40,6 +41,8 @@ pub(super) struct Course {
     /// When each of them happened, by the server's clocks over its restarts.
     times: Vec<Timestamp>,
     clock: RunClock,
+    /// What the participant consented to, if that is recorded.
+    pub consent: Option<Consent>,
     /// Comments in all.
     pub comments: usize,
     /// The latest comments, newest last.
@@ -104,6 +107,7 @@ impl Course {
             events: Vec::new(),
             times: Vec::new(),
             clock,
+            consent: None,
             comments: 0,
             latest_comments: Vec::new(),
             dismissed: false,
@@ -127,6 +131,9 @@ impl Course {
         course.replay(stored.events.into_iter().map(at).collect());
         for (run, answer) in reader.answers(session).await? {
             course.state.keep_answer(answer.segment, &answer.question, answer.given(run, &clock.clocks));
+        }
+        if let Some(latest) = reader.consents(session).await?.pop() {
+            course.keep_consent(latest.consent);
         }
         reader.comments(session).await?.into_iter().for_each(|(_, comment)| course.heard(comment));
         Ok(Some(course))
@@ -276,6 +283,19 @@ impl Course {
         self.grace.apply(&event.kind, at);
         self.times.push(at);
         self.events.push(event);
+    }
+
+    /// Takes in a consent that was recorded.
+    pub fn keep_consent(&mut self, consent: Consent) {
+        self.state.keep_consent(&consent.text_version);
+        self.consent = Some(consent);
+    }
+
+    /// Forgets the comments, of which some were erased, and takes in `comments`, which are all there are.
+    pub fn hear_again(&mut self, comments: impl IntoIterator<Item = Comment>) {
+        self.comments = 0;
+        self.latest_comments.clear();
+        comments.into_iter().for_each(|comment| self.heard(comment));
     }
 
     /// Takes in a comment that was kept.

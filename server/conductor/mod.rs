@@ -7,8 +7,12 @@
 //! them as not recorded yet.
 
 mod allocate;
+mod beside;
 mod circumstances;
+mod consents;
+mod corrections;
 mod course;
+mod erasures;
 mod error;
 mod flow;
 mod keeping;
@@ -24,6 +28,7 @@ use std::sync::Arc;
 use rand_chacha::ChaCha12Rng;
 use tokio::sync::{Mutex, Notify, watch};
 
+pub use beside::{ConsentLine, CorrectionLine, WithdrawalLine};
 pub use error::ConductError;
 pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};

@@ -112,7 +112,7 @@ impl Shared {
         Ok((stored.made.segments.into_iter().map(|(segment, _)| segment).collect(), grace))
     }
 
-    fn stamp(&self) -> Stamp {
+    pub(super) fn stamp(&self) -> Stamp {
         Stamp { wall: self.clock.wall(), at: self.clock.now() }
     }
 }

@@ -6,14 +6,18 @@ use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine, withdrawal};
 use super::course::Course;
+use super::timeline::erased;
 use super::{ConductError, Conductor, ProtocolSummary};
 use crate::autofocus::PolicyName;
-use crate::ids::{SegmentId, SessionId};
-use crate::store::{DeviceEvent, Participant, Reader, Recorder, SessionLine, standings};
-use crate::trial::answers::sus_score;
+use crate::ids::{IdempotencyKey, SegmentId, SessionId};
+use crate::store::{DeviceEvent, Latest, Participant, Reader, Recorder, SessionLine, standings};
+use crate::trial::correction::Subject;
+use crate::trial::erasure::Erasable;
 use crate::trial::event::EventKind;
 use crate::trial::grace::Outstanding;
+use crate::trial::instruments::{Measure, in_words, measures, sus};
 use crate::trial::participant::ParticipantCode;
 use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::question::{AnswerValue, QuestionKind};
@@ -36,6 +40,12 @@ pub struct SessionDetail {
     pub settings_detail: Vec<SettingDetail>,
     /// Answers that count, in the order they were given.
     pub answers: Vec<AnswerLine>,
+    /// What was put right, oldest first.
+    pub corrections: Vec<CorrectionLine>,
+    /// What the participant consented to, oldest first; the latest counts.
+    pub consents: Vec<ConsentLine>,
+    /// That the participant withdrew, if so.
+    pub withdrawal: Option<WithdrawalLine>,
     /// Until when, by the server's clock, what arrives counts; none while the session is under way.
     #[schema(value_type = Option<String>)]
     pub counts_until: Option<Timestamp>,
@@ -73,8 +83,25 @@ pub struct AnswerLine {
     pub question: String,
     /// The question.
     pub text: String,
+    /// The question's kind, where it is known.
+    pub kind: Option<&'static str>,
+    /// The answer's key.
+    pub key: IdempotencyKey,
     /// The answer.
     pub value: AnswerValue,
+    /// The same in words.
+    pub words: String,
+    /// The right answer, where it was corrected.
+    pub corrected: Option<AnswerValue>,
+    /// The same in words.
+    pub corrected_words: Option<String>,
+    /// A researcher's note on it.
+    pub note: Option<String>,
+    /// When its words were erased, by the server's wall clock.
+    #[schema(value_type = Option<String>)]
+    pub erased: Option<Timestamp>,
+    /// What it scores, corrected where it was; none where it has no score or lacks an item.
+    pub scores: Vec<Measure>,
     /// The System Usability Scale's score, 0..=100, for its ten items.
     pub sus_score: Option<f64>,
     /// Whether it replaced an earlier answer.
@@ -159,6 +186,9 @@ impl Conductor {
             commitment: course.made.commitment.clone(),
             settings_detail: settings(&course),
             answers: self.answer_lines(&course).await?,
+            corrections: self.correction_lines(&course).await?,
+            consents: self.consent_lines(session).await?,
+            withdrawal: withdrawal(&course),
             counts_until: course.grace.until(),
             outstanding: self.shared.outstanding(course.session(), course.grace).await?,
             log: self.log(&course).await?,
@@ -189,6 +219,7 @@ impl Conductor {
             }
         }
 
+        lines.extend(self.beside(course.session()).await?);
         lines.sort_by_key(|(at, _)| *at);
         Ok(lines.into_iter().map(|(_, line)| line).collect())
     }
@@ -197,18 +228,30 @@ impl Conductor {
         let clocks = &self.shared.run_clock.clocks;
         let answers = self.shared.store.reader().answers(course.session()).await?;
         let standings = standings(&answers, clocks);
+        let corrections = Latest::of(&self.shared.store.reader().corrections(course.session()).await?);
+        let erasures = self.shared.store.reader().erasures(course.session()).await?;
 
         let mut lines: Vec<(Timestamp, AnswerLine)> = Vec::new();
         for ((run, answer), standing) in answers.into_iter().zip(standings).filter(|(_, standing)| standing.counts) {
             let question = course.protocol.question(&answer.question, answer.segment.is_some());
+            let kind = question.map(|question| &question.kind);
+            let corrected = corrections.value(&answer.key);
             let line = AnswerLine {
                 at: answer.stamp.wall,
                 setting: answer.segment.map(|segment| course.setting(segment)),
                 text: question.map(|question| question.text.clone()).unwrap_or_default(),
-                sus_score: match (question.map(|question| &question.kind), &standing.value) {
-                    (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
+                sus_score: match (kind, &standing.value) {
+                    (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
                     _ => None,
                 },
+                kind: kind.map(QuestionKind::name),
+                key: answer.key,
+                words: in_words(kind, &standing.value),
+                corrected_words: corrected.as_ref().map(|value| in_words(kind, value)),
+                note: corrections.note(Subject::Answer, &answer.key).map(str::to_owned),
+                erased: erased(&erasures, Erasable::Answer, &answer.key),
+                scores: kind.map_or_else(Vec::new, |kind| scores(kind, corrected.as_ref().unwrap_or(&standing.value))),
+                corrected,
                 question: answer.question,
                 value: standing.value,
                 changed: standing.revision > 1,
@@ -221,6 +264,12 @@ impl Conductor {
         lines.sort_by_key(|(given, _)| *given);
         Ok(lines.into_iter().map(|(_, line)| line).collect())
     }
+}
+
+/// The scores of an answer that lacks no item of theirs, the weights of a workload index left aside.
+fn scores(kind: &QuestionKind, value: &AnswerValue) -> Vec<Measure> {
+    let told = |measure: &Measure| measure.score && measure.value.is_some() && !measure.name.starts_with("weight-of-");
+    measures(kind, value).into_iter().filter(told).collect()
 }
 
 fn settings(course: &Course) -> Vec<SettingDetail> {

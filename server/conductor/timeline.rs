@@ -10,8 +10,10 @@ use utoipa::ToSchema;
 use super::course::Course;
 use super::{ConductError, Conductor};
 use crate::clock::Moment;
-use crate::ids::SessionId;
-use crate::store::{Answer, PathPoint, RunClocks, standings};
+use crate::ids::{IdempotencyKey, SessionId};
+use crate::store::{Answer, Latest, PathPoint, RunClocks, StoredErasure, standings};
+use crate::trial::correction::Subject;
+use crate::trial::erasure::Erasable;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::permission;
 use crate::trial::protocol::Record;
@@ -79,6 +81,8 @@ pub struct TimelinePoint {
 /// A comment on the timeline.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TimelineComment {
+    /// The comment's key.
+    pub key: IdempotencyKey,
     /// When it was kept, by the server's wall clock.
     #[schema(value_type = String)]
     pub at: Timestamp,
@@ -90,9 +94,14 @@ pub struct TimelineComment {
     pub frame: Option<u64>,
     /// Whether it arrived after the time in which what a surgeon's device held counted.
     pub late: bool,
-    /// What was said.
+    /// What was said; nothing where it was erased.
     #[serde(flatten)]
     pub said: Said,
+    /// A researcher's note on it.
+    pub note: Option<String>,
+    /// When its words were erased, by the server's wall clock.
+    #[schema(value_type = Option<String>)]
+    pub erased: Option<Timestamp>,
 }
 
 /// An answer that does not count: a later one from another device says something else, or it arrived too late.
@@ -141,8 +150,13 @@ impl Conductor {
             metric: point.metric.filter(|_| with_metric),
         };
 
+        let notes = Latest::of(&reader.corrections(session).await?);
+        let erasures = reader.erasures(session).await?;
         let comments = reader.comments(session).await?;
         let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
+            key: comment.key,
+            note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
+            erased: erased(&erasures, Erasable::Comment, &comment.key),
             at: comment.stamp.wall,
             seconds: seconds(start, runs.said(run, comment.stamp.at, &comment.origin)).max(0.0),
             setting: comment.segment.map(|segment| course.setting(segment)),
@@ -216,6 +230,13 @@ impl Conductor {
             ended: course.state.phase().has_ended(),
         })
     }
+}
+
+/// When the words of the record with this key were erased.
+pub(super) fn erased(erasures: &[StoredErasure], subject: Erasable, key: &IdempotencyKey) -> Option<Timestamp> {
+    let key = key.to_string();
+    let its_own = |stored: &&StoredErasure| stored.erasure.subject == subject && stored.erasure.record == key;
+    erasures.iter().find(its_own).map(|stored| stored.erasure.stamp.wall)
 }
 
 fn set_aside(course: &Course, answers: &[(i64, Answer)], runs: &RunClocks, start: Timestamp) -> Vec<SetAside> {

@@ -22,7 +22,7 @@ impl From<ExportError> for Error {
         let text = error.to_string();
         match error {
             ExportError::NoSession { .. } => Self::NotFound(text),
-            ExportError::StillBlinded(_) => Self::Conflict(text),
+            ExportError::StillBlinded(_) | ExportError::Withdrawn { .. } => Self::Conflict(text),
             ExportError::Exists(_) | ExportError::Busy | ExportError::Unwritable { .. } | ExportError::Store(_) => {
                 Self::Storage(text)
             }

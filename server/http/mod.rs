@@ -17,6 +17,7 @@ mod operator;
 mod places;
 mod playback;
 mod recording;
+mod records;
 mod researcher;
 pub mod roles;
 pub mod security;
@@ -59,6 +60,7 @@ pub fn router(app: AppState) -> Router {
         .merge(recording::routes())
         .merge(researcher::routes())
         .merge(playback::routes())
+        .merge(records::routes())
         .merge(export::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())

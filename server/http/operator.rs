@@ -21,6 +21,7 @@ use crate::autofocus::PolicyEntry;
 use crate::conductor::ProtocolSummary;
 use crate::ids::SessionId;
 use crate::trial::action::Focus;
+use crate::trial::consent::NewConsent;
 use crate::trial::role::Role;
 use crate::trial::view::OperatorView;
 
@@ -171,6 +172,17 @@ async fn act(_: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<A
     Ok(Json(app.operator_view.borrow().clone()))
 }
 
+/// Records a participant's consent. Answers with the session as it is then.
+#[utoipa::path(post, path = "/api/operator/consents", tag = "operator", request_body = NewConsent, responses(
+    (status = 200, body = Option<OperatorView>),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 422, description = "Something is missing, the day is yet to come, or the protocol requires another \
+                                  version of the text", body = ErrorBody)))]
+async fn consent(_: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewConsent>) -> Result<View, Error> {
+    app.conductor.record_consent(Role::Operator, new).await?;
+    Ok(Json(app.operator_view.borrow().clone()))
+}
+
 /// A session to be taken off the screens.
 #[derive(Debug, Deserialize, ToSchema)]
 struct Dismissal {
@@ -195,6 +207,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(add_participant))
         .routes(routes!(session))
         .routes(routes!(create))
+        .routes(routes!(consent))
         .routes(routes!(act))
         .routes(routes!(dismiss))
 }

@@ -23,15 +23,13 @@ use crate::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
 use crate::ids::SessionId;
 use crate::store::{Access, SessionLine};
 use crate::trial::action::Action;
+use crate::trial::instruments::Measure;
 use crate::trial::phase::SessionStatus;
 use crate::trial::question::AnswerValue;
 use crate::trial::role::Role;
 
 /// Points of the focal path for each setting: about as many as there are pixels to draw them on.
 const POINTS: u32 = 600;
-
-/// What stands where an answer is missing.
-const NO_ANSWER: &str = "–";
 
 /// When a session was made, on the clock of the room.
 pub(super) fn made(line: &SessionLine) -> String {
@@ -80,29 +78,31 @@ struct SessionPage {
     /// Those answered in words, which no column holds.
     written: Vec<QuestionRow>,
     closing: Vec<AnswerLine>,
+    /// The participants there are: one of them may be the right one.
+    participants: Vec<String>,
 }
 
 /// A question with its answer in each setting.
 struct QuestionRow {
     text: String,
-    answers: Vec<String>,
+    answers: Vec<Option<AnswerLine>>,
     /// Whether the answers are words.
     written: bool,
 }
 
 impl QuestionRow {
     /// The settings that were answered, each with the answer.
-    fn given(&self) -> impl Iterator<Item = (usize, &String)> {
-        (1..).zip(&self.answers).filter(|(_, answer)| *answer != NO_ANSWER)
+    fn given(&self) -> impl Iterator<Item = (usize, &AnswerLine)> {
+        (1..).zip(&self.answers).filter_map(|(setting, answer)| Some((setting, answer.as_ref()?)))
     }
 }
 
 impl SessionPage {
-    fn new(nonce: String, chain: String, detail: SessionDetail) -> Self {
+    fn new(nonce: String, chain: String, detail: SessionDetail, participants: Vec<String>) -> Self {
         let (asked, closing): (Vec<_>, _) = detail.answers.iter().cloned().partition(|answer| answer.setting.is_some());
         let all = questions(&asked, detail.settings_detail.len());
         let (written, questions) = all.into_iter().partition(|question| question.written);
-        Self { nonce, chain, detail, questions, written, closing }
+        Self { nonce, chain, detail, questions, written, closing, participants }
     }
 
     /// The policy of `setting`, once the session was unblinded.
@@ -123,31 +123,40 @@ fn questions(answers: &[AnswerLine], settings: usize) -> Vec<QuestionRow> {
     for answer in answers {
         let place = *places.entry(&answer.question).or_insert_with(|| {
             let written = matches!(answer.value, AnswerValue::Text(_));
-            let answers = vec![NO_ANSWER.to_owned(); settings];
-            rows.push(QuestionRow { text: answer.text.clone(), answers, written });
+            rows.push(QuestionRow { text: answer.text.clone(), answers: vec![None; settings], written });
             rows.len() - 1
         });
 
         let cell = answer.setting.and_then(|setting| rows[place].answers.get_mut(setting.wrapping_sub(1)));
         if let Some(cell) = cell {
-            *cell = in_words(&answer.value);
+            *cell = Some(answer.clone());
         }
     }
 
     rows
 }
 
-pub(super) fn in_words(value: &AnswerValue) -> String {
-    match value {
-        AnswerValue::Point(point) => point.to_string(),
-        AnswerValue::Points(points) => points.iter().map(|point| point_in_words(*point)).collect::<Vec<_>>().join(", "),
-        AnswerValue::Text(text) => text.clone(),
-    }
+/// A score with its name.
+pub(super) fn score_words(score: &Measure) -> String {
+    let value = score.value.map_or_else(|| "–".to_owned(), |value| tenths(value).to_string());
+    format!("{} {value}", score.label)
 }
 
-/// An item still open has no point.
-fn point_in_words(point: u8) -> String {
-    if point == 0 { NO_ANSWER.to_owned() } else { point.to_string() }
+fn tenths(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0
+}
+
+/// An answer as it stands in a table: its scores where it has any, else the answer itself.
+pub(super) fn cell(answer: &AnswerLine) -> String {
+    if answer.scores.is_empty() {
+        return answer.words.clone();
+    }
+    answer.scores.iter().map(score_words).collect::<Vec<_>>().join(", ")
+}
+
+/// When something happened, in the words of the room.
+pub(super) fn day_and_time(at: &Timestamp) -> String {
+    local(at, "%Y-%m-%d at %H:%M")
 }
 
 /// One session.
@@ -166,8 +175,10 @@ async fn session_page(
         error => error.into(),
     })?;
 
+    let participants = app.conductor.participants().await?;
+    let participants = participants.into_iter().map(|participant| participant.code).collect();
     let chain = chain_words(&app).await;
-    SessionPage::new(nonce, chain, detail).render().map(Html).map_err(|_| Error::Internal)
+    SessionPage::new(nonce, chain, detail, participants).render().map(Html).map_err(|_| Error::Internal)
 }
 
 /// The sessions, newest first, practice included and marked.

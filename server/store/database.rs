@@ -18,11 +18,11 @@ use crate::autofocus::{BlurRate, PolicyName};
 use crate::clock::Moment;
 use crate::files::make_private;
 
-use super::chain;
 use super::counts::Counts;
 use super::schema::{DATABASE, MIGRATOR};
+use super::scrub::scrub;
 use super::values::{begin, drop_if_failed, nanoseconds};
-use super::{DeviceEvent, Reader, Stamp, StoreError};
+use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
 
 /// Name of the lock in the data folder.
 const LOCK: &str = "parfocal.lock";
@@ -108,6 +108,10 @@ impl Store {
         let reader = Reader::open_file(&file).await?;
         let started = Stamp { wall: run.wall, at: run.at };
         let run = begin_run(&trial, run).await?;
+        // A server that was killed while it erased words may have left copies of them.
+        if let Err(error) = scrub(&trial).await {
+            tracing::warn!("copies of erased words may still stand in the database's files: {error}");
+        }
 
         let inner = Inner {
             folder: folder.to_owned(),

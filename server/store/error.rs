@@ -60,6 +60,12 @@ pub enum StoreError {
          change their permissions, or copy the data folder to a place where you can write and name it with --data-dir"
     )]
     Shut,
+    /// Words were erased from their records, but not yet from the files.
+    #[error(
+        "the words are erased from their record, but copies may stand in the database's log as long as another \
+         program reads the database, such as an export or a backup; end that program and erase again"
+    )]
+    ErasureUnfinished,
     /// Another program holds it.
     #[error("another program has locked the database; close it and try again")]
     Locked,

@@ -18,7 +18,9 @@ impl Reader {
             "SELECT run, wall, monotonic_ns, version, camera, lens, calibration, blur FROM runs WHERE run IN (
                  SELECT run FROM sessions WHERE session = ?1 UNION SELECT run FROM events WHERE session = ?1
                  UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
-                 UNION SELECT frame_run FROM comments WHERE session = ?1)
+                 UNION SELECT frame_run FROM comments WHERE session = ?1
+                 UNION SELECT run FROM corrections WHERE session = ?1
+                 UNION SELECT run FROM consents WHERE session = ?1 UNION SELECT run FROM erasures WHERE session = ?1)
              ORDER BY run",
         )
         .bind(session.to_string())

@@ -140,7 +140,10 @@ impl Reader {
                  (SELECT count(*) FROM segments AS g WHERE g.session = s.session) AS settings,
                  (SELECT count(*) FROM comments AS c WHERE c.session = s.session) AS comments,
                  (SELECT payload ->> 'emergency' FROM events AS e WHERE e.session = s.session AND kind = 'unblinded')
-                     AS emergency
+                     AS emergency,
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = s.session AND kind = 'withdrawn') AS withdrawn,
+                 (SELECT new_value FROM corrections AS c WHERE c.session = s.session AND field = 'participant'
+                     ORDER BY number DESC LIMIT 1) AS corrected_participant
              FROM sessions AS s WHERE practice = 0 OR ?1 ORDER BY s.rowid DESC",
         )
         .bind(practice)
@@ -256,6 +259,7 @@ fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
         session: parsed(row, "session")?,
         created: parsed(row, "wall")?,
         participant: row.try_get("participant")?,
+        corrected_participant: row.try_get("corrected_participant")?,
         protocol: row.try_get("protocol")?,
         practice: row.try_get("practice")?,
         status: match ended.as_deref() {
@@ -268,6 +272,7 @@ fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
         comments: row.try_get("comments")?,
         unblinded: emergency.is_some(),
         emergency: emergency == Some(true),
+        withdrawn: row.try_get("withdrawn")?,
     })
 }
 

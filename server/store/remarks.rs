@@ -110,7 +110,8 @@ async fn insert_comment(connection: &mut SqliteConnection, run: i64, comment: &C
         .fetch_one(&mut *transaction)
         .await?;
 
-    let same = parsed::<SessionId>(&row, "session")? == comment.session && said(&row)? == comment.said;
+    let same = parsed::<SessionId>(&row, "session")? == comment.session
+        && (said(&row)? == comment.said || is_erased(&mut transaction, "comment", &comment.key).await?);
     Ok(if same { Kept::Before } else { Kept::KeyTaken })
 }
 
@@ -148,15 +149,24 @@ async fn insert_answer(connection: &mut SqliteConnection, run: i64, answer: &Ans
     }
 
     // Sent again, or another answer under the same key?
-    let kept: (String, Option<String>, String, String) =
-        sqlx::query_as("SELECT session, segment, question, value FROM answers WHERE key = ?")
-            .bind(answer.key.to_string())
-            .fetch_one(&mut *transaction)
-            .await?;
+    let row = sqlx::query("SELECT session, segment, question, value FROM answers WHERE key = ?")
+        .bind(answer.key.to_string())
+        .fetch_one(&mut *transaction)
+        .await?;
 
-    let segment = answer.segment.map(|segment| segment.to_string());
-    let same = kept == (answer.session.to_string(), segment, answer.question.clone(), value);
+    let kept: String = row.try_get("value")?;
+    let same = parsed::<SessionId>(&row, "session")? == answer.session
+        && segment(&row)? == answer.segment
+        && row.try_get::<String, _>("question")? == answer.question
+        && (kept == value || is_erased(&mut transaction, "answer", &answer.key).await?);
     Ok(if same { Kept::Before } else { Kept::KeyTaken })
+}
+
+/// Whether the words of what was said under this key were erased: a tablet that sends them again is told that they are
+/// kept, and keeps them no longer itself.
+async fn is_erased(connection: &mut SqliteConnection, subject: &str, key: &IdempotencyKey) -> Result<bool, StoreError> {
+    let erased = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM erasures WHERE subject = ? AND record = ?)");
+    Ok(erased.bind(subject).bind(key.to_string()).fetch_one(connection).await?)
 }
 
 impl Reader {

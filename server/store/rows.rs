@@ -117,8 +117,10 @@ pub struct SessionLine {
     /// When it was made, by the server's wall clock.
     #[schema(value_type = String)]
     pub created: Timestamp,
-    /// Participant's code.
+    /// Participant's code, as it was recorded.
     pub participant: String,
+    /// The right code, where that was corrected.
+    pub corrected_participant: Option<String>,
     /// Protocol's name.
     pub protocol: String,
     /// Whether it is practice.
@@ -135,6 +137,8 @@ pub struct SessionLine {
     pub unblinded: bool,
     /// Whether that was while it was under way.
     pub emergency: bool,
+    /// Whether the participant withdrew: its data stay out of exports.
+    pub withdrawn: bool,
 }
 
 /// A point of a session's focal path, with the metric, which is for those alone who know the policy.

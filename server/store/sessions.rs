@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use jiff::Timestamp;
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
@@ -64,6 +65,13 @@ impl StoredSession {
     pub fn protocol(&self) -> Result<Protocol, ProtocolError> {
         let known: Vec<PolicyName> = self.made.segments.iter().map(|(_, policy)| policy.clone()).collect();
         Protocol::parse(&self.made.protocol_toml, &self.made.protocol, &known)
+    }
+
+    /// When its participant withdrew and who recorded that, if so.
+    #[must_use]
+    pub fn withdrawn(&self) -> Option<(Timestamp, Role)> {
+        let withdrawal = self.events.iter().find(|(_, event)| matches!(event.kind, EventKind::Withdrawn { .. }));
+        withdrawal.map(|(_, event)| (event.wall, event.by))
     }
 
     /// Whether what arrives for it still counts; `clocks` are those of the server's starts.

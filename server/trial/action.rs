@@ -41,6 +41,12 @@ pub enum Action {
         #[schema(pattern = r"\S")]
         reason: String,
     },
+    /// Operator or researcher: the participant has withdrawn; from now on the session's data stay out of exports.
+    Withdraw {
+        /// Why.
+        #[schema(pattern = r"\S")]
+        reason: String,
+    },
     /// Researcher: tell which policies ran. On a session still under way this is emergency unblinding.
     Unblind {
         /// Why.

@@ -1,13 +1,10 @@
-//! Questionnaires: whether an answer fits its question, how an answer in parts adds up, and the
-//! System Usability Scale's score.
+//! Answers: whether one fits its question, and how an answer in parts adds up.
 
-use super::question::{AnswerValue, Question, QuestionKind};
+use super::instruments;
+use super::question::{AnswerValue, Question};
 
 /// Longest text of an answer or comment, bytes of UTF-8: some 2500 words.
 pub const LONGEST_TEXT: usize = 16 * 1024;
-
-/// Items of the System Usability Scale.
-pub const SUS_ITEMS: usize = 10;
 
 /// Why an answer does not fit.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -33,20 +30,14 @@ pub enum Misfit {
 /// # Errors
 /// When it does not; says what the question takes.
 pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Result<(), Misfit> {
-    let expected = match (&question.kind, value) {
-        (QuestionKind::Text, AnswerValue::Text(text)) => return check_length(text),
-        (QuestionKind::Likert { points, .. }, AnswerValue::Point(point)) if (1..=*points).contains(point) => {
-            return Ok(());
-        }
-        (QuestionKind::Ranking, AnswerValue::Points(order)) if is_ranking(order, settings) => return Ok(()),
-        (QuestionKind::Sus, AnswerValue::Points(items)) if is_part_of_sus(items) => return Ok(()),
-        (QuestionKind::Text, _) => "text".to_owned(),
-        (QuestionKind::Likert { points, .. }, _) => format!("a point from 1 to {points}"),
-        (QuestionKind::Ranking, _) => format!("each of the settings 1 to {settings} once, best first"),
-        (QuestionKind::Sus, _) => format!("{SUS_ITEMS} points from 1 to 5, 0 for an item that it leaves as it was"),
-    };
-
-    Err(Misfit::Kind { question: question.id.clone(), expected })
+    if !instruments::fits(&question.kind, value, settings) {
+        let expected = instruments::expected(&question.kind, settings);
+        return Err(Misfit::Kind { question: question.id.clone(), expected });
+    }
+    match value {
+        AnswerValue::Text(text) => check_length(text),
+        AnswerValue::Point(_) | AnswerValue::Points(_) => Ok(()),
+    }
 }
 
 /// Checks the length of what was written.
@@ -55,17 +46,6 @@ pub fn check(question: &Question, value: &AnswerValue, settings: usize) -> Resul
 /// When it is longer than [`LONGEST_TEXT`].
 pub const fn check_length(text: &str) -> Result<(), Misfit> {
     if text.len() > LONGEST_TEXT { Err(Misfit::TooLong { length: text.len() }) } else { Ok(()) }
-}
-
-fn is_ranking(order: &[u8], settings: usize) -> bool {
-    let mut sorted = order.to_vec();
-    sorted.sort_unstable();
-    sorted.len() == settings
-        && sorted.iter().zip(1_usize..).all(|(&setting, expected)| usize::from(setting) == expected)
-}
-
-fn is_part_of_sus(items: &[u8]) -> bool {
-    items.len() == SUS_ITEMS && items.iter().all(|item| *item <= 5) && items.iter().any(|item| *item > 0)
 }
 
 /// What stands once `given` has come on top of `earlier`: a 0 among points gives nothing and leaves
@@ -90,36 +70,14 @@ pub fn is_whole(value: &AnswerValue) -> bool {
     !matches!(value, AnswerValue::Points(points) if points.contains(&0))
 }
 
-/// The System Usability Scale's score, 0..=100 in steps of 2.5, of ten items from 1 (strongly
-/// disagree) to 5 (strongly agree): odd items count `item - 1`, even ones `5 - item`, the sum times
-/// 2.5 (Brooke 1996). `None` when these are not ten such items.
-#[must_use]
-pub fn sus_score(items: &[u8]) -> Option<f64> {
-    if items.len() != SUS_ITEMS || !items.iter().all(|item| (1..=5).contains(item)) {
-        return None;
-    }
-    let sum: u8 = items.iter().enumerate().map(|(i, item)| if i % 2 == 0 { item - 1 } else { 5 - item }).sum();
-    Some(f64::from(sum) * 2.5)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trial::instruments::sus::ITEMS as SUS_ITEMS;
+    use crate::trial::question::QuestionKind;
 
     fn question(kind: QuestionKind) -> Question {
         Question { id: "q".to_owned(), text: "?".to_owned(), kind, optional: false }
-    }
-
-    #[test]
-    fn the_sus_score_goes_from_0_to_100() {
-        assert_eq!(sus_score(&[5, 1, 5, 1, 5, 1, 5, 1, 5, 1]), Some(100.0));
-        assert_eq!(sus_score(&[1, 5, 1, 5, 1, 5, 1, 5, 1, 5]), Some(0.0));
-        assert_eq!(sus_score(&[3; 10]), Some(50.0));
-        // Worked by hand: odd items 4+3+4+2+4 = 17 less 5 = 12, even 25 less (2+1+3+2+2) = 15; 27 *
-        // 2.5.
-        assert_eq!(sus_score(&[4, 2, 3, 1, 4, 3, 2, 2, 4, 2]), Some(67.5));
-        assert_eq!(sus_score(&[3; 9]), None);
-        assert_eq!(sus_score(&[0; 10]), None);
     }
 
     #[test]
@@ -157,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_ranking_names_every_setting_once() {
-        let ranking = question(QuestionKind::Ranking);
+        let ranking = question(QuestionKind::Ranking { ties: false });
         assert_eq!(check(&ranking, &AnswerValue::Points(vec![3, 1, 2]), 3), Ok(()));
         for wrong in [vec![1, 2], vec![1, 2, 2], vec![0, 1, 2], vec![1, 2, 4], vec![1, 2, 3, 4]] {
             let misfit = check(&ranking, &AnswerValue::Points(wrong), 3).unwrap_err();
@@ -167,7 +125,9 @@ mod tests {
 
     #[test]
     fn a_likert_point_stays_on_its_scale() {
-        let likert = question(QuestionKind::Likert { points: 7, low: "l".to_owned(), high: "h".to_owned() });
+        let low = "l".to_owned();
+        let high = "h".to_owned();
+        let likert = question(QuestionKind::Likert { points: 7, low, high, labels: Vec::new() });
         assert_eq!(check(&likert, &AnswerValue::Point(7), 6), Ok(()));
         assert!(check(&likert, &AnswerValue::Point(0), 6).is_err());
         assert!(check(&likert, &AnswerValue::Point(8), 6).is_err());

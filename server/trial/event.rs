@@ -72,6 +72,11 @@ pub enum EventKind {
         /// Time inspected in the segment under way.
         inspected_ms: u64,
     },
+    /// The participant withdrew: its data stay out of exports.
+    Withdrawn {
+        /// Why.
+        reason: String,
+    },
     /// It was told which policies ran.
     Unblinded {
         /// Why.
@@ -96,6 +101,7 @@ impl EventKind {
             Self::ServerRestarted { .. } => "server-restarted",
             Self::Completed => "completed",
             Self::Aborted { .. } => "aborted",
+            Self::Withdrawn { .. } => "withdrawn",
             Self::Unblinded { .. } => "unblinded",
         }
     }
@@ -152,6 +158,7 @@ impl EventKind {
             Self::ServerRestarted { .. } => "The server restarted; paused where it was".to_owned(),
             Self::Completed => "Session completed".to_owned(),
             Self::Aborted { reason, .. } => format!("Session aborted: {reason}"),
+            Self::Withdrawn { reason } => format!("Withdrawn: {reason}"),
             Self::Unblinded { reason, .. } if reason.is_empty() => "Unblinded by the researcher".to_owned(),
             Self::Unblinded { reason, emergency: false } => format!("Unblinded: {reason}"),
             Self::Unblinded { reason, emergency: true } => format!("Unblinded while under way: {reason}"),
@@ -181,6 +188,7 @@ mod tests {
             EventKind::ServerRestarted { inspected_ms: 1 },
             EventKind::Completed,
             EventKind::Aborted { reason: String::new(), inspected_ms: 0 },
+            EventKind::Withdrawn { reason: "changed their mind".to_owned() },
             EventKind::Unblinded { reason: String::new(), emergency: true },
         ];
 

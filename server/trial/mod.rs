@@ -1,4 +1,4 @@
-//! Trials: protocol, allocation, the session's state machine, questionnaires. Pure: clock and
+//! Trials: protocol, allocation, the session's state machine, instruments. Pure: clock and
 //! random source are handed in.
 
 pub mod acceptance;
@@ -7,13 +7,18 @@ pub mod allocation;
 pub mod answers;
 pub mod balanced_set;
 pub mod commitment;
+pub mod consent;
+pub mod correction;
+pub mod erasure;
 pub mod event;
 pub mod grace;
+pub mod instruments;
 pub mod participant;
 pub mod permission;
 pub mod phase;
 pub mod protocol;
 pub mod question;
+pub mod reason;
 pub mod refusal;
 pub mod remark;
 pub mod role;

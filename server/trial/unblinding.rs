@@ -87,6 +87,7 @@ mod tests {
             limit: Duration::from_mins(1),
             after_segment: Vec::new(),
             closing: Vec::new(),
+            consent: None,
         };
 
         let mut state = SessionState::new(plan);

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::consent::Consent;
 use super::phase::Phase;
 use super::question::{AnswerValue, Question};
 use super::remark::Said;
@@ -60,6 +61,12 @@ pub struct OperatorView {
     pub participant: String,
     /// Protocol's name.
     pub protocol: String,
+    /// The version of the consent text without which the session does not start; none where none is required.
+    pub consent_required: Option<String>,
+    /// What the participant consented to, if that is recorded.
+    pub consent: Option<Consent>,
+    /// Whether the participant withdrew.
+    pub withdrawn: bool,
     /// Why the disk has not taken what is `unrecorded`, as far as it has said.
     pub unrecorded_because: Option<String>,
     /// The latest comments, newest first.

@@ -46,7 +46,7 @@ async fn opened_by_its_owner(file: &Path) -> SqlitePool {
     pool
 }
 
-fn said(checks: &[Check], name: &str) -> Result<String, String> {
+pub fn said(checks: &[Check], name: &str) -> Result<String, String> {
     match &checks.iter().find(|check| check.name == name).unwrap().verdict {
         Verdict::Passed(said) => Ok(said.clone()),
         Verdict::Failed(said) | Verdict::NotChecked(said) => Err(said.clone()),
@@ -54,7 +54,7 @@ fn said(checks: &[Check], name: &str) -> Result<String, String> {
 }
 
 /// What verification says of a copy of `database` to which `sql` was done.
-async fn after(database: &Path, sql: &str, head: Option<&Head>) -> Vec<Check> {
+pub async fn after(database: &Path, sql: &str, head: Option<&Head>) -> Vec<Check> {
     let folder = tempfile::tempdir().unwrap();
     let copy = folder.path().join("copy.db");
     std::fs::copy(database, &copy).unwrap();

@@ -146,7 +146,14 @@ impl Trial {
             let value = match &question.kind {
                 QuestionKind::Text => AnswerValue::Text("fine 👍".to_owned()),
                 QuestionKind::Likert { points, .. } => AnswerValue::Point(*points),
-                QuestionKind::Ranking => AnswerValue::Points((1..=settings).rev().collect()),
+                QuestionKind::VisualAnalogue { .. } => AnswerValue::Point(63),
+                QuestionKind::Recognition => AnswerValue::Point(2),
+                QuestionKind::Ranking { ties: false } => AnswerValue::Points((1..=settings).rev().collect()),
+                QuestionKind::Ranking { ties: true } => AnswerValue::Points(vec![1; view.settings]),
+                QuestionKind::NasaTlx { scales } => AnswerValue::Points(vec![11; scales.len()]),
+                QuestionKind::SurgTlx { scales, pairs } => {
+                    AnswerValue::Points([vec![11; scales.len()], vec![1; pairs.len()]].concat())
+                }
                 QuestionKind::Sus => AnswerValue::Points(vec![4, 2, 3, 1, 4, 3, 2, 2, 4, 2]),
             };
 

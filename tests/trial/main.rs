@@ -2,8 +2,12 @@
 
 mod balance;
 mod chain;
+mod consent;
+mod corrections;
+mod erasure;
 mod exports;
 mod fixture;
+mod instruments;
 mod late;
 mod lens;
 mod remarks;

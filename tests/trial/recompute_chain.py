@@ -45,8 +45,18 @@ OPEN = {
     ),
     "device": ("devices", "number wall run monotonic_ns device working message"),
     "access": ("accesses", "number wall run monotonic_ns role kind session detail"),
+    "correction": ("corrections", "number session subject record field role wall run monotonic_ns"),
+    "consent": ("consents", "number session text_version given_on medium role wall run monotonic_ns"),
+    "erasure": ("erasures", "number session subject record role wall run monotonic_ns"),
 }
-SEALED = {"event": ["reason"], "comment": ["text"], "answer": ["given_value"]}
+SEALED = {
+    "event": ["reason"],
+    "comment": ["text"],
+    "answer": ["given_value"],
+    "correction": ["old_value", "new_value", "reason"],
+    "consent": ["obtained_by"],
+    "erasure": ["reason"],
+}
 
 
 def main(folder):
@@ -73,6 +83,9 @@ def main(folder):
         "answer": lambda row: row["key"],
         "device": lambda row: row["number"],
         "access": lambda row: row["number"],
+        "correction": lambda row: row["number"],
+        "consent": lambda row: row["number"],
+        "erasure": lambda row: row["number"],
     }
     records = {(kind, keys[kind](row)): row for kind, found in tables.items() for row in found}
 

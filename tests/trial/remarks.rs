@@ -217,7 +217,7 @@ async fn a_questionnaire_half_filled_is_kept_item_by_item() {
 
     for question in view.questions.iter().filter(|question| question.id != sus) {
         let value = match &question.kind {
-            QuestionKind::Ranking => AnswerValue::Points(vec![2, 1, 3, 4, 5, 6]),
+            QuestionKind::Ranking { .. } => AnswerValue::Points(vec![2, 1, 3, 4, 5, 6]),
             _ => AnswerValue::Text("fine".to_owned()),
         };
 

@@ -130,7 +130,7 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "copies", "chain"]);
 
     // An answer that counts though it came too late.
-    let late = read("answers.csv").replacen(",false,false\n", ",true,false\n", 1);
+    let late = read("answers.csv").replacen(",false,false,\n", ",true,false,\n", 1);
     assert_eq!(found(&|| write("answers.csv", late.clone())), ["said", "copies", "chain"]);
 
     // An event without a number.

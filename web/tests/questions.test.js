@@ -233,3 +233,85 @@ test("going on marks what is still open, and answering takes the marks back", ()
   assert.equal(questionnaire.marked, false);
   assert.deepEqual(questionnaire.check(), []);
 });
+
+const SCALES = ["Mental demands", "Physical demands", "Temporal demands"].map((title) => ({
+  name: title.toLowerCase().replace(" ", "-"),
+  title,
+  text: `${title}?`,
+  low: "Low",
+  high: "High",
+}));
+/** @type {Api.Question} */
+const WORKLOAD = {
+  id: "workload",
+  kind: "surg-tlx",
+  text: "Your workload",
+  scales: SCALES,
+  pairs: [
+    { first: 0, second: 1 },
+    { first: 0, second: 2 },
+    { first: 1, second: 2 },
+  ],
+};
+/** @type {Api.Question} */
+const EFFORT = { id: "effort", kind: "visual-analogue", text: "Effort?", low: "None", high: "All" };
+/** @type {Api.Question} */
+const SHARED = { id: "shared", kind: "ranking", text: "Which was best?", ties: true };
+
+test("each scale and each pair of a workload index is given alone, and all make an answer", () => {
+  const { ask, given } = openPage();
+  /** @type {import("../static/surgeon/questions.js").WorkloadAnswer} */
+  const workload = ask(WORKLOAD);
+  assert.deepEqual(workload.points, [0, 0, 0, 0, 0, 0], "nothing is marked before the surgeon marks it");
+
+  workload.choose(1, 21);
+  workload.choose(4, 2);
+  assert.deepEqual(given, [
+    { question: "workload", value: [0, 21, 0, 0, 0, 0], part: 1 },
+    { question: "workload", value: [0, 0, 0, 0, 2, 0], part: 4 },
+  ]);
+  workload.show("saved");
+  assert.deepEqual([workload.status, workload.unanswered], ["2 of 6 answered · Saved", true]);
+  workload.want();
+  assert.deepEqual(workload.wantedParts, [true, false, true, true, false, true]);
+
+  workload.take([1, 21, 3, 1, 2, 1]);
+  assert.equal(workload.unanswered, false);
+});
+
+test("a workload index half filled before a reload goes on where it was", () => {
+  const { ask } = openPage();
+  /** @type {import("../static/surgeon/questions.js").WorkloadAnswer} */
+  const workload = ask(WORKLOAD, [0, 21, 0, 0, 2, 0]);
+  assert.deepEqual([workload.points, workload.status], [[0, 21, 0, 0, 2, 0], "2 of 6 answered · Saved"]);
+});
+
+test("the lower end of a line is an answer, and a line that was not touched is none", () => {
+  const { ask, given } = openPage();
+  /** @type {ScaleAnswer} */
+  const effort = ask(EFFORT);
+  assert.deepEqual([effort.point, effort.unanswered], [null, true]);
+  effort.choose(0);
+  assert.deepEqual(given, [{ question: "effort", value: 0, part: null }]);
+  assert.equal(effort.unanswered, false);
+  /** @type {ScaleAnswer} */
+  const again = ask(EFFORT, 0);
+  assert.deepEqual([again.point, again.status], [0, "Saved"]);
+});
+
+test("settings may share a place where the protocol allows it", () => {
+  const { ask, given } = openPage();
+  /** @type {import("../static/surgeon/questions.js").PlacesAnswer} */
+  const shared = ask(SHARED);
+  for (const setting of [0, 1, 2]) shared.choose(setting, 1);
+  assert.deepEqual(
+    given.map(({ value }) => value),
+    [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ],
+  );
+  shared.show("saved");
+  assert.equal(shared.unanswered, false);
+});

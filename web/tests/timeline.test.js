@@ -18,7 +18,14 @@ const EMPTY = { comments: [], pauses: [], points: [], set_aside: [], settings: [
 const point = (seconds, asked, rest = {}) => ({ seconds, asked, frame: seconds * 10, setting: 1, ...rest });
 
 /** @type {Api.TimelineComment} */
-const COMMENT = { kind: "text", text: "Said", at: "2026-01-01T00:00:00Z", late: false, seconds: 0 };
+const COMMENT = {
+  key: "1",
+  kind: "text",
+  text: "Said",
+  at: "2026-01-01T00:00:00Z",
+  late: false,
+  seconds: 0,
+};
 
 test("the timeline is as long as the last thing that happened, whatever that is", () => {
   assert.equal(lengthOf(EMPTY), 1, "and never without a length");

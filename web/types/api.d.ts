@@ -110,6 +110,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/operator/consents": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Records a participant's consent. Answers with the session as it is then. */
+        post: operations["operator_consent"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/operator/dismissals": {
         parameters: {
             query?: never;
@@ -247,6 +264,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/researcher/sessions/{session}/corrections": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Corrects something of a session that has ended. The original stays; the correction stands beside it. */
+        post: operations["researcher_correct"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/sessions/{session}/course": {
         parameters: {
             query?: never;
@@ -258,6 +292,23 @@ export interface paths {
         get: operations["researcher_course"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/sessions/{session}/erasures": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Erases words for good. Once this has answered, they are nowhere in the database; their record and its hash stay. */
+        post: operations["researcher_erase"];
         delete?: never;
         options?: never;
         head?: never;
@@ -343,6 +394,23 @@ export interface paths {
         put?: never;
         /** Tells which policies ran; on a session still under way this is emergency unblinding and marked so for good. */
         post: operations["researcher_unblind"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/sessions/{session}/withdraw": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Records that the participant withdrew: from now on the session's data stay out of exports. */
+        post: operations["researcher_withdraw"];
         delete?: never;
         options?: never;
         head?: never;
@@ -669,6 +737,11 @@ export interface components {
             reason: string;
         } | {
             /** @enum {string} */
+            action: "withdraw";
+            /** @description Why. */
+            reason: string;
+        } | {
+            /** @enum {string} */
             action: "unblind";
             /** @description Whether to do it though what a surgeon's device still holds would then not count any more. */
             despite_outstanding?: boolean;
@@ -701,10 +774,23 @@ export interface components {
             at: string;
             /** @description Whether it replaced an earlier answer. */
             changed: boolean;
+            corrected?: components["schemas"]["AnswerValue"] | null;
+            /** @description The same in words. */
+            corrected_words?: string | null;
             /** @description Whether another of the surgeon's devices said something else; the timeline tells what. */
             devices_disagree: boolean;
+            /** @description When its words were erased, by the server's wall clock. */
+            erased?: string | null;
+            /** @description The answer's key. */
+            key: components["schemas"]["IdempotencyKey"];
+            /** @description The question's kind, where it is known. */
+            kind?: string | null;
+            /** @description A researcher's note on it. */
+            note?: string | null;
             /** @description Question's id. */
             question: string;
+            /** @description What it scores, corrected where it was; none where it has no score or lacks an item. */
+            scores: components["schemas"]["Measure"][];
             /** @description Setting, from 1; none for a closing question. */
             setting?: number | null;
             /**
@@ -716,6 +802,8 @@ export interface components {
             text: string;
             /** @description The answer. */
             value: components["schemas"]["AnswerValue"];
+            /** @description The same in words. */
+            words: string;
         };
         /** @description An answer. */
         AnswerValue: number | number[] | string;
@@ -764,6 +852,49 @@ export interface components {
             /** @description Setting, from 1. */
             setting?: number | null;
         };
+        /** @description A consent. */
+        Consent: {
+            /**
+             * Format: date
+             * @description The day on which it was given.
+             */
+            given_on: string;
+            /** @description On paper or on a screen. */
+            medium: components["schemas"]["Medium"];
+            /** @description Who obtained it: initials or a code. */
+            obtained_by: string;
+            /** @description Version of the text. */
+            text_version: string;
+        };
+        /** @description A consent for reading. */
+        ConsentLine: components["schemas"]["Consent"] & {
+            /** @description When it was recorded, by the server's wall clock. */
+            at: string;
+        };
+        /** @description A correction for reading. */
+        CorrectionLine: {
+            /** @description What was corrected, in words. */
+            about: string;
+            /** @description When, by the server's wall clock. */
+            at: string;
+            /** @description Who. */
+            by: components["schemas"]["Role"];
+            /** @description When its words were erased, by the server's wall clock. */
+            erased?: string | null;
+            /** @description What of it. */
+            field: components["schemas"]["Field"];
+            /** @description What is right, in words. */
+            new: string;
+            /**
+             * Format: int64
+             * @description Order of the record in the database.
+             */
+            number: number;
+            /** @description What stood there so far, in words. */
+            old: string;
+            /** @description Why. */
+            reason: string;
+        };
         /**
          * Format: uuid
          * @description A browser that surgeons use, all its tabs together. Random, made by its page and kept there.
@@ -774,10 +905,47 @@ export interface components {
             /** @description The session. */
             session: components["schemas"]["SessionId"];
         };
+        /**
+         * @description A record whose words can be erased.
+         * @enum {string}
+         */
+        Erasable: "answer" | "comment" | "correction";
         /** @description A failure as programs get it. */
         ErrorBody: {
             /** @description What happened and what to do. */
             error: string;
+        };
+        /**
+         * @description What of a record is put right.
+         * @enum {string}
+         */
+        Field: "participant" | "value" | "note";
+        /** @description What is put right. `old` is what the page showed, so that nobody corrects what somebody else corrected meanwhile. */
+        FieldChange: {
+            /** @enum {string} */
+            field: "participant";
+            /** @description The right code. */
+            new: string;
+            /** @description The code so far. */
+            old: string;
+        } | {
+            /** @enum {string} */
+            field: "value";
+            /** @description The right answer. */
+            new: components["schemas"]["AnswerValue"];
+            /** @description The answer so far. */
+            old: components["schemas"]["AnswerValue"];
+            /** @description The answer's key. */
+            record: components["schemas"]["IdempotencyKey"];
+        } | {
+            /** @enum {string} */
+            field: "note";
+            /** @description The note. */
+            new: string;
+            /** @description The note so far; empty where there is none. */
+            old: string;
+            /** @description The key of the comment or answer. */
+            record: components["schemas"]["IdempotencyKey"];
         };
         /** @description Who is to focus outside sessions. */
         Focus: {
@@ -834,6 +1002,25 @@ export interface components {
             /** @description What happened. */
             text: string;
         };
+        /** @description An item or a score of an answer, as a number. */
+        Measure: {
+            /** @description Its name for reading. */
+            label: string;
+            /** @description Its name: lower case letters, digits and dashes. */
+            name: string;
+            /** @description Whether it is computed from other items. */
+            score: boolean;
+            /**
+             * Format: double
+             * @description The number; none where it is missing.
+             */
+            value?: number | null;
+        };
+        /**
+         * @description Where a consent was given.
+         * @enum {string}
+         */
+        Medium: "paper" | "screen";
         /**
          * @description An answer as a surgeon's browser sends it. Of several to the same question the one given last counts, as far as it
          *     gives an answer, in whatever order they arrive; the others stay in the log.
@@ -867,6 +1054,25 @@ export interface components {
             /** @description Session that the surgeon's page was showing. */
             session: components["schemas"]["SessionId"];
         };
+        /** @description A consent as the operator's page sends it. */
+        NewConsent: components["schemas"]["Consent"] & {
+            /** @description The session that it is for. */
+            session: components["schemas"]["SessionId"];
+        };
+        /** @description A correction as the researcher's page sends it. */
+        NewCorrection: components["schemas"]["FieldChange"] & {
+            /** @description Why; kept with the correction. */
+            reason: string;
+        };
+        /** @description An erasure as the researcher's page sends it. */
+        NewErasure: {
+            /** @description Why; kept with the erasure. It must not repeat the words. */
+            reason: string;
+            /** @description Its key; of a correction its number. */
+            record: string;
+            /** @description What sort of record. */
+            subject: components["schemas"]["Erasable"];
+        };
         /** @description A participant to be added. */
         NewParticipant: {
             /** @description 2 to 16 capital letters, digits and dashes; never a name. */
@@ -881,6 +1087,9 @@ export interface components {
         };
         /** @description The session under way as the operator sees it. No policy either: the operator stands beside the surgeon. */
         OperatorView: components["schemas"]["SurgeonView"] & {
+            consent?: components["schemas"]["Consent"] | null;
+            /** @description The version of the consent text without which the session does not start; none where none is required. */
+            consent_required?: string | null;
             /** @description The latest comments, newest first. */
             latest_comments: components["schemas"]["CommentLine"][];
             /** @description The latest events in words, newest first. */
@@ -891,6 +1100,8 @@ export interface components {
             protocol: string;
             /** @description Why the disk has not taken what is `unrecorded`, as far as it has said. */
             unrecorded_because?: string | null;
+            /** @description Whether the participant withdrew. */
+            withdrawn: boolean;
         };
         /** @description Where and when something was said, as the surgeon's page tells. */
         Origin: {
@@ -918,6 +1129,19 @@ export interface components {
             counts_until?: string | null;
             /** @description Surgeons' devices that have not said since the end that they hold nothing more. */
             devices: number;
+        };
+        /** @description Two scales of a questionnaire, by their places from 0, of which the surgeon chooses one. */
+        Pair: {
+            /**
+             * Format: int32
+             * @description The one offered first.
+             */
+            first: number;
+            /**
+             * Format: int32
+             * @description The other.
+             */
+            second: number;
         };
         /** @description When the session was held, by someone or by a restart of the server. */
         PauseSpan: {
@@ -975,19 +1199,45 @@ export interface components {
             high: string;
             /** @enum {string} */
             kind: "likert";
+            /** @description What each point means, in order; empty where only the ends are named. */
+            labels?: string[];
             /** @description What 1 means. */
             low: string;
             /**
              * Format: int32
-             * @description 5 or 7.
+             * @description 5 or 7; with labels, as many as there are.
              */
             points: number;
         } | {
+            /** @description What 100 means. */
+            high: string;
+            /** @enum {string} */
+            kind: "visual-analogue";
+            /** @description What 0 means. */
+            low: string;
+        } | {
             /** @enum {string} */
             kind: "ranking";
+            /** @description Whether settings may share a place. */
+            ties?: boolean;
         } | {
             /** @enum {string} */
             kind: "sus";
+        } | {
+            /** @enum {string} */
+            kind: "nasa-tlx";
+            /** @description Its six scales. */
+            scales: components["schemas"]["Scale"][];
+        } | {
+            /** @enum {string} */
+            kind: "surg-tlx";
+            /** @description The pairs of scales to be compared; empty where it is asked without weights. */
+            pairs: components["schemas"]["Pair"][];
+            /** @description Its six scales. */
+            scales: components["schemas"]["Scale"][];
+        } | {
+            /** @enum {string} */
+            kind: "recognition";
         };
         /**
          * @description What of a session is recorded, from its start to its end.
@@ -1088,6 +1338,19 @@ export interface components {
             kind: "mark";
             text?: never;
         };
+        /** @description A scale of a questionnaire. */
+        Scale: {
+            /** @description What its upper end means. */
+            high: string;
+            /** @description What its lower end means. */
+            low: string;
+            /** @description Its name in exports: lower case letters and dashes. */
+            name: string;
+            /** @description What is asked. */
+            text: string;
+            /** @description Its name as the surgeon reads it. */
+            title: string;
+        };
         /**
          * Format: uuid
          * @description One segment of a session. Random, so that two segments of one policy share nothing.
@@ -1101,6 +1364,10 @@ export interface components {
             answers: components["schemas"]["AnswerLine"][];
             /** @description SHA-256 that commits to the order since the session was made. */
             commitment: string;
+            /** @description What the participant consented to, oldest first; the latest counts. */
+            consents: components["schemas"]["ConsentLine"][];
+            /** @description What was put right, oldest first. */
+            corrections: components["schemas"]["CorrectionLine"][];
             /** @description Until when, by the server's clock, what arrives counts; none while the session is under way. */
             counts_until?: string | null;
             /** @description Everything that happened, oldest first. */
@@ -1111,6 +1378,7 @@ export interface components {
             /** @description Its settings, in order. */
             settings_detail: components["schemas"]["SettingDetail"][];
             unblinding?: components["schemas"]["Unblinding"] | null;
+            withdrawal?: components["schemas"]["WithdrawalLine"] | null;
         };
         /**
          * Format: uuid
@@ -1124,6 +1392,8 @@ export interface components {
              * @description Comments kept.
              */
             comments: number;
+            /** @description The right code, where that was corrected. */
+            corrected_participant?: string | null;
             /** @description When it was made, by the server's wall clock. */
             created: string;
             /** @description Whether that was while it was under way. */
@@ -1133,7 +1403,7 @@ export interface components {
              * @description Settings inspected to the end.
              */
             finished_settings: number;
-            /** @description Participant's code. */
+            /** @description Participant's code, as it was recorded. */
             participant: string;
             /** @description Whether it is practice. */
             practice: boolean;
@@ -1150,6 +1420,8 @@ export interface components {
             status: components["schemas"]["SessionStatus"];
             /** @description Whether it was told which policies ran. */
             unblinded: boolean;
+            /** @description Whether the participant withdrew: its data stay out of exports. */
+            withdrawn: boolean;
         };
         /** @description The recordings of a session, as far as they can be played. */
         SessionRecordings: {
@@ -1274,13 +1546,19 @@ export interface components {
         TimelineComment: components["schemas"]["Said"] & {
             /** @description When it was kept, by the server's wall clock. */
             at: string;
+            /** @description When its words were erased, by the server's wall clock. */
+            erased?: string | null;
             /**
              * Format: int64
              * @description Number of the frame that was on screen.
              */
             frame?: number | null;
+            /** @description The comment's key. */
+            key: components["schemas"]["IdempotencyKey"];
             /** @description Whether it arrived after the time in which what a surgeon's device held counted. */
             late: boolean;
+            /** @description A researcher's note on it. */
+            note?: string | null;
             /**
              * Format: double
              * @description When it was said, seconds: what it waited on the surgeon's device is taken off.
@@ -1350,6 +1628,20 @@ export interface components {
          * @enum {string}
          */
         WaitClock: "page-clock" | "wall-clock";
+        /** @description Why a participant withdrew. */
+        Withdraw: {
+            /** @description Kept in the audit trail. */
+            reason: string;
+        };
+        /** @description A withdrawal for reading. */
+        WithdrawalLine: {
+            /** @description When, by the server's wall clock. */
+            at: string;
+            /** @description Who recorded it. */
+            by: components["schemas"]["Role"];
+            /** @description Why. */
+            reason: string;
+        };
     };
     responses: never;
     parameters: never;
@@ -2004,6 +2296,137 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    operator_consent: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewConsent"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OperatorView"] | null;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Something is missing, the day is yet to come, or the protocol requires another version of the text */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description The server failed; its log says more */
@@ -3071,6 +3494,147 @@ export interface operations {
             };
         };
     };
+    researcher_correct: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewCorrection"];
+            };
+        };
+        responses: {
+            /** @description Recorded */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session or record */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The session is under way, what a surgeon wrote cannot be corrected, or somebody has corrected the same meanwhile */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It makes no sense, or no reason was given */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     researcher_course: {
         parameters: {
             query?: never;
@@ -3137,6 +3701,147 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_erase: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewErasure"];
+            };
+        };
+        responses: {
+            /** @description Erased */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session or record */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description A session is under way, or the record has no words */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No reason was given */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description The server failed; its log says more */
@@ -3671,6 +4376,147 @@ export interface operations {
                 };
             };
             /** @description Its order would tell that of another session of its balanced set, or something may be outstanding */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No reason was given */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_withdraw: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Withdraw"];
+            };
+        };
+        responses: {
+            /** @description Withdrawn */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The session is under way */
             409: {
                 headers: {
                     [name: string]: unknown;

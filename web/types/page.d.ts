@@ -19,11 +19,16 @@ declare global {
     type LogLine = Schemas["LogLine"];
     type OperatorView = Schemas["OperatorView"];
     type Origin = Schemas["Origin"];
+    type NewConsent = Schemas["NewConsent"];
+    type NewCorrection = Schemas["NewCorrection"];
     type Outstanding = Schemas["Outstanding"];
+    type Pair = Schemas["Pair"];
     type Question = Schemas["Question"];
     type RecordingCourse = Schemas["RecordingCourse"];
     type RecordingStatus = Schemas["RecordingStatus"];
     type Said = Schemas["Said"];
+    type Scale = Schemas["Scale"];
+    type SessionDetail = Schemas["SessionDetail"];
     type SetAside = Schemas["SetAside"];
     type Setting = Schemas["Setting"];
     type SurgeonView = Schemas["SurgeonView"];

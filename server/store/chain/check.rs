@@ -1,9 +1,9 @@
 //! The chain computed again, row by row, against the records: the first row that is not as it was written is named.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::form::{Entry, Head, link, sealed};
-use super::kinds::{TELEMETRY, kind};
+use super::kinds::{ERASED, TELEMETRY, kind};
 use super::records::Record;
 use super::telemetry::Block;
 
@@ -40,6 +40,10 @@ pub struct Walk {
     whole: usize,
     /// Records with sealed columns that could not be checked.
     withheld: usize,
+    /// The records whose sealed columns were erased, by kind and key.
+    erased: BTreeSet<(String, String)>,
+    /// How many of them came.
+    erased_rows: usize,
     /// Of each session the rows so far.
     places: BTreeMap<String, i64>,
     /// Of each kind and session the place of the latest record.
@@ -62,12 +66,14 @@ impl Walk {
     /// Begins, with every record but telemetry. `expected` is a head known from elsewhere.
     pub fn new(records: BTreeMap<(&'static str, String), Record>, expected: Option<Head>) -> Self {
         Self {
+            erased: erased(&records),
             records,
             expected,
             last: Head::none(),
             adopted: 0,
             whole: 0,
             withheld: 0,
+            erased_rows: 0,
             places: BTreeMap::new(),
             orders: BTreeMap::new(),
             steps: BTreeMap::new(),
@@ -149,6 +155,13 @@ impl Walk {
         match (&record.sealed, salt) {
             _ if kind.sealed.is_empty() => {}
             (None, _) => self.withheld += 1,
+            // That it was erased is a record of its own, which has to have its row.
+            (Some(columns), None) if self.erased.contains(&(entry.kind.clone(), entry.key.clone())) => {
+                if columns.iter().any(|column| !matches!(column.as_str(), "" | EMPTY_TEXT)) {
+                    return Err(format!("{named} was erased, but has words"));
+                }
+                self.erased_rows += 1;
+            }
             (Some(_), None) => return Err(format!("{named}: its salt is missing, without which nothing proves it")),
             (Some(columns), Some(salt)) => {
                 if sealed(salt, columns.iter().map(String::as_str)) != entry.sealed {
@@ -214,11 +227,29 @@ impl Walk {
         if self.adopted > 0 {
             said.push(format!("{} were recorded before there was a chain", self.adopted));
         }
+        if self.erased_rows > 0 {
+            said.push(format!("of {} the words were erased", self.erased_rows));
+        }
         if self.withheld > 0 {
             said.push(format!("of {} a part is withheld here", self.withheld));
         }
         Ok(said.join("; "))
     }
+}
+
+/// An answer without words, as JSON.
+const EMPTY_TEXT: &str = "\"\"";
+
+/// The records that erasures among `records` name, by kind and key.
+fn erased(records: &BTreeMap<(&'static str, String), Record>) -> BTreeSet<(String, String)> {
+    let Some(kind) = kind(ERASED) else { return BTreeSet::new() };
+    let place = |column: &str| kind.open.iter().position(|name| *name == column);
+    let named = |record: &Record| {
+        let subject = record.open.get(place("subject")?)?.clone();
+        Some((subject, record.open.get(place("record")?)?.clone()))
+    };
+    let erasures = records.iter().filter(|((kind, _), _)| *kind == ERASED);
+    erasures.filter_map(|(_, record)| named(record)).collect()
 }
 
 impl BlockToCheck {

@@ -160,18 +160,55 @@ const ACCESS: Kind = Kind {
     order: "number",
 };
 
+const CORRECTION: Kind = Kind {
+    name: "correction",
+    table: "corrections",
+    open: &["number", "session", "subject", "record", "field", "role", "wall", "run", "monotonic_ns"],
+    sealed: &["old_value", "new_value", "reason"],
+    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
+         FROM corrections",
+    one: "number = ?",
+    order: "number",
+};
+
+const CONSENT: Kind = Kind {
+    name: "consent",
+    table: "consents",
+    open: &["number", "session", "text_version", "given_on", "medium", "role", "wall", "run", "monotonic_ns"],
+    sealed: &["obtained_by"],
+    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
+         FROM consents",
+    one: "number = ?",
+    order: "number",
+};
+
+const ERASURE: Kind = Kind {
+    name: ERASED,
+    table: "erasures",
+    open: &["number", "session", "subject", "record", "role", "wall", "run", "monotonic_ns"],
+    sealed: &["reason"],
+    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, *
+         FROM erasures",
+    one: "number = ?",
+    order: "number",
+};
+
 /// Every kind but telemetry, which is sealed in blocks.
-pub const KINDS: [Kind; 8] = [RUN, PARTICIPANT, SESSION, EVENT, COMMENT, ANSWER, DEVICE, ACCESS];
+pub const KINDS: [Kind; 11] =
+    [RUN, PARTICIPANT, SESSION, EVENT, COMMENT, ANSWER, DEVICE, ACCESS, CORRECTION, CONSENT, ERASURE];
 
 /// The kind called `name`.
 pub fn kind(name: &str) -> Option<&'static Kind> {
-    static ALL: [Kind; 8] = KINDS;
+    static ALL: [Kind; 11] = KINDS;
     ALL.iter().find(|kind| kind.name == name)
 }
 
 /// A block of telemetry: steps of a segment that follow one another. Its key is `SEGMENT/FIRST/LAST`, counted from 1
 /// within the segment.
 pub const TELEMETRY: &str = "telemetry";
+
+/// The kind of record that tells that another one's sealed columns were erased.
+pub const ERASED: &str = "erasure";
 
 /// The kind of an event whose reason may name a policy.
 pub const UNBLINDED: &str = "unblinded";

@@ -13,6 +13,6 @@ mod telemetry;
 pub use adopt::adopt;
 pub use append::append;
 pub use form::{Entry, Fields, Head, begin_sealed};
-pub use kinds::{KINDS, UNBLINDED};
+pub use kinds::{KINDS, Kind, UNBLINDED};
 pub use records::{Record, all};
 pub use telemetry::{OPEN, SEALED, begin_open, hashes, seal, unsealed};

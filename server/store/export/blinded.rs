@@ -3,22 +3,29 @@
 
 use std::collections::BTreeSet;
 
+use jiff::Timestamp;
 use serde_json::{Map, Value, json};
 
 use super::ExportError;
 use super::description::{
-    AnswerRow, ChainRow, CommentRow, DeviceRow, EventRow, RecordingRow, RunRow, SegmentRow, SessionRow,
+    AnswerRow, ChainRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow, RunRow,
+    ScoreRow, SegmentRow, SessionRow, WithdrawalRow,
 };
 use super::folder::Folder;
+use super::scores::Scored;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
-use crate::store::{Answer, Comment, DeviceEvent, Head, Reader, RunClocks, SessionLine, StoreError, standings};
-use crate::trial::answers::sus_score;
+use crate::store::{
+    Answer, Comment, DeviceEvent, Erasure, Head, Latest, Reader, RunClocks, SessionLine, StoreError, StoredConsent,
+    StoredCorrection, StoredErasure, Withdrawal, standings,
+};
+use crate::trial::erasure::Erasable;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::Grace;
+use crate::trial::instruments::sus;
 use crate::trial::phase::SessionStatus;
 use crate::trial::protocol::Protocol;
 use crate::trial::question::{AnswerValue, QuestionKind};
@@ -45,6 +52,10 @@ pub struct Blinded {
     events: Vec<(i64, Event)>,
     comments: Vec<(i64, Comment)>,
     answers: Vec<(i64, Answer)>,
+    corrections: Vec<StoredCorrection>,
+    consents: Vec<StoredConsent>,
+    erasures: Vec<StoredErasure>,
+    withdrawals: Vec<Withdrawal>,
     clocks: RunClocks,
     grace: Grace,
 }
@@ -77,6 +88,10 @@ impl Blinded {
             events: stored.events.into_iter().map(blind).collect(),
             comments: reader.comments(session).await?,
             answers: reader.answers(session).await?,
+            corrections: reader.corrections(session).await?,
+            consents: reader.consents(session).await?,
+            erasures: reader.erasures(session).await?,
+            withdrawals: reader.withdrawals(session).await?,
         })
     }
 
@@ -110,6 +125,11 @@ impl Blinded {
         copy(folder, &mut copies, &device_rows(devices)).await?;
         copy(folder, &mut copies, recordings).await?;
         copy(folder, &mut copies, &reader.export_accesses(self.session()).await?).await?;
+        copy(folder, &mut copies, &self.score_rows()).await?;
+        copy(folder, &mut copies, &self.correction_rows()).await?;
+        copy(folder, &mut copies, &self.consent_rows()).await?;
+        copy(folder, &mut copies, &self.erasure_rows()).await?;
+        copy(folder, &mut copies, &self.withdrawal_rows()).await?;
         folder.json("session.json", &Value::Object(copies)).await?;
 
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
@@ -237,6 +257,7 @@ impl Blinded {
                 device: comment.origin.device,
                 sequence: comment.origin.sequence,
                 late: comment.late,
+                erased: self.erased(Erasable::Comment, &comment.key.to_string()),
             }
         };
 
@@ -249,7 +270,7 @@ impl Blinded {
             let question = self.protocol.as_ref().and_then(|p| p.question(&answer.question, answer.segment.is_some()));
             let kind = question.map(|question| &question.kind);
             let sus_score = match (kind, &standing.value) {
-                (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus_score(items),
+                (Some(QuestionKind::Sus), AnswerValue::Points(items)) => sus::score(items),
                 _ => None,
             };
 
@@ -278,16 +299,101 @@ impl Blinded {
                 sequence: answer.origin.sequence,
                 late: answer.late,
                 disagrees: standing.disagrees,
+                erased: self.erased(Erasable::Answer, &answer.key.to_string()),
             }
         };
 
         self.answers.iter().zip(standings).zip(1..).map(row).collect()
     }
 
+    /// When the words of a record were erased.
+    fn erased(&self, subject: Erasable, record: &str) -> Option<Timestamp> {
+        let mut erasures = self.erasures.iter().map(|stored| &stored.erasure);
+        let its_own = |erasure: &&Erasure| erasure.subject == subject && erasure.record == record;
+        erasures.find(its_own).map(|erasure| erasure.stamp.wall)
+    }
+
+    fn score_rows(&self) -> Vec<ScoreRow> {
+        // What was asked cannot be known where this version cannot read the protocol.
+        let Some(protocol) = &self.protocol else { return Vec::new() };
+        let scored = Scored {
+            session: self.session(),
+            protocol,
+            segments: &self.segments,
+            answers: &self.answers,
+            standings: &standings(&self.answers, &self.clocks),
+            corrections: &Latest::of(&self.corrections),
+        };
+        scored.rows()
+    }
+
+    fn correction_rows(&self) -> Vec<CorrectionRow> {
+        let row = |StoredCorrection { number, run, correction }: &StoredCorrection| CorrectionRow {
+            number: *number,
+            session: correction.session,
+            subject: correction.subject.name(),
+            record: correction.record.clone(),
+            field: correction.field.name(),
+            old_value: correction.old.clone(),
+            new_value: correction.new.clone(),
+            reason: correction.reason.clone(),
+            role: correction.by,
+            wall: correction.stamp.wall,
+            run: *run,
+            monotonic_ns: nanoseconds(correction.stamp.at),
+            erased: self.erased(Erasable::Correction, &number.to_string()),
+        };
+        self.corrections.iter().map(row).collect()
+    }
+
+    fn consent_rows(&self) -> Vec<ConsentRow> {
+        let row = |stored: &StoredConsent| ConsentRow {
+            number: stored.number,
+            session: self.session(),
+            text_version: stored.consent.text_version.clone(),
+            given_on: stored.consent.given_on.to_string(),
+            obtained_by: stored.consent.obtained_by.clone(),
+            medium: stored.consent.medium.name(),
+            role: stored.by,
+            wall: stored.stamp.wall,
+            run: stored.run,
+            monotonic_ns: nanoseconds(stored.stamp.at),
+        };
+        self.consents.iter().map(row).collect()
+    }
+
+    fn erasure_rows(&self) -> Vec<ErasureRow> {
+        let row = |StoredErasure { number, run, erasure }: &StoredErasure| ErasureRow {
+            number: *number,
+            session: erasure.session,
+            subject: erasure.subject.name(),
+            record: erasure.record.clone(),
+            reason: erasure.reason.clone(),
+            role: erasure.by,
+            wall: erasure.stamp.wall,
+            run: *run,
+            monotonic_ns: nanoseconds(erasure.stamp.at),
+        };
+        self.erasures.iter().map(row).collect()
+    }
+
+    fn withdrawal_rows(&self) -> Vec<WithdrawalRow> {
+        let row = |withdrawal: &Withdrawal| WithdrawalRow {
+            session: withdrawal.session,
+            protocol: withdrawal.protocol.clone(),
+            place: withdrawal.place,
+            wall: withdrawal.wall,
+            role: withdrawal.role.clone(),
+        };
+        self.withdrawals.iter().map(row).collect()
+    }
+
     fn event_rows(&self) -> Vec<EventRow> {
         let row = |(run, event): &(i64, Event)| {
             let (reason, emergency) = match &event.kind {
-                EventKind::Paused { reason, .. } | EventKind::Aborted { reason, .. } => (Some(reason), None),
+                EventKind::Paused { reason, .. }
+                | EventKind::Aborted { reason, .. }
+                | EventKind::Withdrawn { reason } => (Some(reason), None),
                 EventKind::Unblinded { emergency, .. } => (None, Some(*emergency)),
                 _ => (None, None),
             };

@@ -37,6 +37,9 @@ const LATE: Meaning = means(
 .since(2);
 const FRAME: Meaning = means("Frame's number within the run");
 const EXPOSED: Meaning = means("End of the exposure, by the monotonic clock").in_unit("ns");
+const ERASED: Meaning = means("When its words were erased, by the server's wall clock; by whom and why is in erasures")
+    .in_unit("UTC")
+    .since(5);
 const KEY: Meaning = means("Key by which the browser could send it again without it counting twice");
 
 table! {
@@ -148,6 +151,7 @@ table! {
         device: Option<DeviceId> = DEVICE,
         sequence: Option<i64> = SEQUENCE,
         late: bool = LATE,
+        erased: Option<Timestamp> = ERASED,
     }
 }
 
@@ -166,15 +170,20 @@ table! {
         segment: Option<SegmentId> = means("Segment asked about; empty for a closing question"),
         question: String = means("Question's id in the protocol"),
         question_text: Option<String> = means("The question as the surgeon read it"),
-        kind: Option<&'static str> = means("text, likert, ranking or sus"),
+        kind: Option<&'static str> = means(
+            "text, likert, visual-analogue, ranking, sus, nasa-tlx, surg-tlx or recognition",
+        ),
         revision: usize =
             means("Place among the answers to the question in the order they were given, from 1"),
         counts: bool =
             means("Whether it is the answer that counts: the one given last, late ones left aside"),
         value: Option<String> = means(
-            "JSON: a text; a Likert point from 1; settings from 1, best first (ranking); ten points of \
-             1..5 (sus), 0 for an item still open; as it stood after this revision; of a late answer, \
-             as it was given",
+            "JSON: a text; a Likert point from 1; a place from 0 to 100 (visual-analogue); 1 no, 2 not sure, \
+             3 yes (recognition); settings from 1, best first, or with ties the place of each setting \
+             (ranking); ten points of 1..5 (sus); gradations of 1..21, of which 1 is a rating of 0 and 21 of \
+             100 (nasa-tlx, surg-tlx), then 1 or 2 for the chosen scale of each pair; 0 for an item still \
+             open; as it stood after this revision; of a late answer, as it was given; scores has all of it \
+             as numbers",
         ),
         given_value: Option<String> = means(
             "JSON: what was given this time, before items of a questionnaire given earlier were joined to it",
@@ -201,6 +210,127 @@ table! {
              differs",
         )
         .since(2),
+        erased: Option<Timestamp> = ERASED,
+    }
+}
+
+table! {
+    name: "scores",
+    description:
+        "The items and scores of the answers that count, one a row, corrections applied; a score that \
+         lacks an item is empty",
+    key: [question, setting, measure],
+    row:
+    /// An item or a score of an answer.
+    #[derive(Debug, Clone)]
+    ScoreRow {
+        session: SessionId = SESSION.since(5),
+        setting: Option<usize> =
+            means("Setting asked about, from 1; empty for a closing question").since(5),
+        segment: Option<SegmentId> = means("Segment asked about; empty for a closing question").since(5),
+        question: String = means("Question's id in the protocol").since(5),
+        kind: &'static str = means("Kind of the question, as in answers").since(5),
+        measure: String = means(
+            "Name of the item or score: item-1..10 and sus-score; the names of the scales, 0..100, raw-tlx \
+             (nasa-tlx), raw-surg-tlx, weight-of-..., 0..5, and weighted-surg-tlx (surg-tlx); point (likert); \
+             position (visual-analogue); rank-of-setting-N, 1 for the best, ties sharing their ranks (ranking); \
+             recognised (recognition)",
+        )
+        .since(5),
+        label: String = means("The same for reading").since(5),
+        value: Option<f64> = means("The number; empty where it is missing").since(5),
+        computed: bool = means("Whether it is computed from other items").since(5),
+        corrected: bool = means("Whether the answer was corrected; see corrections").since(5),
+    }
+}
+
+table! {
+    name: "corrections",
+    description:
+        "What a researcher put right, in order; the originals stand in their tables as they were \
+         recorded. Of several about the same field of a record the latest counts",
+    key: [number],
+    row:
+    /// A correction.
+    #[derive(Debug, Clone)]
+    CorrectionRow {
+        number: i64 = means("Order of the record in the database").since(5),
+        session: SessionId = SESSION.since(5),
+        subject: &'static str = means("What was corrected: session, answer or comment").since(5),
+        record: String = means("The key of the answer or comment, or the session's id").since(5),
+        field: &'static str = means(
+            "What of it: participant, value (of an answer, JSON), or note (beside an answer or a comment)",
+        )
+        .since(5),
+        old_value: String = means("What stood there so far").since(5),
+        new_value: String = means("What is right").since(5),
+        reason: String = means("Why, as the researcher said").since(5),
+        role: Role = means("Who did it: researcher").since(5),
+        wall: Timestamp = WALL.since(5),
+        run: i64 = RUN.since(5),
+        monotonic_ns: i64 = MONOTONIC.since(5),
+        erased: Option<Timestamp> = ERASED,
+    }
+}
+
+table! {
+    name: "consents",
+    description: "What the participant consented to; the latest counts",
+    key: [number],
+    row:
+    /// A consent.
+    #[derive(Debug, Clone)]
+    ConsentRow {
+        number: i64 = means("Order of the record in the database").since(5),
+        session: SessionId = SESSION.since(5),
+        text_version: String = means("Version of the text").since(5),
+        given_on: String = means("The day on which it was given, YYYY-MM-DD").since(5),
+        obtained_by: String = means("Who obtained it: initials or a code").since(5),
+        medium: &'static str = means("paper or screen").since(5),
+        role: Role = means("Who recorded it: operator").since(5),
+        wall: Timestamp = WALL.since(5),
+        run: i64 = RUN.since(5),
+        monotonic_ns: i64 = MONOTONIC.since(5),
+    }
+}
+
+table! {
+    name: "erasures",
+    description: "Words that were erased: the record stays, with the hash of what it said",
+    key: [number],
+    row:
+    /// An erasure.
+    #[derive(Debug, Clone)]
+    ErasureRow {
+        number: i64 = means("Order of the record in the database").since(5),
+        session: SessionId = SESSION.since(5),
+        subject: &'static str = means("What was erased: answer, comment or correction").since(5),
+        record: String = means("The key of the answer or comment, or the number of the correction").since(5),
+        reason: String = means("Why, as the researcher said").since(5),
+        role: Role = means("Who did it: researcher").since(5),
+        wall: Timestamp = WALL.since(5),
+        run: i64 = RUN.since(5),
+        monotonic_ns: i64 = MONOTONIC.since(5),
+    }
+}
+
+table! {
+    name: "withdrawals",
+    description:
+        "The sessions of the same protocol whose participants withdrew: their data are in no export",
+    key: [session],
+    row:
+    /// A withdrawn session.
+    #[derive(Debug, Clone)]
+    WithdrawalRow {
+        session: SessionId = SESSION.since(5),
+        protocol: String = means("Protocol's name").since(5),
+        place: i64 = means(
+            "Place among the sessions of the protocol, in the order in which they were made, from 1",
+        )
+        .since(5),
+        wall: Timestamp = means("When it was withdrawn, by the server's wall clock").in_unit("UTC").since(5),
+        role: String = means("Who recorded that: operator or researcher").since(5),
     }
 }
 
@@ -323,7 +453,11 @@ table! {
         hash: String = means("SHA-256 of number, the hash of the row before, and entry").since(4),
         wall: Option<String> = means("When it was written, by the server's wall clock").in_unit("UTC").since(4),
         kind: Option<String> =
-            means("Kind of the record: run, session, event, comment, answer, device, access or telemetry").since(4),
+            means(
+            "Kind of the record: run, session, event, comment, answer, device, access, correction, consent, \
+             erasure or telemetry",
+        )
+        .since(4),
         key: Option<String> = means("The record's key").since(4),
         session: Option<String> = means("The record's session; empty for runs and devices").since(4),
         place: Option<i64> = means("Order of the row among those of the session, from 1").since(4),
@@ -435,7 +569,7 @@ table! {
 }
 
 /// Every table that an export may have.
-pub const ALL: [Table; 15] = [
+pub const ALL: [Table; 20] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -445,6 +579,11 @@ pub const ALL: [Table; 15] = [
     DeviceRow::TABLE,
     RecordingRow::TABLE,
     AccessRow::TABLE,
+    ScoreRow::TABLE,
+    CorrectionRow::TABLE,
+    ConsentRow::TABLE,
+    ErasureRow::TABLE,
+    WithdrawalRow::TABLE,
     ChainRow::TABLE,
     TelemetryRow::TABLE,
     AllocationRow::TABLE,

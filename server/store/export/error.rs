@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use jiff::Timestamp;
+
 use crate::ids::SessionId;
 use crate::store::StoreError;
 
@@ -19,6 +21,19 @@ pub enum ExportError {
     /// Policies were asked for before unblinding.
     #[error("session {0} has not been unblinded: unblind it on the researcher's page first, or export it blinded")]
     StillBlinded(SessionId),
+    /// The participant withdrew.
+    #[error(
+        "session {session} was withdrawn by the {by} on {at:.0}: its data stay out of exports; exports of other \
+         sessions of its protocol tell that it was withdrawn, and its place"
+    )]
+    Withdrawn {
+        /// The session.
+        session: SessionId,
+        /// When.
+        at: Timestamp,
+        /// By whom.
+        by: &'static str,
+    },
     /// The folder to write holds something.
     #[error("{} exists and is not empty; choose a new folder", .0.display())]
     Exists(PathBuf),

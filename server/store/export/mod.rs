@@ -7,6 +7,7 @@ mod destination;
 mod error;
 mod folder;
 mod recordings;
+mod scores;
 mod table;
 mod unblinded;
 pub mod verify;
@@ -157,6 +158,10 @@ async fn read(
     let Some(stored) = reader.session(session).await? else {
         return Err(ExportError::NoSession { session, known: known_sessions(reader).await? });
     };
+    if let Some((at, by)) = stored.withdrawn() {
+        return Err(ExportError::Withdrawn { session, at, by: by.name() });
+    }
+
     // `None` unless the session was unblinded: whoever has no `Unblinded` can write no policy.
     let telling = if unblinded { Some(Unblinded::of(reader, &stored).await?) } else { None };
     let telling = match telling {

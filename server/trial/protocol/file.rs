@@ -12,13 +12,17 @@ use super::{Prompt, Protocol, Record};
 use crate::autofocus::PolicyName;
 use crate::lens::FocalPower;
 use crate::trial::allocation::Order;
+use crate::trial::consent;
 use crate::trial::grace::DEFAULT_GRACE;
+use crate::trial::instruments::{nasa_tlx, surg_tlx};
 use crate::trial::question::{Question, QuestionKind};
 
 /// Most segments in a session: what a surgeon can still compare, and the ranking's limit.
 const MOST_SETTINGS: usize = 24;
 /// Most segments in a balanced session: its base order is drawn by rejection, which is slow for long ones.
 const MOST_BALANCED_SETTINGS: usize = 12;
+/// How many points with labels a scale may have: more cannot be told apart, or reached with gloves.
+const LABELS: std::ops::RangeInclusive<u8> = 2..=9;
 /// Longest text that surgeons read, in characters.
 const LONGEST_TEXT: usize = 400;
 
@@ -53,6 +57,8 @@ struct File {
     #[serde(default)]
     record: Record,
     #[serde(default)]
+    consent_version: Option<Spanned<String>>,
+    #[serde(default)]
     quick_comments: Vec<Spanned<String>>,
     #[serde(default)]
     prompts: Vec<FilePrompt>,
@@ -78,6 +84,9 @@ struct FileQuestion {
     points: Option<Spanned<u8>>,
     low: Option<Spanned<String>>,
     high: Option<Spanned<String>>,
+    labels: Option<Spanned<Vec<Spanned<String>>>>,
+    ties: Option<Spanned<bool>>,
+    weighted: Option<Spanned<bool>>,
     #[serde(default)]
     optional: bool,
 }
@@ -87,8 +96,40 @@ struct FileQuestion {
 enum Kind {
     Text,
     Likert,
+    VisualAnalogue,
     Ranking,
     Sus,
+    NasaTlx,
+    SurgTlx,
+    Recognition,
+}
+
+impl Kind {
+    /// The keys that only questions of some kinds have, and this one has.
+    const fn own_keys(self) -> &'static [&'static str] {
+        match self {
+            Self::Likert => &["points", "low", "high", "labels"],
+            Self::VisualAnalogue => &["low", "high"],
+            Self::Ranking => &["ties"],
+            Self::SurgTlx => &["weighted"],
+            Self::Text | Self::Sus | Self::NasaTlx | Self::Recognition => &[],
+        }
+    }
+}
+
+impl FileQuestion {
+    /// The keys that only questions of some kinds have, as far as they are given, each with its place.
+    fn own_keys(&self) -> impl Iterator<Item = (&'static str, Range<usize>)> {
+        let given = [
+            ("points", self.points.as_ref().map(Spanned::span)),
+            ("low", self.low.as_ref().map(Spanned::span)),
+            ("high", self.high.as_ref().map(Spanned::span)),
+            ("labels", self.labels.as_ref().map(Spanned::span)),
+            ("ties", self.ties.as_ref().map(Spanned::span)),
+            ("weighted", self.weighted.as_ref().map(Spanned::span)),
+        ];
+        given.into_iter().filter_map(|(key, span)| Some((key, span?)))
+    }
 }
 
 /// Reads and checks `source`.
@@ -122,6 +163,7 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
         quick_comments: reader.all_shown(&file.quick_comments, "quick_comments")?,
         grace,
         record: file.record,
+        consent: file.consent_version.as_ref().map(consent_version).transpose()?,
         after_segment: reader.questions(&file.after_segment, &mut ids, false)?,
         closing: reader.questions(&file.closing, &mut ids, true)?,
         policies,
@@ -157,6 +199,17 @@ fn start(given: Option<&Spanned<f64>>) -> Result<FocalPower, Fault> {
         FocalPower::new(*power.get_ref())
             .map_err(|error| Fault::new(power.span(), "start_focal_power", error.to_string()))
     })
+}
+
+/// The version of the consent text that is required.
+fn consent_version(given: &Spanned<String>) -> Result<String, Fault> {
+    let version = given.get_ref().trim();
+    let length = version.chars().count();
+    if (1..=consent::LONGEST).contains(&length) {
+        return Ok(version.to_owned());
+    }
+    let message = format!("must be 1 to {} characters, not {length}", consent::LONGEST);
+    Err(Fault::new(given.span(), "consent_version", message))
 }
 
 fn between<T>(value: &Spanned<T>, key: &str, range: std::ops::RangeInclusive<T>, unit: &str) -> Result<T, Fault>
@@ -267,39 +320,76 @@ impl Reader<'_> {
     }
 
     fn kind(&self, question: &FileQuestion, closing: bool) -> Result<QuestionKind, Fault> {
-        match question.kind.get_ref() {
-            Kind::Likert => return self.likert(question),
-            Kind::Ranking if !closing => {
-                let message = "a ranking of all settings can be asked in [[closing]] only";
-                return Err(Fault::new(question.kind.span(), "kind", message));
-            }
-            _ => {}
+        let kind = *question.kind.get_ref();
+        if let Some((key, span)) = question.own_keys().find(|(key, _)| !kind.own_keys().contains(key)) {
+            return Err(Fault::new(span, key, "questions of this kind do not have it"));
         }
 
-        only_for_likert(question.points.as_ref().map(Spanned::span), "points")?;
-        only_for_likert(question.low.as_ref().map(Spanned::span), "low")?;
-        only_for_likert(question.high.as_ref().map(Spanned::span), "high")?;
-        Ok(match question.kind.get_ref() {
-            Kind::Ranking => QuestionKind::Ranking,
-            Kind::Sus => QuestionKind::Sus,
-            Kind::Text | Kind::Likert => QuestionKind::Text,
-        })
+        match kind {
+            Kind::Text => Ok(QuestionKind::Text),
+            Kind::Likert if question.labels.is_some() => self.labelled(question),
+            Kind::Likert => self.likert(question),
+            Kind::VisualAnalogue => {
+                let low = self.end(question, question.low.as_ref(), "low")?;
+                let high = self.end(question, question.high.as_ref(), "high")?;
+                Ok(QuestionKind::VisualAnalogue { low, high })
+            }
+            Kind::Ranking if !closing => {
+                let message = "a ranking of all settings can be asked in [[closing]] only";
+                Err(Fault::new(question.kind.span(), "kind", message))
+            }
+            Kind::Ranking => Ok(QuestionKind::Ranking { ties: is_set(question.ties.as_ref()) }),
+            Kind::Sus => Ok(QuestionKind::Sus),
+            Kind::NasaTlx => Ok(nasa_tlx::question()),
+            Kind::SurgTlx => Ok(surg_tlx::question(is_set(question.weighted.as_ref()))),
+            Kind::Recognition => Ok(QuestionKind::Recognition),
+        }
     }
 
     fn likert(&self, question: &FileQuestion) -> Result<QuestionKind, Fault> {
-        let missing = |key: &str| Fault::new(question.kind.span(), key, "a 'likert' question needs it");
-        let points = question.points.as_ref().ok_or_else(|| missing("points"))?;
+        let missing = || Fault::new(question.kind.span(), "points", "a 'likert' question needs it, or 'labels'");
+        let points = question.points.as_ref().ok_or_else(missing)?;
         if !matches!(points.get_ref(), 5 | 7) {
             let message = format!("must be 5 or 7, not {}", points.get_ref());
             return Err(Fault::new(points.span(), "points", message));
         }
 
-        let low = self.shown(question.low.as_ref().ok_or_else(|| missing("low"))?, "low")?;
-        let high = self.shown(question.high.as_ref().ok_or_else(|| missing("high"))?, "high")?;
-        Ok(QuestionKind::Likert { points: *points.get_ref(), low, high })
+        let low = self.end(question, question.low.as_ref(), "low")?;
+        let high = self.end(question, question.high.as_ref(), "high")?;
+        Ok(QuestionKind::Likert { points: *points.get_ref(), low, high, labels: Vec::new() })
+    }
+
+    /// A Likert scale of which every point has a label.
+    fn labelled(&self, question: &FileQuestion) -> Result<QuestionKind, Fault> {
+        if let Some((key, span)) = question.own_keys().find(|(key, _)| *key != "labels") {
+            return Err(Fault::new(span, key, "'labels' says it already"));
+        }
+
+        let labels = question.labels.as_ref().map_or(&[][..], |labels| labels.get_ref().as_slice());
+        let span = question.labels.as_ref().map_or(0..0, Spanned::span);
+        let labels = self.all_shown(labels, "labels")?;
+        let points = u8::try_from(labels.len()).ok().filter(|points| LABELS.contains(points));
+        let points = points.ok_or_else(|| {
+            let message = format!("must be {} to {} labels, not {}", LABELS.start(), LABELS.end(), labels.len());
+            Fault::new(span.clone(), "labels", message)
+        })?;
+
+        match labels.as_slice() {
+            [low, .., high] => {
+                Ok(QuestionKind::Likert { points, low: low.clone(), high: high.clone(), labels: labels.clone() })
+            }
+            _ => Err(Fault::new(span, "labels", "name at least two points")),
+        }
+    }
+
+    /// What an end of a scale means.
+    fn end(&self, question: &FileQuestion, end: Option<&Spanned<String>>, key: &str) -> Result<String, Fault> {
+        let kind = if *question.kind.get_ref() == Kind::Likert { "likert" } else { "visual-analogue" };
+        let missing = || Fault::new(question.kind.span(), key, format!("a '{kind}' question needs it"));
+        self.shown(end.ok_or_else(missing)?, key)
     }
 }
 
-fn only_for_likert(span: Option<Range<usize>>, key: &str) -> Result<(), Fault> {
-    span.map_or(Ok(()), |span| Err(Fault::new(span, key, "only a 'likert' question has it")))
+fn is_set(value: Option<&Spanned<bool>>) -> bool {
+    value.is_some_and(|value| *value.get_ref())
 }

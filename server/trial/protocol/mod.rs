@@ -49,6 +49,8 @@ pub struct Protocol {
     pub grace: Duration,
     /// What is recorded.
     pub record: Record,
+    /// The version of the consent text without which a session does not start; none where none is required.
+    pub consent: Option<String>,
     /// Questions after each segment.
     pub after_segment: Vec<Question>,
     /// Questions at the end.

@@ -11,11 +11,9 @@ use crate::trial::answers::is_whole;
 use crate::trial::event::EventKind;
 use crate::trial::phase::Phase;
 use crate::trial::question::Question;
+use crate::trial::reason;
 use crate::trial::refusal::Refusal;
 use crate::trial::role::Role;
-
-/// Longest reason, characters.
-const LONGEST_REASON: usize = 1000;
 
 /// The events that `action` by `by` brings about at `now`; none when it was done before (a double
 /// click, a stale tab).
@@ -25,7 +23,7 @@ const LONGEST_REASON: usize = 1000;
 pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> Result<Vec<EventKind>, Refusal> {
     allowed(state, by, action)?;
     match action {
-        Action::Start => Ok(if state.phase == Phase::Ready { vec![EventKind::Started] } else { Vec::new() }),
+        Action::Start => start(state),
         Action::Acknowledge { segment } => acknowledge(state, *segment),
         Action::FinishSegment { segment } => finish_segment(state, *segment, now),
         Action::FinishQuestions { segment: Some(segment) } => finish_questions(state, *segment),
@@ -33,6 +31,7 @@ pub fn decide(state: &SessionState, by: Role, action: &Action, now: Moment) -> R
         Action::Pause { reason } => pause(state, reason, now),
         Action::Resume => Ok(if state.paused.is_some() { vec![EventKind::Resumed] } else { Vec::new() }),
         Action::Abort { reason } => abort(state, reason, now),
+        Action::Withdraw { reason } => withdraw(state, reason),
         Action::Unblind { reason, .. } => unblind(state, reason),
     }
 }
@@ -66,6 +65,7 @@ fn allowed(state: &SessionState, by: Role, action: &Action) -> Result<(), Refusa
             let surgeon_may = state.paused != Some(PauseCause::Operator);
             ("the operator", by == Role::Operator || (by == Role::Surgeon && surgeon_may))
         }
+        Action::Withdraw { .. } => ("the operator or the researcher", matches!(by, Role::Operator | Role::Researcher)),
         Action::Unblind { .. } => ("the researcher", by == Role::Researcher),
     };
 
@@ -85,6 +85,18 @@ fn current(state: &SessionState, segment: SegmentId) -> Result<Option<Phase>, Re
         return Err(Refusal::conflict("this setting has not been reached"));
     }
     Ok(Some(state.phase))
+}
+
+fn start(state: &SessionState) -> Result<Vec<EventKind>, Refusal> {
+    if state.phase != Phase::Ready {
+        return Ok(Vec::new());
+    }
+    match &state.plan.consent {
+        Some(required) if state.consented.as_ref() != Some(required) => Err(Refusal::Conflict(format!(
+            "the protocol requires the participant's consent to version '{required}' of the text; record it first"
+        ))),
+        _ => Ok(vec![EventKind::Started]),
+    }
 }
 
 fn acknowledge(state: &SessionState, segment: SegmentId) -> Result<Vec<EventKind>, Refusal> {
@@ -155,12 +167,12 @@ fn pause(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKin
     if state.paused == Some(PauseCause::Operator) {
         return Ok(Vec::new());
     }
-    let reason = reason_text(reason)?;
+    let reason = reason::optional(reason)?;
     Ok(vec![EventKind::Paused { reason, inspected_ms: milliseconds(state.inspected(now)) }])
 }
 
 fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKind>, Refusal> {
-    let reason = needed(reason_text(reason)?)?;
+    let reason = reason::needed(reason)?;
     match state.phase {
         Phase::Completed => return Err(Refusal::conflict("the session is complete; nothing is left to abort")),
         Phase::Aborted => return Ok(Vec::new()),
@@ -169,8 +181,19 @@ fn abort(state: &SessionState, reason: &str, now: Moment) -> Result<Vec<EventKin
     Ok(vec![EventKind::Aborted { reason, inspected_ms: milliseconds(state.inspected(now)) }])
 }
 
+fn withdraw(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal> {
+    let reason = reason::needed(reason)?;
+    if state.withdrawn {
+        return Ok(Vec::new());
+    }
+    if !state.ended() {
+        return Err(Refusal::conflict("the session is under way; abort it first, then withdraw it"));
+    }
+    Ok(vec![EventKind::Withdrawn { reason }])
+}
+
 fn unblind(state: &SessionState, reason: &str) -> Result<Vec<EventKind>, Refusal> {
-    let reason = needed(reason_text(reason)?)?;
+    let reason = reason::needed(reason)?;
     if state.unblinded {
         return Ok(Vec::new());
     }
@@ -185,22 +208,6 @@ fn answered(state: &SessionState, segment: Option<SegmentId>, questions: &[Quest
 
 fn going_on(state: &SessionState) -> Result<(), Refusal> {
     if state.paused.is_some() { Err(Refusal::conflict("the session is paused")) } else { Ok(()) }
-}
-
-fn reason_text(reason: &str) -> Result<String, Refusal> {
-    let reason = reason.trim();
-    if reason.chars().count() > LONGEST_REASON {
-        return Err(Refusal::Invalid(format!("the reason is longer than {LONGEST_REASON} characters")));
-    }
-    Ok(reason.to_owned())
-}
-
-fn needed(reason: String) -> Result<String, Refusal> {
-    if reason.is_empty() {
-        Err(Refusal::Invalid("give a reason: it is kept in the log".to_owned()))
-    } else {
-        Ok(reason)
-    }
 }
 
 fn milliseconds(duration: Duration) -> u64 {

@@ -38,6 +38,8 @@ pub struct Plan {
     pub after_segment: Vec<Question>,
     /// Questions at the end.
     pub closing: Vec<Question>,
+    /// The version of the consent text without which it does not start; none where the protocol requires no consent.
+    pub consent: Option<String>,
 }
 
 impl Plan {
@@ -49,6 +51,7 @@ impl Plan {
             limit: protocol.segment_limit,
             after_segment: protocol.after_segment.clone(),
             closing: protocol.closing.clone(),
+            consent: protocol.consent.clone(),
         }
     }
 
@@ -80,6 +83,9 @@ pub struct SessionState {
     inspected: Duration,
     running_since: Option<Moment>,
     unblinded: bool,
+    withdrawn: bool,
+    /// The version of the text that the participant last consented to.
+    consented: Option<String>,
     answers: BTreeMap<(Option<SegmentId>, String), Answered>,
 }
 
@@ -105,15 +111,18 @@ impl SessionState {
             inspected: Duration::ZERO,
             running_since: None,
             unblinded: false,
+            withdrawn: false,
+            consented: None,
             answers: BTreeMap::new(),
         }
     }
 
-    /// Where `events`, all from the first, lead to; with the answers kept so far.
+    /// Where `events`, all from the first, lead to; with the answers and the consent kept so far.
     #[must_use]
     pub fn replayed(&self, events: &[Event]) -> Self {
         let mut state = Self::new(self.plan.clone());
         state.answers.clone_from(&self.answers);
+        state.consented.clone_from(&self.consented);
         for event in events {
             state.apply(event);
         }
@@ -148,6 +157,17 @@ impl SessionState {
     #[must_use]
     pub const fn unblinded(&self) -> bool {
         self.unblinded
+    }
+
+    /// Whether the participant withdrew.
+    #[must_use]
+    pub const fn withdrawn(&self) -> bool {
+        self.withdrawn
+    }
+
+    /// Takes in a consent to version `text_version` of the text.
+    pub fn keep_consent(&mut self, text_version: &str) {
+        self.consented = Some(text_version.to_owned());
     }
 
     /// Segments done with, their questions included.
@@ -243,6 +263,7 @@ impl SessionState {
                 self.paused = None;
                 self.phase = Phase::Aborted;
             }
+            EventKind::Withdrawn { .. } => self.withdrawn = true,
             EventKind::Unblinded { .. } => self.unblinded = true,
         }
     }

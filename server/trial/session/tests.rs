@@ -26,6 +26,7 @@ fn plan(segments: usize, asks_after: bool, asks_closing: bool) -> Plan {
         limit: Duration::from_mins(2),
         after_segment: if asks_after { vec![question("a", false), question("b", true)] } else { Vec::new() },
         closing: if asks_closing { vec![question("z", false)] } else { Vec::new() },
+        consent: None,
     }
 }
 

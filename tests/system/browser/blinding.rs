@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 44] = [
+const KEYS: [&str; 51] = [
     "age",
     "answers",
     "area",
@@ -38,16 +38,20 @@ const KEYS: [&str; 44] = [
     "comments",
     "error",
     "estimated",
+    "first",
     "frame",
     "height",
     "high",
     "id",
     "kind",
+    "labels",
     "lens_simulated",
     "low",
     "may_resume",
+    "name",
     "notice",
     "optional",
+    "pairs",
     "patch",
     "paused",
     "per_cell",
@@ -60,11 +64,14 @@ const KEYS: [&str; 44] = [
     "radius",
     "run",
     "remaining_seconds",
+    "scales",
+    "second",
     "segment",
     "session",
     "setting",
     "settings",
     "text",
+    "ties",
     "title",
     "type",
     "unrecorded",
@@ -77,7 +84,11 @@ const KEYS: [&str; 44] = [
     "sharpness",
 ];
 /// Ids of questions are keys too, where answers are told.
-const QUESTION_IDS: [&str; 2] = ["usability", "closing-remarks"];
+const QUESTION_IDS: [&str; 7] =
+    ["usability", "closing-remarks", "effort", "how-often", "workload", "seen-before", "surgical-workload"];
+
+/// What the NASA Task Load Index asks of every setting, in its published words.
+const PUBLISHED: &str = "what you were asked to do";
 
 /// What the check has seen, so that it can be seen to have looked.
 #[derive(Debug, Default)]
@@ -185,6 +196,7 @@ fn keys(value: &Value) {
 }
 
 fn search(place: &str, text: &str) {
+    let text = &text.replace(PUBLISHED, "");
     for word in TELLING {
         if let Some(at) = text.find(word) {
             let around: String = text.chars().skip(at.saturating_sub(60)).take(140).collect();

@@ -9,6 +9,7 @@ mod camera_card;
 mod course;
 mod driver;
 mod full_disk;
+mod instruments;
 mod killed;
 mod lens_troubles;
 mod outbox;

@@ -118,6 +118,12 @@ impl Browser {
     pub async fn to_top(&self) {
         self.run("scrollTo(0, 0)", &[]).await;
     }
+
+    /// Brings the element into the middle of what is seen.
+    pub async fn show(&self, css: &str) {
+        let scroll = "document.querySelector(arguments[0]).scrollIntoView({ block: 'center', behavior: 'instant' })";
+        self.run(scroll, &[json!(css)]).await;
+    }
 }
 
 /// What no driver tells.

@@ -10,6 +10,7 @@ mod playback;
 mod privacy;
 mod real_time;
 mod recordings;
+mod records;
 mod restart;
 mod roles;
 mod seed;

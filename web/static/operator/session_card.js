@@ -5,7 +5,17 @@ import { post, Refused } from "../shared/api.js";
 import { askReason, askWhetherMeant } from "../shared/dialogs.js";
 import { byId, make, redraw, setText } from "../shared/dom.js";
 import { tell, tellTrouble } from "../shared/trouble.js";
-import { commentWords, deeds, phaseWords, steps, timeLeft, unrecordedWords } from "./session_words.js";
+import { askConsent } from "./consent.js";
+import {
+  commentWords,
+  consentWords,
+  deeds,
+  lacksConsent,
+  phaseWords,
+  steps,
+  timeLeft,
+  unrecordedWords,
+} from "./session_words.js";
 
 /** @typedef {Api.OperatorView} View */
 /** @typedef {import("./session_words.js").Deed} Deed */
@@ -40,6 +50,9 @@ export class SessionCard {
     setText(byId("phase"), phaseWords(session));
     byId("unrecorded").hidden = !session.unrecorded;
     setText(byId("unrecorded"), unrecordedWords(session));
+    setText(byId("consent"), consentWords(session));
+    byId("consent").className = lacksConsent(session) || session.withdrawn ? "notice-line warn" : "muted";
+    byId("consent").hidden = consentWords(session) === "";
     byId("steps").replaceChildren(...steps(session).map((className) => make("li", { className })));
     this.#drawDeeds(session);
     drawFeed(session);
@@ -88,6 +101,10 @@ export class SessionCard {
         return this.#askPause(this.#session);
       case "abort":
         return this.#askAbort(this.#session);
+      case "consent":
+        return this.#askConsent(this.#session);
+      case "withdraw":
+        return this.#askWithdrawal(this.#session);
       case "dismiss":
         return this.#dismiss(this.#session);
     }
@@ -125,6 +142,24 @@ export class SessionCard {
       go: "Abort session",
       danger: true,
       done: (reason) => this.#send(session, { action: "abort", reason }),
+    });
+  }
+
+  /** @param {View} view */
+  #askConsent(view) {
+    askConsent(view, (consent) => this.#followAnswer(post("/api/operator/consents", consent)));
+  }
+
+  /** @param {View} view */
+  #askWithdrawal({ session }) {
+    askReason({
+      heading: "The participant withdraws",
+      consequence:
+        "From now on this session’s data stay out of exports and analyses. That it was withdrawn remains on record. " +
+        "This cannot be undone.",
+      go: "Withdraw session",
+      danger: true,
+      done: (reason) => this.#send(session, { action: "withdraw", reason }),
     });
   }
 

@@ -3,7 +3,7 @@
 import { clockText } from "../shared/text.js";
 
 /** @typedef {Api.OperatorView} View */
-/** @typedef {"start" | "resume" | "end-setting" | "pause" | "dismiss" | "abort"} Deed */
+/** @typedef {"start" | "resume" | "end-setting" | "pause" | "dismiss" | "abort" | "consent" | "withdraw"} Deed */
 
 /** @param {View} view */
 export function isOver({ phase }) {
@@ -55,17 +55,48 @@ export function timeLeft({ phase, paused }, seconds) {
 }
 
 /**
+ * Whether the session waits for the participant's consent.
+ *
+ * @param {View} view
+ */
+export function lacksConsent({ consent, consent_required: required }) {
+  return required != null && consent?.text_version !== required;
+}
+
+/**
+ * What is known of the participant's consent, or of a withdrawal; empty where there is nothing to say.
+ *
+ * @param {View} view
+ */
+export function consentWords(view) {
+  const { consent, consent_required: required, withdrawn } = view;
+  if (withdrawn) return "The participant withdrew. The data of this session stay out of exports.";
+  if (lacksConsent(view)) {
+    return `The protocol requires the participant’s consent to version ${required} of the text. Record it before the start.`;
+  }
+  if (!consent) return "";
+  const { text_version: version, medium, given_on: day, obtained_by: by } = consent;
+  return `Consent to version ${version} of the text, on ${medium}, given on ${day}, obtained by ${by}.`;
+}
+
+/**
  * The buttons, in order.
  *
  * @param {View} view
  * @returns {{ deed: Deed, label: string, className: "" | "primary" | "danger" }[]}
  */
 export function deeds(view) {
-  const { phase, paused, setting } = view;
+  const { phase, paused, setting, withdrawn } = view;
   /** @type {ReturnType<typeof deeds>} */
   const all = [];
 
-  if (phase === "ready") all.push({ deed: "start", label: "Start", className: "primary" });
+  if (phase === "ready") {
+    const missing = lacksConsent(view);
+    if (missing || !view.consent) {
+      all.push({ deed: "consent", label: "Record consent…", className: missing ? "primary" : "" });
+    }
+    if (!missing) all.push({ deed: "start", label: "Start", className: "primary" });
+  }
   if (paused) all.push({ deed: "resume", label: "Resume", className: "primary" });
   else if (phase === "inspecting") {
     all.push({ deed: "end-setting", label: `End setting ${setting} now…`, className: "" });
@@ -74,8 +105,10 @@ export function deeds(view) {
   if (!paused && phase !== "ready" && !isOver(view)) {
     all.push({ deed: "pause", label: "Pause…", className: "" });
   }
-  if (isOver(view)) all.push({ deed: "dismiss", label: "Close and prepare the next", className: "primary" });
-  else all.push({ deed: "abort", label: "Abort…", className: "danger" });
+  if (isOver(view)) {
+    all.push({ deed: "dismiss", label: "Close and prepare the next", className: "primary" });
+    if (!withdrawn) all.push({ deed: "withdraw", label: "Participant withdraws…", className: "danger" });
+  } else all.push({ deed: "abort", label: "Abort…", className: "danger" });
   return all;
 }
 
@@ -93,6 +126,8 @@ export function unrecordedWords({ unrecorded, unrecorded_because: because }) {
 
 /** @param {Api.CommentLine} comment */
 export function commentWords(comment) {
+  // Nobody says nothing: such a comment was erased.
+  if (comment.kind !== "mark" && comment.text === "") return "Erased";
   if (comment.kind === "mark") return "Marked this moment";
   return comment.kind === "quick" ? `${comment.text} (quick)` : comment.text;
 }

@@ -5,6 +5,7 @@ import { get, inWords, post } from "../shared/api.js";
 import { askReason } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
+import { askErasure, askNote, askWithdrawal, correctAnswer, correctParticipant } from "./corrections.js";
 import { drawMetric } from "./metric_drawing.js";
 import { Player } from "./player.js";
 import { lastComment, lengthOf, Scale } from "./timeline.js";
@@ -122,7 +123,30 @@ function listComments(comments) {
       make("span", { className: "said" }, said, late && " ", late),
     );
   });
-  byId("comment-list").replaceChildren(...lines.map((line) => make("li", {}, line)));
+  const items = lines.map((line, index) => {
+    const comment = comments[index];
+    return make("li", {}, line, comment ? besideComment(comment) : null);
+  });
+  byId("comment-list").replaceChildren(...items);
+}
+
+/**
+ * The note on a comment, and what can be done with the comment once the session has ended.
+ *
+ * @param {Api.TimelineComment} comment
+ */
+function besideComment({ key, kind, note, erased }) {
+  const noted = note ? make("p", { className: "note" }, `Note: ${note}`) : null;
+  const button = (
+    /** @type {string} */ label,
+    /** @type {string} */ level,
+    /** @type {() => void} */ onclick,
+  ) => make("button", { type: "button", className: `small ${level}`, onclick }, label);
+  const deeds = ended ? [button("Note…", "", () => askNote(session, key, note ?? ""))] : [];
+  if (ended && kind !== "mark" && !erased) {
+    deeds.push(button("Erase…", "danger", () => askErasure(session, "comment", key)));
+  }
+  return make("div", { className: "beside" }, noted, make("span", { className: "deeds" }, ...deeds));
 }
 
 /**
@@ -266,4 +290,25 @@ byId("show-path").onclick = async () => {
 
 // A session that is unblinded already has no such button.
 document.getElementById("unblind")?.addEventListener("click", unblind);
+
+// Nor has one that is under way, or was withdrawn, these.
+document.getElementById("withdraw")?.addEventListener("click", () => askWithdrawal(session));
+document.getElementById("correct-participant")?.addEventListener("click", () => {
+  correctParticipant(session, page.participant ?? "", (page.participants ?? "").split(" ").filter(Boolean));
+});
+document.getElementById("correct-answer")?.addEventListener("click", async () => {
+  try {
+    await correctAnswer(session);
+  } catch (error) {
+    setText(byId("timeline-trouble"), inWords(error));
+  }
+});
+for (const button of document.querySelectorAll("button[data-note], button[data-erase]")) {
+  if (!(button instanceof HTMLButtonElement)) continue;
+  const { note, noted, erase } = button.dataset;
+  button.onclick = () => {
+    if (note) askNote(session, note, noted ?? "");
+    if (erase) askErasure(session, "answer", erase);
+  };
+}
 load();

@@ -24,6 +24,7 @@ export function description({ settings, pauses, comments, set_aside: setAside },
 
 /** @param {Api.TimelineComment} comment */
 export function commentWords(comment) {
+  if (comment.erased) return `Erased on ${comment.erased.slice(0, 10)}`;
   return comment.kind === "mark" ? "Marked this moment" : comment.text;
 }
 
@@ -40,8 +41,9 @@ export function setAsideWords({ value, counted, late }) {
 
 /** @param {Api.AnswerValue} value a 0 among points is one that was not given */
 function answerWords(value) {
-  const parts = Array.isArray(value) ? value : [value];
-  return parts.map((part) => (part === 0 ? "–" : part)).join(", ");
+  // Nobody answers with nothing: such a text was erased.
+  if (value === "") return "erased";
+  return Array.isArray(value) ? value.map((part) => (part === 0 ? "–" : part)).join(", ") : String(value);
 }
 
 /**

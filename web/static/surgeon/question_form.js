@@ -1,9 +1,23 @@
 // The questions as a form.
 
 import { make, setText } from "../shared/dom.js";
-import { NOT_ANSWERED, ordinal, RankingAnswer, ScaleAnswer, SusAnswer, TextAnswer } from "./questions.js";
+import { drawScale, drawWords } from "./choices.js";
+import { drawPlaces, drawWorkload } from "./instrument_form.js";
+import {
+  ordinal,
+  PlacesAnswer,
+  RankingAnswer,
+  ScaleAnswer,
+  SusAnswer,
+  TextAnswer,
+  WorkloadAnswer,
+} from "./questions.js";
+import { drawTrack } from "./track.js";
 
 /** @typedef {import("./questions.js").AnyAnswer} AnyAnswer */
+
+/** Whether settings were recognised, from 1. */
+const RECOGNITION = ["No", "Not sure", "Yes"];
 
 /**
  * One question's element; `draw` shows the answer's state, `wantedPlace` the first place still to
@@ -75,6 +89,8 @@ function drawKind(answer, changed) {
   if (answer instanceof TextAnswer) return drawText(answer, changed);
   if (answer instanceof ScaleAnswer) return drawScaleQuestion(answer, changed);
   if (answer instanceof SusAnswer) return drawSus(answer, changed);
+  if (answer instanceof WorkloadAnswer) return drawWorkload(answer, heading(answer.question), changed);
+  if (answer instanceof PlacesAnswer) return drawPlaces(answer, heading(answer.question), changed);
   return drawRanking(answer, changed);
 }
 
@@ -116,53 +132,37 @@ function drawText(answer, changed) {
  */
 function drawScaleQuestion(answer, changed) {
   const { question } = answer;
-  if (question.kind !== "likert") throw new Error(`question ${question.id} has no scale`);
-  const scale = drawScale(question.id, question, (point) => {
+  const { element, check } = drawPoints(question, (point) => {
     answer.choose(point);
     changed();
   });
-  return { nodes: [heading(question), scale.element], draw: () => scale.check(answer.point) };
+  return { nodes: [heading(question), element], draw: () => check(answer.point) };
 }
 
 /**
- * Radio buttons from 1 to `points`, with what the ends mean.
+ * What a question that takes one number is answered with.
  *
- * @param {string} name
- * @param {{ points: number, low: string, high: string }} ends
+ * @param {Api.Question} question
  * @param {(point: number) => void} choose
+ * @returns {import("./choices.js").Choices}
  */
-function drawScale(name, { points, low, high }, choose) {
-  // Room for the mark is kept, so that nothing moves when it comes or goes.
-  const ends = make(
-    "div",
-    { className: "ends" },
-    make("span", { "aria-hidden": "true" }, low),
-    make("span", { className: "gap" }, NOT_ANSWERED),
-    make("span", { "aria-hidden": "true" }, high),
-  );
-
-  const inputs = Array.from({ length: points }, (_, index) => {
-    const point = index + 1;
-    const meaning = point === 1 ? `, ${low}` : point === points ? `, ${high}` : "";
-    const label = `${point} of ${points}${meaning}`;
-    const input = make("input", { type: "radio", name, value: String(point), "aria-label": label });
-    input.addEventListener("change", () => choose(point));
-    return input;
-  });
-  const labels = inputs.map((input) =>
-    make("label", {}, input, make("span", { "aria-hidden": "true" }, input.value)),
-  );
-
-  return {
-    element: make("div", { className: "likert" }, make("div", { className: "points" }, ...labels), ends),
-    /** @param {number | null} point */
-    check(point) {
-      for (const [index, input] of inputs.entries()) {
-        const chosen = index + 1 === point;
-        if (input.checked !== chosen) input.checked = chosen;
-      }
-    },
-  };
+function drawPoints(question, choose) {
+  switch (question.kind) {
+    case "likert":
+      return question.labels?.length
+        ? drawWords(question.id, question.labels, choose, "column")
+        : drawScale(question.id, question, choose);
+    case "recognition":
+      return drawWords(question.id, RECOGNITION, choose);
+    case "visual-analogue": {
+      const { low, high, text } = question;
+      const words = (/** @type {number} */ value) => `${value} of 100, from ${low} to ${high}`;
+      const track = drawTrack({ label: text, low, high, min: 0, max: 100, graded: false, words }, choose);
+      return { element: track.element, check: track.show };
+    }
+    default:
+      throw new Error(`question ${question.id} has no scale`);
+  }
 }
 
 /**

@@ -103,7 +103,7 @@ export class QuestionPanel {
     const first = this.#boxes.find(({ answer }) => answer === unanswered[0])?.wantedPlace();
     first?.scrollIntoView({ block: "center" });
     /** @type {HTMLElement | null | undefined} */
-    const field = first?.querySelector("input, textarea, button.confirm");
+    const field = first?.querySelector("[role=slider], input, textarea, button.confirm");
     field?.focus({ preventScroll: true });
   }
 

@@ -267,7 +267,7 @@ export class TextAnswer extends Answer {
   }
 }
 
-/** A point on a scale. */
+/** A point on a scale, or a place on a line. */
 export class ScaleAnswer extends Answer {
   /** @type {number | null} */
   point;
@@ -300,20 +300,22 @@ export class ScaleAnswer extends Answer {
   }
 }
 
-/** The ten items of the System Usability Scale; 0 where none is given. */
-export class SusAnswer extends Answer {
-  items = SUS_ITEMS;
+/** A questionnaire of several items, each a point from 1; 0 where none is given. */
+class ItemsAnswer extends Answer {
   points;
-  #wantedItems = SUS_ITEMS.map(() => false);
+  /** @type {boolean[]} */
+  #wantedItems;
 
   /**
    * @param {Api.Question} question
    * @param {Api.AnswerValue | undefined} answered
    * @param {Context} context
+   * @param {number} count how many items there are
    */
-  constructor(question, answered, context) {
+  constructor(question, answered, context, count) {
     super(question, context);
-    this.points = Array.isArray(answered) ? [...answered] : SUS_ITEMS.map(() => 0);
+    this.points = Array.isArray(answered) ? [...answered] : Array.from({ length: count }, () => 0);
+    this.#wantedItems = this.points.map(() => false);
     if (answered !== undefined) this.show("saved");
   }
 
@@ -336,7 +338,7 @@ export class SusAnswer extends Answer {
   /** @override */
   unwant() {
     super.unwant();
-    this.#wantedItems = SUS_ITEMS.map(() => false);
+    this.#wantedItems = this.points.map(() => false);
   }
 
   /**
@@ -362,6 +364,51 @@ export class SusAnswer extends Answer {
     this.points = [...value];
     this.#wantedItems = this.#wantedItems.map((wanted, item) => wanted && value[item] === 0);
     return isNews;
+  }
+}
+
+/** The ten items of the System Usability Scale. */
+export class SusAnswer extends ItemsAnswer {
+  items = SUS_ITEMS;
+
+  /**
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue | undefined} answered
+   * @param {Context} context
+   */
+  constructor(question, answered, context) {
+    super(question, answered, context, SUS_ITEMS.length);
+  }
+}
+
+/** The scales of a workload index, each a gradation from 1, and which of each pair of them was chosen, 1 or 2. */
+export class WorkloadAnswer extends ItemsAnswer {
+  scales;
+  pairs;
+
+  /**
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue | undefined} answered
+   * @param {Context} context
+   * @param {Api.Scale[]} scales
+   * @param {Api.Pair[]} pairs
+   */
+  constructor(question, answered, context, scales, pairs) {
+    super(question, answered, context, scales.length + pairs.length);
+    this.scales = scales;
+    this.pairs = pairs;
+  }
+}
+
+/** The place of each setting, from 1; settings may share one. */
+export class PlacesAnswer extends ItemsAnswer {
+  /**
+   * @param {Api.Question} question
+   * @param {Api.AnswerValue | undefined} answered
+   * @param {Context} context
+   */
+  constructor(question, answered, context) {
+    super(question, answered, context, context.settings);
   }
 }
 
@@ -437,7 +484,7 @@ export class RankingAnswer extends Answer {
   }
 }
 
-/** @typedef {TextAnswer | ScaleAnswer | SusAnswer | RankingAnswer} AnyAnswer */
+/** @typedef {TextAnswer | ScaleAnswer | SusAnswer | WorkloadAnswer | PlacesAnswer | RankingAnswer} AnyAnswer */
 
 /**
  * @param {Api.Question} question
@@ -450,11 +497,19 @@ export function answerTo(question, answered, context) {
     case "text":
       return new TextAnswer(question, answered, context);
     case "likert":
+    case "visual-analogue":
+    case "recognition":
       return new ScaleAnswer(question, answered, context);
     case "sus":
       return new SusAnswer(question, answered, context);
+    case "nasa-tlx":
+      return new WorkloadAnswer(question, answered, context, question.scales, []);
+    case "surg-tlx":
+      return new WorkloadAnswer(question, answered, context, question.scales, question.pairs);
     case "ranking":
-      return new RankingAnswer(question, answered, context);
+      return question.ties
+        ? new PlacesAnswer(question, answered, context)
+        : new RankingAnswer(question, answered, context);
   }
 }
 

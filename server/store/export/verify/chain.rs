@@ -11,16 +11,18 @@ use serde_json::Value;
 use super::files::{cells, csv, json, session_cell};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, Found, FoundRow, Walk};
-use crate::store::chain::{Entry, Fields, Head, KINDS, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed};
+use crate::store::chain::{
+    Entry, Fields, Head, KINDS, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed,
+};
 use crate::store::export::description::ALL;
 
 /// A row of a table: its cells by column, as they were recorded.
 type Cells = BTreeMap<String, String>;
 
-/// Checks the chain of the export in `folder`; `expected` is a head known from elsewhere.
-pub(super) fn chain(folder: &Path, expected: Option<&Head>) -> Outcome {
+/// Checks the chain of the export in `folder`, which is of this format; `expected` is a head known from elsewhere.
+pub(super) fn chain(folder: &Path, format: u64, expected: Option<&Head>) -> Outcome {
     let salts = salts(folder)?;
-    let mut walk = Walk::new(records(folder)?, expected.cloned());
+    let mut walk = Walk::new(records(folder, format)?, expected.cloned());
     let steps = Steps::read(folder)?;
     let mut last = None;
 
@@ -116,22 +118,23 @@ fn rows(folder: &Path, name: &str) -> Result<Vec<Cells>, String> {
     reader.records().map(|row| row.map(cells).map_err(|error| format!("{file}: {error}"))).collect()
 }
 
-/// The records of the tables, by kind and key.
-fn records(folder: &Path) -> Result<BTreeMap<(&'static str, String), Record>, String> {
-    let told = folder.join("allocation.json").exists();
-    let unblinding = if told { json(folder, "allocation.json")?["unblinding_reason"].take() } else { Value::Null };
+/// The records of the tables that exports of this format have, by kind and key.
+fn records(folder: &Path, format: u64) -> Result<BTreeMap<(&'static str, String), Record>, String> {
+    let unblinded = folder.join("allocation.json").exists();
+    let unblinding = if unblinded { json(folder, "allocation.json")?["unblinding_reason"].take() } else { Value::Null };
     let unblinding = unblinding.as_str();
 
     let mut found = BTreeMap::new();
     // An export tells of no participant but by the session's code.
-    for kind in KINDS.iter().filter(|kind| kind.name != "participant") {
+    let told = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table && table.since() <= format);
+    for kind in KINDS.iter().filter(told) {
         for mut row in rows(folder, kind.table)? {
             let cell = |row: &Cells, column: &str| row.get(column).cloned().unwrap_or_default();
             let key = match kind.name {
                 "run" => cell(&row, "run"),
                 "session" => cell(&row, "session"),
                 "event" => format!("{}/{}", cell(&row, "session"), cell(&row, "number")),
-                "device" | "access" => cell(&row, "number"),
+                "device" | "access" | "correction" | "consent" | "erasure" => cell(&row, "number"),
                 _ => cell(&row, "key"),
             };
 

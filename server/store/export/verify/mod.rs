@@ -17,7 +17,8 @@ pub use verdict::Verdict;
 
 use crate::store::Head;
 use crate::store::export::description::{
-    ALL, AccessRow, AnswerRow, CommentRow, DeviceRow, EventRow, RecordingRow, RunRow, SegmentRow, SessionRow,
+    ALL, AccessRow, AnswerRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow,
+    RunRow, ScoreRow, SegmentRow, SessionRow, WithdrawalRow,
 };
 use crate::store::export::folder::SUMS;
 use crate::store::export::table::{FORMAT, Row, Table};
@@ -65,9 +66,10 @@ pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
 
 /// Exports have the chain since their fourth format.
 fn chained(folder: &Path, expected: Option<&Head>) -> Outcome {
-    match format(folder)? {
+    let format = format(folder)?;
+    match format {
         ..4 => Ok(Verdict::NotChecked("an earlier version wrote the export, without a chain".to_owned())),
-        _ => chain(folder, expected),
+        _ => chain(folder, format, expected),
     }
 }
 
@@ -197,7 +199,7 @@ const UNBLINDED: [(&str, u64); 5] = [
 ];
 
 /// Tables that session.json repeats.
-const COPIED: [Table; 9] = [
+const COPIED: [Table; 14] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -207,6 +209,11 @@ const COPIED: [Table; 9] = [
     DeviceRow::TABLE,
     RecordingRow::TABLE,
     AccessRow::TABLE,
+    ScoreRow::TABLE,
+    CorrectionRow::TABLE,
+    ConsentRow::TABLE,
+    ErasureRow::TABLE,
+    WithdrawalRow::TABLE,
 ];
 
 fn copies(folder: &Path) -> Outcome {

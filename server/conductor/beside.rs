@@ -1,0 +1,181 @@
+//! What stands beside a session, as researchers read it: consents, corrections, erasures, a withdrawal.
+
+use jiff::Timestamp;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::course::Course;
+use super::{ConductError, Conductor};
+use crate::ids::SessionId;
+use crate::store::{Answer, Stamp, StoredConsent, StoredCorrection, StoredErasure};
+use crate::trial::consent::Consent;
+use crate::trial::correction::{Field, Subject};
+use crate::trial::erasure::Erasable;
+use crate::trial::event::EventKind;
+use crate::trial::instruments::in_words;
+use crate::trial::question::Question;
+use crate::trial::role::Role;
+use crate::trial::view::LogLine;
+
+/// A correction for reading.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct CorrectionLine {
+    /// Order of the record in the database.
+    pub number: i64,
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// Who.
+    pub by: Role,
+    /// What was corrected, in words.
+    pub about: String,
+    /// What of it.
+    pub field: Field,
+    /// What stood there so far, in words.
+    pub old: String,
+    /// What is right, in words.
+    pub new: String,
+    /// Why.
+    pub reason: String,
+    /// When its words were erased, by the server's wall clock.
+    #[schema(value_type = Option<String>)]
+    pub erased: Option<Timestamp>,
+}
+
+/// A consent for reading.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct ConsentLine {
+    /// When it was recorded, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// The consent.
+    #[serde(flatten)]
+    pub consent: Consent,
+}
+
+/// A withdrawal for reading.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct WithdrawalLine {
+    /// When, by the server's wall clock.
+    #[schema(value_type = String)]
+    pub at: Timestamp,
+    /// Who recorded it.
+    pub by: Role,
+    /// Why.
+    pub reason: String,
+}
+
+impl Conductor {
+    /// What was recorded beside the session: consents, corrections, erasures. Each with its time by the server's clocks
+    /// over its restarts.
+    pub(super) async fn beside(&self, session: SessionId) -> Result<Vec<(Timestamp, LogLine)>, ConductError> {
+        let reader = self.shared.store.reader();
+        let clocks = &self.shared.run_clock.clocks;
+        let line = |run: i64, stamp: Stamp, by: Role, text: String| {
+            (clocks.wall(run, stamp.at), LogLine { at: stamp.wall, by, text })
+        };
+
+        let mut lines = Vec::new();
+        for stored in reader.consents(session).await? {
+            let Consent { text_version, given_on, obtained_by, medium } = &stored.consent;
+            let medium = medium.name();
+            let text = format!(
+                "Consent recorded: version {text_version} of the text, on {medium}, given on {given_on}, \
+                 obtained by {obtained_by}"
+            );
+            lines.push(line(stored.run, stored.stamp, stored.by, text));
+        }
+        for StoredCorrection { run, correction, .. } in reader.corrections(session).await? {
+            let subject = correction.subject.name();
+            let what = match correction.field {
+                Field::Note => format!("Note on {} {subject}", if subject == "answer" { "an" } else { "a" }),
+                Field::Participant => "Participant corrected".to_owned(),
+                Field::Value => "Answer corrected".to_owned(),
+            };
+            let why = Some(&correction.reason).filter(|reason| !reason.is_empty());
+            let text = why.map_or_else(|| what.clone(), |reason| format!("{what}: {reason}"));
+            lines.push(line(run, correction.stamp, correction.by, text));
+        }
+        for StoredErasure { run, erasure, .. } in reader.erasures(session).await? {
+            let what = erasure.subject.name();
+            let text =
+                format!("Words of {} {what} erased: {}", if what == "answer" { "an" } else { "a" }, erasure.reason);
+            lines.push(line(run, erasure.stamp, erasure.by, text));
+        }
+        Ok(lines)
+    }
+
+    pub(super) async fn consent_lines(&self, session: SessionId) -> Result<Vec<ConsentLine>, ConductError> {
+        let consents = self.shared.store.reader().consents(session).await?;
+        let line = |stored: StoredConsent| ConsentLine { at: stored.stamp.wall, consent: stored.consent };
+        Ok(consents.into_iter().map(line).collect())
+    }
+
+    pub(super) async fn correction_lines(&self, course: &Course) -> Result<Vec<CorrectionLine>, ConductError> {
+        let reader = self.shared.store.reader();
+        let session = course.session();
+        let corrections = reader.corrections(session).await?;
+        let answers = reader.answers(session).await?;
+        let comments = reader.comments(session).await?;
+        let erasures = reader.erasures(session).await?;
+
+        let erased = |number: i64| {
+            let its_own = |stored: &&StoredErasure| {
+                stored.erasure.subject == Erasable::Correction && stored.erasure.record == number.to_string()
+            };
+            erasures.iter().find(its_own).map(|stored| stored.erasure.stamp.wall)
+        };
+        let line = |StoredCorrection { number, correction, .. }: StoredCorrection| {
+            let mut all = answers.iter().map(|(_, answer)| answer);
+            let answer = all.find(|answer| answer.key.to_string() == correction.record);
+            let question = answer.and_then(|answer| question_of(course, answer));
+            let words = |text: &str| match (correction.field, serde_json::from_str(text)) {
+                (Field::Value, Ok(value)) => in_words(question.map(|question| &question.kind), &value),
+                _ => text.to_owned(),
+            };
+            let setting = answer.and_then(|answer| answer.segment).or_else(|| {
+                let comment = comments.iter().find(|(_, comment)| comment.key.to_string() == correction.record);
+                comment.and_then(|(_, comment)| comment.segment)
+            });
+            let setting = setting.map(|segment| course.setting(segment));
+
+            CorrectionLine {
+                number,
+                at: correction.stamp.wall,
+                by: correction.by,
+                about: about(correction.subject, setting, question),
+                field: correction.field,
+                old: words(&correction.old),
+                new: words(&correction.new),
+                reason: correction.reason.clone(),
+                erased: erased(number),
+            }
+        };
+        Ok(corrections.into_iter().map(line).collect())
+    }
+}
+
+fn question_of<'a>(course: &'a Course, answer: &Answer) -> Option<&'a Question> {
+    course.protocol.question(&answer.question, answer.segment.is_some())
+}
+
+/// What a correction is about, in words.
+fn about(subject: Subject, setting: Option<usize>, question: Option<&Question>) -> String {
+    let on = setting.map_or_else(String::new, |setting| format!(" on setting {setting}"));
+    match (subject, question) {
+        (Subject::Session, _) => "Participant".to_owned(),
+        (Subject::Comment, _) => format!("Comment{on}"),
+        (Subject::Answer, Some(question)) => format!("Answer{on}: {}", question.text),
+        (Subject::Answer, None) => format!("Answer{on}"),
+    }
+}
+
+/// That the participant withdrew, if so.
+pub(super) fn withdrawal(course: &Course) -> Option<WithdrawalLine> {
+    course.events.iter().find_map(|event| match &event.kind {
+        EventKind::Withdrawn { reason } => {
+            Some(WithdrawalLine { at: event.wall, by: event.by, reason: reason.clone() })
+        }
+        _ => None,
+    })
+}

@@ -1,0 +1,85 @@
+//! What a researcher does to a session's records: corrections, erasures, and a withdrawal.
+
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use serde::Deserialize;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
+use super::roles::Researcher;
+use crate::ids::SessionId;
+use crate::trial::action::Action;
+use crate::trial::correction::NewCorrection;
+use crate::trial::erasure::NewErasure;
+use crate::trial::role::Role;
+
+/// Corrects something of a session that has ended. The original stays; the correction stands beside it.
+#[utoipa::path(post, path = "/api/researcher/sessions/{session}/corrections", tag = "researcher",
+    params(("session" = SessionId, Path)),
+    request_body = NewCorrection, responses(
+    (status = 204, description = "Recorded"),
+    (status = 404, description = "No such session or record", body = ErrorBody),
+    (status = 409, description = "The session is under way, what a surgeon wrote cannot be corrected, or somebody \
+                                  has corrected the same meanwhile", body = ErrorBody),
+    (status = 422, description = "It makes no sense, or no reason was given", body = ErrorBody)))]
+async fn correct(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+    JsonBody(correction): JsonBody<NewCorrection>,
+) -> Result<StatusCode, Error> {
+    app.conductor.correct(Role::Researcher, id, correction).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Erases words for good. Once this has answered, they are nowhere in the database; their record and its hash stay.
+#[utoipa::path(post, path = "/api/researcher/sessions/{session}/erasures", tag = "researcher",
+    params(("session" = SessionId, Path)),
+    request_body = NewErasure, responses(
+    (status = 204, description = "Erased"),
+    (status = 404, description = "No such session or record", body = ErrorBody),
+    (status = 409, description = "A session is under way, or the record has no words", body = ErrorBody),
+    (status = 422, description = "No reason was given", body = ErrorBody)))]
+async fn erase(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+    JsonBody(erasure): JsonBody<NewErasure>,
+) -> Result<StatusCode, Error> {
+    app.conductor.erase(Role::Researcher, id, erasure).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Why a participant withdrew.
+#[derive(Debug, Deserialize, ToSchema)]
+struct Withdraw {
+    /// Kept in the audit trail.
+    #[schema(pattern = r"\S")]
+    reason: String,
+}
+
+/// Records that the participant withdrew: from now on the session's data stay out of exports.
+#[utoipa::path(post, path = "/api/researcher/sessions/{session}/withdraw", tag = "researcher",
+    params(("session" = SessionId, Path)),
+    request_body = Withdraw, responses(
+    (status = 204, description = "Withdrawn"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "The session is under way", body = ErrorBody),
+    (status = 422, description = "No reason was given", body = ErrorBody)))]
+async fn withdraw(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+    JsonBody(Withdraw { reason }): JsonBody<Withdraw>,
+) -> Result<StatusCode, Error> {
+    app.conductor.act(Role::Researcher, id, Action::Withdraw { reason }).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(correct)).routes(routes!(erase)).routes(routes!(withdraw))
+}

@@ -1,0 +1,153 @@
+//! Erasure of words: from their record, from the free pages of the file, and from its log. The record and its hash
+//! stay; the salt of the hash goes, so that nobody can try which words had it.
+
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+use super::scrub::scrub;
+use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
+use super::{Reader, Stamp, Store, StoreError, chain};
+use crate::ids::SessionId;
+use crate::trial::erasure::Erasable;
+use crate::trial::role::Role;
+
+/// An erasure to be made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Erasure {
+    /// The session.
+    pub session: SessionId,
+    /// What sort of record.
+    pub subject: Erasable,
+    /// Its key; of a correction its number.
+    pub record: String,
+    /// Why.
+    pub reason: String,
+    /// Who.
+    pub by: Role,
+    /// When.
+    pub stamp: Stamp,
+}
+
+/// An erasure read back.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredErasure {
+    /// Order of the record in the database.
+    pub number: i64,
+    /// The start of the server that recorded it.
+    pub run: i64,
+    /// The erasure.
+    pub erasure: Erasure,
+}
+
+impl Store {
+    /// Erases the words of all of `erasures`, or of none. What is erased already stays so. When this returns, the
+    /// words are nowhere in the database's files.
+    ///
+    /// # Errors
+    /// When the disk or database failed, or another program has the database open; then the words may still stand in
+    /// free pages of the file or in its log, until the same is asked again or the server starts again.
+    pub async fn erase(&self, erasures: &[Erasure]) -> Result<(), StoreError> {
+        let _turn = self.turn().await;
+        let mut connection = self.inner.trial.acquire().await?;
+        let erased = insert_erasures(&mut connection, self.inner.run, erasures).await;
+        drop_if_failed(connection, &erased);
+        erased?;
+        scrub(&self.inner.trial).await
+    }
+}
+
+async fn insert_erasures(connection: &mut SqliteConnection, run: i64, erasures: &[Erasure]) -> Result<(), StoreError> {
+    // What is overwritten is zeroed. The driver's connection keeps this; others do not need it.
+    sqlx::query("PRAGMA secure_delete = ON").execute(&mut *connection).await?;
+    let mut transaction = begin(connection).await?;
+    for erasure in erasures {
+        insert_erasure(&mut transaction, run, erasure).await?;
+    }
+    Ok(transaction.commit().await?)
+}
+
+async fn insert_erasure(connection: &mut SqliteConnection, run: i64, erasure: &Erasure) -> Result<(), StoreError> {
+    let wall = erasure.stamp.wall.to_string();
+    let known = "SELECT number FROM erasures WHERE subject = ? AND record = ?";
+    let known: Option<i64> = sqlx::query_scalar(known)
+        .bind(erasure.subject.name())
+        .bind(&erasure.record)
+        .fetch_optional(&mut *connection)
+        .await?;
+    if let Some(known) = known {
+        // Asked again because the files were not rid of it: they are gone through once more.
+        return note_unfinished(connection, known).await;
+    }
+
+    let done = sqlx::query(
+        "INSERT INTO erasures (session, subject, record, reason, role, run, wall, monotonic_ns)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(erasure.session.to_string())
+    .bind(erasure.subject.name())
+    .bind(&erasure.record)
+    .bind(&erasure.reason)
+    .bind(erasure.by.name())
+    .bind(run)
+    .bind(&wall)
+    .bind(nanoseconds(erasure.stamp.at))
+    .execute(&mut *connection)
+    .await?;
+    let number = done.last_insert_rowid();
+
+    let emptied = match erasure.subject {
+        Erasable::Answer => "UPDATE answers SET value = '\"\"' WHERE key = ?",
+        Erasable::Comment => "UPDATE comments SET text = '' WHERE key = ?",
+        Erasable::Correction => {
+            "UPDATE corrections SET old_value = '', new_value = '', reason = '' WHERE CAST(number AS TEXT) = ?"
+        }
+    };
+    sqlx::query(emptied).bind(&erasure.record).execute(&mut *connection).await?;
+
+    sqlx::query("DELETE FROM chain_salts WHERE number = (SELECT number FROM chain WHERE kind = ? AND key = ?)")
+        .bind(erasure.subject.name())
+        .bind(&erasure.record)
+        .execute(&mut *connection)
+        .await?;
+    note_unfinished(connection, number).await?;
+    chain::append(connection, "erasure", &number.to_string(), &wall).await?;
+    Ok(())
+}
+
+async fn note_unfinished(connection: &mut SqliteConnection, number: i64) -> Result<(), StoreError> {
+    sqlx::query("INSERT INTO unfinished_erasures (number) VALUES (?) ON CONFLICT DO NOTHING")
+        .bind(number)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+impl Reader {
+    /// The erasures in `session`, in the order in which they were made.
+    ///
+    /// # Errors
+    /// When the database failed or holds what this version cannot read.
+    pub async fn erasures(&self, session: SessionId) -> Result<Vec<StoredErasure>, StoreError> {
+        let rows = sqlx::query("SELECT * FROM erasures WHERE session = ? ORDER BY number")
+            .bind(session.to_string())
+            .fetch_all(self.pool())
+            .await?;
+        rows.iter().map(erasure).collect()
+    }
+}
+
+fn erasure(row: &SqliteRow) -> Result<StoredErasure, StoreError> {
+    let subject: String = row.try_get("subject")?;
+    let role: String = row.try_get("role")?;
+    let unknown = |what: &str| StoreError::Damaged(format!("an erasure has the unknown {what}"));
+
+    let erasure = Erasure {
+        session: parsed(row, "session")?,
+        subject: Erasable::named(&subject).ok_or_else(|| unknown(&format!("subject '{subject}'")))?,
+        record: row.try_get("record")?,
+        reason: row.try_get("reason")?,
+        by: Role::named(&role).ok_or_else(|| unknown(&format!("role '{role}'")))?,
+        stamp: stamp(row)?,
+    };
+    Ok(StoredErasure { number: row.try_get("number")?, run: row.try_get("run")?, erasure })
+}

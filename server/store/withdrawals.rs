@@ -1,0 +1,55 @@
+//! Sessions whose participants withdrew: that they did, and the place of each session in its study.
+
+use jiff::Timestamp;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+use super::values::parsed;
+use super::{Reader, StoreError};
+use crate::ids::SessionId;
+
+/// A withdrawn session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Withdrawal {
+    /// The session.
+    pub session: SessionId,
+    /// Its protocol's name.
+    pub protocol: String,
+    /// Its place among the sessions of its protocol, in the order in which they were made, from 1.
+    pub place: i64,
+    /// When it was withdrawn, by the server's wall clock.
+    pub wall: Timestamp,
+    /// By whom.
+    pub role: String,
+}
+
+impl Reader {
+    /// The withdrawn sessions of the protocol of `session`.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn withdrawals(&self, session: SessionId) -> Result<Vec<Withdrawal>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT s.session, s.protocol, s.place, e.wall, e.role
+             FROM (SELECT session, protocol, protocol_sha256,
+                     row_number() OVER (PARTITION BY protocol_sha256 ORDER BY rowid) AS place FROM sessions) AS s
+                 JOIN events AS e ON e.session = s.session AND e.kind = 'withdrawn'
+             WHERE s.protocol_sha256 = (SELECT protocol_sha256 FROM sessions WHERE session = ?)
+             ORDER BY s.place",
+        )
+        .bind(session.to_string())
+        .fetch_all(self.pool())
+        .await?;
+        rows.iter().map(withdrawal).collect()
+    }
+}
+
+fn withdrawal(row: &SqliteRow) -> Result<Withdrawal, StoreError> {
+    Ok(Withdrawal {
+        session: parsed(row, "session")?,
+        protocol: row.try_get("protocol")?,
+        place: row.try_get("place")?,
+        wall: parsed(row, "wall")?,
+        role: row.try_get("role")?,
+    })
+}

@@ -1,0 +1,81 @@
+//! Erasure of words: the text goes for good, its record and its hash stay.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::reason;
+use super::refusal::Refusal;
+use super::role::Role;
+
+/// An erasure as the researcher's page sends it.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, ToSchema)]
+pub struct NewErasure {
+    /// What sort of record.
+    pub subject: Erasable,
+    /// Its key; of a correction its number.
+    pub record: String,
+    /// Why; kept with the erasure. It must not repeat the words.
+    #[schema(pattern = r"\S")]
+    pub reason: String,
+}
+
+/// A record whose words can be erased.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Erasable {
+    /// An answer in words.
+    Answer,
+    /// A comment.
+    Comment,
+    /// A correction, with its note and its reason.
+    Correction,
+}
+
+impl Erasable {
+    /// Its name, as in the database and in exports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Answer => "answer",
+            Self::Comment => "comment",
+            Self::Correction => "correction",
+        }
+    }
+
+    /// The sort called `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Answer, Self::Comment, Self::Correction].into_iter().find(|subject| subject.name() == name)
+    }
+}
+
+/// Whether `by` may erase words for `reason`, while a session is `under_way` or not. The reason comes back without
+/// blanks around it.
+///
+/// # Errors
+/// When another role does this, a session is under way, or the reason is missing or too long.
+pub fn check(by: Role, under_way: bool, reason: &str) -> Result<String, Refusal> {
+    if by != Role::Researcher {
+        return Err(Refusal::only("the researcher"));
+    }
+    // Erasing writes the whole database anew, for which what a surgeon says would have to wait.
+    if under_way {
+        return Err(Refusal::conflict("a session is under way; erase once it has ended"));
+    }
+    reason::needed(reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_researcher_erases_only_between_sessions_and_only_with_a_reason() {
+        assert_eq!(check(Role::Researcher, false, "names a patient"), Ok("names a patient".to_owned()));
+        assert!(matches!(check(Role::Researcher, true, "why"), Err(Refusal::Conflict(_))));
+        assert!(matches!(check(Role::Researcher, false, " "), Err(Refusal::Invalid(_))));
+        for by in [Role::Surgeon, Role::Operator, Role::System] {
+            assert_eq!(check(by, false, "why"), Err(Refusal::only("the researcher")), "{by:?}");
+        }
+    }
+}

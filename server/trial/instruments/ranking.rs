@@ -1,0 +1,89 @@
+//! An order of all settings. Without ties the answer names the settings, best first; with ties it gives each setting,
+//! in the order of their numbers, a place. Settings that share a place get the mean of the ranks that they take up
+//! together, as rank statistics want it (Friedman 1937, Journal of the American Statistical Association 32:675).
+
+use super::measure::{MISSING, Measure};
+
+/// Whether `order` names each of `settings` settings once.
+pub fn is_order(order: &[u8], settings: usize) -> bool {
+    let mut sorted = order.to_vec();
+    sorted.sort_unstable();
+    sorted.len() == settings
+        && sorted.iter().zip(1_usize..).all(|(&setting, expected)| usize::from(setting) == expected)
+}
+
+/// Whether `places` are places of `settings` settings, or a part of them.
+pub fn are_places(places: &[u8], settings: usize) -> bool {
+    places.len() == settings
+        && places.iter().all(|place| usize::from(*place) <= settings)
+        && places.iter().any(|place| *place > 0)
+}
+
+/// The rank of each setting, 1 for the best.
+pub fn measures(points: &[u8], ties: bool) -> Vec<Measure> {
+    let ranks = if ties { shared_ranks(points) } else { ranks(points) };
+    let measure = |(setting, rank): (usize, Option<f64>)| {
+        Measure::item(format!("rank-of-setting-{setting}"), format!("Rank of setting {setting}"), rank)
+    };
+    (1..).zip(ranks).map(measure).collect()
+}
+
+/// The rank of each setting of an order.
+fn ranks(order: &[u8]) -> Vec<Option<f64>> {
+    let rank = |setting: usize| {
+        let place = order.iter().position(|named| usize::from(*named) == setting)?;
+        Some(place as f64 + 1.0)
+    };
+    (1..=order.len()).map(rank).collect()
+}
+
+/// The rank of each setting by its place. All are missing where one has no place: the others' ranks depend on it.
+fn shared_ranks(places: &[u8]) -> Vec<Option<f64>> {
+    if places.contains(&0) {
+        return vec![None; places.len()];
+    }
+    let rank = |place: &u8| {
+        let better = places.iter().filter(|other| *other < place).count();
+        let sharing = places.iter().filter(|other| *other == place).count();
+        Some(better as f64 + (sharing as f64 + 1.0) / 2.0)
+    };
+    places.iter().map(rank).collect()
+}
+
+/// Each setting with its place.
+pub fn in_words(places: &[u8]) -> String {
+    let part = |(setting, place): (usize, &u8)| {
+        let place = if *place == 0 { MISSING.to_owned() } else { place.to_string() };
+        format!("setting {setting}: {place}")
+    };
+    (1..).zip(places).map(part).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(points: &[u8], ties: bool) -> Vec<Option<f64>> {
+        measures(points, ties).iter().map(|measure| measure.value).collect()
+    }
+
+    #[test]
+    fn each_setting_has_its_place_in_the_order() {
+        // Setting 3 is best, then 1, then 2.
+        assert_eq!(values(&[3, 1, 2], false), [Some(2.0), Some(3.0), Some(1.0)]);
+    }
+
+    #[test]
+    fn settings_that_share_a_place_share_their_ranks() {
+        // scipy.stats.rankdata([1, 2, 2, 4]) and ([1, 1, 1, 2]) and ([2, 5, 5]).
+        assert_eq!(values(&[1, 2, 2, 4], true), [Some(1.0), Some(2.5), Some(2.5), Some(4.0)]);
+        assert_eq!(values(&[1, 1, 1, 2], true), [Some(2.0), Some(2.0), Some(2.0), Some(4.0)]);
+        assert_eq!(values(&[2, 3, 3], true), [Some(1.0), Some(2.5), Some(2.5)]);
+    }
+
+    #[test]
+    fn a_setting_without_a_place_leaves_no_ranks() {
+        assert_eq!(values(&[1, 0, 2], true), [None, None, None]);
+        assert!(are_places(&[1, 0, 2], 3) && !are_places(&[0, 0, 0], 3) && !are_places(&[1, 4, 1], 3));
+    }
+}

@@ -1,0 +1,34 @@
+//! Whether the surgeon thinks to have recognised settings: the question by which the success of blinding is judged
+//! (Bang, Ni & Davis 2004, Controlled Clinical Trials 25:143, who ask for a guess and take "don't know" as an answer).
+//! Nobody is asked which policy it was: surgeons know none by name.
+
+use super::measure::{Measure, given};
+
+const WORDS: [&str; 3] = ["No", "Not sure", "Yes"];
+
+/// Whether `point` is one of the three answers.
+pub fn fits(point: u8) -> bool {
+    (1..=WORDS.len()).contains(&usize::from(point))
+}
+
+/// 1 for no, 2 for not sure, 3 for yes.
+pub fn measures(point: u8) -> Vec<Measure> {
+    vec![Measure::item("recognised", "Recognised: 1 no, 2 not sure, 3 yes", given(point))]
+}
+
+/// The answer in words.
+pub fn in_words(point: u8) -> String {
+    let word = usize::from(point).checked_sub(1).and_then(|place| WORDS.get(place));
+    word.map_or_else(|| point.to_string(), |word| (*word).to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_are_three_answers() {
+        assert_eq!([1, 2, 3].map(in_words), ["No", "Not sure", "Yes"]);
+        assert!(!fits(0) && fits(1) && fits(3) && !fits(4));
+    }
+}

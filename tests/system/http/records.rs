@@ -1,0 +1,91 @@
+//! Corrections, consents, withdrawals and erasures over HTTP: who may, what is refused, and in which words.
+
+use serde_json::{Value, json};
+
+use crate::support::Server;
+
+/// Posts `body` as `role`; the status, and what is said where it is refused.
+async fn post(server: &Server, role: &str, path: &str, body: &Value) -> (u16, String) {
+    let answer = server.post_as(role, path).json(body).send().await.unwrap();
+    let status = answer.status().as_u16();
+    let text = answer.text().await.unwrap();
+    let said = serde_json::from_str::<Value>(&text).unwrap_or_default();
+    (status, said["error"].as_str().unwrap_or_default().to_owned())
+}
+
+/// A session that was aborted after one comment; its id and the comment's key.
+async fn a_session(server: &Server) -> (String, &'static str) {
+    const KEY: &str = "00000000-0000-4000-8000-000000000001";
+    post(server, "operator", "/api/operator/participants", &json!({"code": "S-05"})).await;
+    let new = json!({"participant": "S-05", "protocol": "practice"});
+    let made = server.post_as("operator", "/api/operator/sessions").json(&new).send().await.unwrap();
+    let made: Value = made.json().await.unwrap();
+    let session = made["session"].as_str().unwrap().to_owned();
+    let comment = json!({"key": KEY, "session": session, "kind": "text", "text": "Mustermann"});
+    assert_eq!(post(server, "surgeon", "/api/surgeon/comments", &comment).await.0, 204);
+    let abort = json!({"session": session, "action": "abort", "reason": "enough"});
+    assert_eq!(post(server, "operator", "/api/operator/actions", &abort).await.0, 200);
+    (session, KEY)
+}
+
+#[tokio::test]
+async fn records_are_put_right_by_the_researcher_alone() {
+    let server = Server::start();
+    let (session, comment) = a_session(&server).await;
+    let base = format!("/api/researcher/sessions/{session}");
+    let note = json!({"field": "note", "record": comment, "old": "", "new": "of the monitor", "reason": "for clarity"});
+    let erase = json!({"subject": "comment", "record": comment, "reason": "names a patient"});
+    let withdraw = json!({"reason": "wants no part in it"});
+    let deeds = [("corrections", &note), ("erasures", &erase), ("withdraw", &withdraw)];
+    for (path, body) in deeds {
+        for role in ["surgeon", "operator"] {
+            let (status, said) = post(&server, role, &format!("{base}/{path}"), body).await;
+            assert_eq!(status, 403, "{role} {path}: {said}");
+        }
+        let mut no_reason = body.clone();
+        no_reason["reason"] = json!(" ");
+        let (status, said) = post(&server, "researcher", &format!("{base}/{path}"), &no_reason).await;
+        assert!(status == 422 && said.contains("reason"), "{path}: {status} {said}");
+    }
+
+    for (path, body) in deeds {
+        let (status, said) = post(&server, "researcher", &format!("{base}/{path}"), body).await;
+        assert_eq!((status, said.as_str()), (204, ""), "{path}");
+    }
+    let (status, said) = post(&server, "researcher", &format!("{base}/corrections"), &note).await;
+    assert_eq!(status, 204, "the note was erased with the comment: {said}");
+
+    let export = server.get_as("researcher", &format!("{base}/export.zip")).send().await.unwrap();
+    assert_eq!(export.status(), 409);
+    assert!(export.text().await.unwrap().contains("was withdrawn by the researcher"));
+    let page = server.get_as("researcher", &format!("/researcher/sessions/{session}")).send().await.unwrap();
+    let page = page.text().await.unwrap();
+    assert!(page.contains("The data of this session stay out of exports") && !page.contains("Mustermann"), "{page}");
+}
+
+#[tokio::test]
+async fn a_consent_that_makes_no_sense_is_refused_with_words() {
+    let server = Server::start();
+    let (session, _) = a_session(&server).await;
+    let good = json!({
+        "session": session, "text_version": "2.1", "given_on": "2026-03-01", "obtained_by": "KM", "medium": "paper",
+    });
+    let consents = "/api/operator/consents";
+    for (field, wrong) in [
+        ("text_version", json!("")),
+        ("obtained_by", json!("x".repeat(81))),
+        ("given_on", json!("9000-01-01")),
+        ("given_on", json!("yesterday")),
+        ("medium", json!("telephone")),
+    ] {
+        let mut body = good.clone();
+        body[field] = wrong;
+        let (status, said) = post(&server, "operator", consents, &body).await;
+        assert!(status == 422 && !said.is_empty(), "{field}: {status} {said}");
+    }
+    assert_eq!(post(&server, "surgeon", consents, &good).await.0, 403);
+    let mut elsewhere = good.clone();
+    elsewhere["session"] = json!("00000000-0000-4000-8000-000000000000");
+    assert_eq!(post(&server, "operator", consents, &elsewhere).await.0, 404);
+    assert_eq!(post(&server, "operator", consents, &good).await.0, 200);
+}

@@ -1,0 +1,142 @@
+//! Consent before a session, and withdrawal after it.
+
+use jiff::civil::date;
+use parfocal::conductor::ConductError;
+use parfocal::store::export::verify::verify;
+use parfocal::store::export::{ExportError, export};
+use parfocal::store::verify_database;
+use parfocal::trial::action::Action;
+use parfocal::trial::consent::{Consent, NewConsent};
+use parfocal::trial::phase::Phase;
+use parfocal::trial::role::Role;
+
+use crate::exports::{failed, rows, with_session};
+use crate::fixture::{PARTICIPANT, Trial};
+use crate::instruments::{begin, consent, with_instruments};
+
+fn withdraw() -> Action {
+    Action::Withdraw { reason: "wants no part in it any more".to_owned() }
+}
+
+#[tokio::test]
+async fn a_session_starts_only_with_the_consent_that_its_protocol_requires() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = with_instruments(folder.path()).await;
+    let session = trial.conductor.create(Role::Operator, PARTICIPANT, "instruments").await.unwrap();
+    let refused = trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("version '2.1'")), "{refused}");
+    assert_eq!(trial.view().phase, Phase::Ready);
+    assert_eq!(trial.operator_view().consent_required.as_deref(), Some("2.1"));
+
+    let record =
+        async |by: Role, consent: Consent| trial.conductor.record_consent(by, NewConsent { session, consent }).await;
+    let other = record(Role::Operator, Consent { text_version: "1.0".to_owned(), ..consent() }).await.unwrap_err();
+    assert!(matches!(&other, ConductError::Invalid(text) if text.contains("requires version '2.1'")), "{other}");
+    let future = record(Role::Operator, Consent { given_on: date(2026, 4, 1), ..consent() }).await.unwrap_err();
+    assert!(matches!(&future, ConductError::Invalid(text) if text.contains("yet to come")), "{future}");
+    let surgeon = record(Role::Surgeon, consent()).await.unwrap_err();
+    assert!(matches!(surgeon, ConductError::Forbidden(_)), "{surgeon}");
+
+    record(Role::Operator, consent()).await.unwrap();
+    record(Role::Operator, consent()).await.unwrap();
+    assert_eq!(trial.store.reader().consents(session).await.unwrap().len(), 1, "the same again is the same");
+    assert_eq!(trial.operator_view().consent, Some(consent()));
+
+    // It is known after a restart.
+    drop(trial);
+    let trial = with_instruments(folder.path()).await;
+    trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
+    assert_eq!(trial.view().phase, Phase::Notice);
+
+    let out = folder.path().join("export");
+    export(&trial.recorder(), session, &out, false).await.unwrap();
+    assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
+    let told = rows(&out, "consents");
+    let [row] = told.as_slice() else { panic!("{told:?}") };
+    let cells = ["text_version", "given_on", "obtained_by", "medium", "role"].map(|column| row[column].as_str());
+    assert_eq!(cells, ["2.1", "2026-03-01", "KM", "paper", "operator"]);
+    trial.store.close().await;
+
+    let database = folder.path().join("parfocal.db");
+    for sql in ["UPDATE consents SET text_version = '2.0'", "UPDATE consents SET obtained_by = 'XX'"] {
+        let checks = crate::chain::after(&database, sql, None).await;
+        assert!(crate::chain::said(&checks, "chain").unwrap_err().contains("consents: consent 1 was changed"), "{sql}");
+    }
+}
+
+#[tokio::test]
+async fn a_withdrawn_session_is_in_no_export_but_its_place_is_told_and_the_chain_stays_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut trial, session) = with_session(folder.path()).await;
+    trial.unblind(session).await;
+    let before = folder.path().join("before");
+    export(&trial.recorder(), session, &before, true).await.unwrap();
+
+    trial.conductor.act(Role::Researcher, session, withdraw()).await.unwrap();
+    trial.conductor.act(Role::Researcher, session, withdraw()).await.unwrap();
+    for unblinded in [false, true] {
+        let out = folder.path().join("after");
+        let refused = export(&trial.recorder(), session, &out, unblinded).await.unwrap_err();
+        assert!(matches!(&refused, ExportError::Withdrawn { by: "researcher", .. }), "{refused}");
+        assert!(!out.exists());
+    }
+
+    let detail = trial.conductor.session_detail(session).await.unwrap();
+    assert!(detail.line.withdrawn);
+    assert_eq!(detail.withdrawal.unwrap().reason, "wants no part in it any more");
+    let withdrawals = detail.log.iter().filter(|line| line.text.starts_with("Withdrawn: ")).count();
+    assert_eq!(withdrawals, 1, "the second time changes nothing");
+
+    // A later session by the same protocol tells of it; one by another protocol does not.
+    let later = trial.whole_session("paper").await;
+    let out = folder.path().join("later");
+    export(&trial.recorder(), later, &out, false).await.unwrap();
+    assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
+    let told = rows(&out, "withdrawals");
+    let [row] = told.as_slice() else { panic!("{told:?}") };
+    assert_eq!((row["session"].clone(), row["place"].as_str()), (session.to_string(), "1"));
+    assert_eq!(row["role"], "researcher");
+    for file in std::fs::read_dir(&out).unwrap() {
+        let path = file.unwrap().path();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(!text.contains("wants no part"), "{}", path.display());
+    }
+    let practice = trial.whole_session("practice").await;
+    let out = folder.path().join("practice");
+    export(&trial.recorder(), practice, &out, false).await.unwrap();
+    assert_eq!(rows(&out, "withdrawals").len(), 0);
+
+    let checks = verify_database(folder.path(), None).await.unwrap();
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+    assert_eq!(failed(&verify(&before, None)), [""; 0], "an export made before still verifies");
+}
+
+#[tokio::test]
+async fn a_session_under_way_is_aborted_before_it_is_withdrawn_and_no_surgeon_withdraws() {
+    let folder = tempfile::tempdir().unwrap();
+    let trial = with_instruments(folder.path()).await;
+    let session = begin(&trial).await;
+    let refused = trial.conductor.act(Role::Operator, session, withdraw()).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("abort it first")), "{refused}");
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "left".to_owned() }).await.unwrap();
+    let refused = trial.conductor.act(Role::Surgeon, session, withdraw()).await.unwrap_err();
+    assert!(matches!(refused, ConductError::Forbidden(_)), "{refused}");
+    let no_reason = Action::Withdraw { reason: " ".to_owned() };
+    let refused = trial.conductor.act(Role::Operator, session, no_reason).await.unwrap_err();
+    assert!(matches!(refused, ConductError::Invalid(_)), "{refused}");
+
+    trial.conductor.act(Role::Operator, session, withdraw()).await.unwrap();
+    assert!(trial.operator_view().withdrawn);
+}
+
+#[tokio::test]
+async fn what_a_tablet_still_holds_after_a_withdrawal_is_acknowledged() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let session = trial.begin("practice").await;
+    let held = trial.comment("said before the withdrawal");
+    trial.conductor.act(Role::Operator, session, Action::Abort { reason: "left".to_owned() }).await.unwrap();
+    trial.conductor.act(Role::Operator, session, withdraw()).await.unwrap();
+    trial.conductor.comment(held).await.unwrap();
+    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 1);
+}

@@ -1,0 +1,206 @@
+//! Erasure: the words are nowhere in the database's files, while records, hashes and order stay.
+
+use std::path::{Path, PathBuf};
+
+use parfocal::conductor::ConductError;
+use parfocal::ids::SessionId;
+use parfocal::store::backup::backup;
+use parfocal::store::export::export;
+use parfocal::store::export::verify::verify;
+use parfocal::store::{Reader, StoreError, verify_database};
+use parfocal::trial::action::Action;
+use parfocal::trial::correction::{FieldChange, NewCorrection};
+use parfocal::trial::erasure::{Erasable, NewErasure};
+use parfocal::trial::question::AnswerValue;
+use parfocal::trial::remark::NewComment;
+use parfocal::trial::role::Role;
+
+use crate::exports::{failed, rows};
+use crate::fixture::Trial;
+
+/// Words that stand nowhere else. Long enough to fill pages of the database, so that SQLite splits them.
+fn words(what: &str) -> String {
+    format!("{what} Frau Mustermann, bed twelve; ").repeat(40)
+}
+
+/// The files of `folder` that hold `text` anywhere.
+fn holding(folder: &Path, text: &str) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
+    let holds = |path: &PathBuf| {
+        let bytes = std::fs::read(path).unwrap();
+        bytes.windows(text.len()).any(|window| window == text.as_bytes())
+    };
+    files.filter(holds).collect()
+}
+
+const NOWHERE: [PathBuf; 0] = [];
+
+fn erasure(subject: Erasable, record: impl ToString) -> NewErasure {
+    NewErasure { subject, record: record.to_string(), reason: "names a patient".to_owned() }
+}
+
+/// A session that has ended, with comments of which the one that comes back is to be erased.
+async fn session(trial: &mut Trial) -> (SessionId, NewComment) {
+    let session = trial.begin("practice").await;
+    for number in 0..30 {
+        trial.say(&format!("comment {number} {}", "filler ".repeat(60))).await;
+    }
+    let comment = trial.comment(&words("the vessel of"));
+    trial.conductor.comment(comment.clone()).await.unwrap();
+    for number in 30..60 {
+        trial.say(&format!("comment {number} {}", "filler ".repeat(60))).await;
+    }
+
+    let mut settings = 0;
+    while settings < 2 {
+        let segment = trial.view().segment.unwrap();
+        trial.surgeon(Action::Acknowledge { segment }).await;
+        trial.surgeon(Action::FinishSegment { segment }).await;
+        trial.answer_all().await;
+        trial.surgeon(Action::FinishQuestions { segment: Some(segment) }).await;
+        settings += 1;
+    }
+    trial.answer("ready", AnswerValue::Text(words("ask again about"))).await.unwrap();
+    trial.surgeon(Action::FinishQuestions { segment: None }).await;
+    (session, comment)
+}
+
+#[tokio::test]
+async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let mut trial = Trial::start(&data).await;
+    let (session, comment) = session(&mut trial).await;
+    let note = FieldChange::Note { record: comment.key, old: String::new(), new: words("note on") };
+    let note = NewCorrection { change: note, reason: "reason of Frau Mustermann".to_owned() };
+    trial.conductor.correct(Role::Researcher, session, note).await.unwrap();
+    assert!(!holding(&data, "Mustermann").is_empty(), "the test looks where the words are");
+    let salted: i64 = count(&data, "SELECT count(*) FROM chain_salts").await;
+
+    trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Comment, comment.key)).await.unwrap();
+    assert_eq!(holding(&data, "the vessel of Frau Mustermann"), NOWHERE);
+    assert_eq!(holding(&data, "note on Frau"), NOWHERE, "a note may repeat the words");
+    assert_eq!(holding(&data, "reason of Frau"), NOWHERE);
+
+    let answer = trial.store.reader().answers(session).await.unwrap().pop().unwrap().1;
+    trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Answer, answer.key)).await.unwrap();
+    assert_eq!(holding(&data, "Mustermann"), NOWHERE);
+    assert_eq!(count(&data, "SELECT count(*) FROM chain_salts").await, salted - 3 + 3, "three gone, three erasures");
+
+    let file = folder.path().join("backup.db");
+    backup(&data, &file, trial.clock.clone()).await.unwrap();
+    assert_eq!(holding(folder.path(), "Mustermann"), NOWHERE);
+    for path in [&data, &file] {
+        let checks = verify_database(path, None).await.unwrap();
+        assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+        assert!(crate::chain::said(&checks, "chain").unwrap().contains("of 3 the words were erased"), "{checks:?}");
+    }
+
+    // The records stay, each with when and by whom.
+    let timeline = trial.conductor.timeline(session, 10).await.unwrap();
+    let erased: Vec<_> = timeline.comments.iter().filter(|comment| comment.erased.is_some()).collect();
+    assert_eq!((timeline.comments.len(), erased.len(), erased[0].key), (61, 1, comment.key));
+    let detail = trial.conductor.session_detail(session).await.unwrap();
+    assert!(detail.log.iter().any(|line| line.text == "Words of a comment erased: names a patient"));
+
+    let out = folder.path().join("export");
+    export(&trial.recorder(), session, &out, false).await.unwrap();
+    assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
+    assert_eq!(holding(&out, "Mustermann"), NOWHERE);
+    let row = rows(&out, "comments").into_iter().find(|row| row["key"] == comment.key.to_string()).unwrap();
+    assert_eq!((row["text"].as_str(), row["erased"].as_str()), ("", rows(&out, "erasures")[0]["wall"].as_str()));
+    let told: Vec<_> = rows(&out, "erasures")
+        .iter()
+        .map(|row| [row["subject"].clone(), row["role"].clone(), row["reason"].clone()].join(", "))
+        .collect();
+    let expected = ["comment", "correction", "answer"].map(|what| format!("{what}, researcher, names a patient"));
+    assert_eq!(told, expected);
+
+    // A tablet that never heard that its comment was kept sends it again, and may forget it.
+    trial.conductor.comment(comment).await.unwrap();
+    assert_eq!(holding(&data, "Mustermann"), NOWHERE);
+}
+
+async fn count(data: &Path, sql: &'static str) -> i64 {
+    let pool = crate::storage::raw(data).await;
+    let count = sqlx::query_scalar(sql).fetch_one(&pool).await.unwrap();
+    pool.close().await;
+    count
+}
+
+#[tokio::test]
+async fn what_a_killed_server_did_not_come_to_erase_is_erased_at_the_next_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let (session, comment) = session(&mut trial).await;
+
+    // Somebody reads the database: its log has to stay.
+    let reader = Reader::open(folder.path()).await.unwrap();
+    let snapshot = reader.snapshot().await.unwrap();
+    let unfinished =
+        trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Comment, comment.key)).await.unwrap_err();
+    assert!(matches!(&unfinished, ConductError::Storage(text) if text.contains("erase again")), "{unfinished}");
+    assert_eq!(StoreError::ErasureUnfinished.to_string(), unfinished.to_string().replace("could not be saved: ", ""));
+    let said = &trial.store.reader().comments(session).await.unwrap()[30].1.said;
+    assert_eq!(format!("{said:?}"), "Text(\"\")", "from its record it is gone");
+
+    drop(snapshot);
+    drop(reader);
+    trial.store.close().await;
+    drop(trial);
+    let trial = Trial::start(folder.path()).await;
+    assert_eq!(holding(folder.path(), "the vessel of Frau"), NOWHERE);
+    trial.store.close().await;
+}
+
+#[tokio::test]
+async fn only_words_are_erased_and_only_by_an_erasure() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = Trial::start(folder.path()).await;
+    let (session, comment) = session(&mut trial).await;
+    let answers = trial.store.reader().answers(session).await.unwrap();
+    let point = answers.iter().find(|(_, answer)| answer.question == "sharpness").unwrap().1.key;
+    let refused = trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Answer, point)).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("only words")), "{refused}");
+    let unknown =
+        trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Comment, point)).await.unwrap_err();
+    assert!(matches!(unknown, ConductError::NotFound(_)), "{unknown}");
+    let operator =
+        trial.conductor.erase(Role::Operator, session, erasure(Erasable::Comment, comment.key)).await.unwrap_err();
+    assert!(matches!(operator, ConductError::Forbidden(_)), "{operator}");
+
+    trial.begin("practice").await;
+    let under_way =
+        trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Comment, comment.key)).await.unwrap_err();
+    assert!(matches!(&under_way, ConductError::Conflict(text) if text.contains("under way")), "{under_way}");
+    trial.store.close().await;
+
+    // Nobody empties a text by mistake.
+    let pool = crate::storage::raw(folder.path()).await;
+    for sql in [
+        "UPDATE comments SET text = '' WHERE number = 31",
+        "UPDATE answers SET value = '\"\"'",
+        "DELETE FROM chain_salts",
+        "INSERT INTO erasures (session, subject, record, reason, role, run, wall, monotonic_ns)
+             SELECT session, 'comment', key, 'r', 'researcher', run, wall, 1 FROM comments WHERE number = 31;
+         UPDATE comments SET text = 'other' WHERE number = 31",
+        "UPDATE comments SET text = '', late = 1 WHERE number = 31",
+    ] {
+        let refused = sqlx::raw_sql(sql).execute(&pool).await.unwrap_err();
+        assert!(refused.to_string().contains("append-only"), "{sql}: {refused}");
+    }
+    pool.close().await;
+
+    // An owner of the file who empties one, and says that it was erased, has no row for that.
+    let emptied = "DELETE FROM chain_salts WHERE number = (
+            SELECT number FROM chain WHERE kind = 'comment' AND key = (SELECT key FROM comments WHERE number = 1));
+        UPDATE comments SET text = '' WHERE number = 1; DELETE FROM erasures;";
+    let claimed = "INSERT INTO erasures (session, subject, record, reason, role, run, wall, monotonic_ns)
+        SELECT session, 'comment', key, 'r', 'researcher', run, wall, 1 FROM comments WHERE number = 1";
+    let database = folder.path().join("parfocal.db");
+    for (sql, expected) in [(emptied.to_owned(), "its salt is missing"), (format!("{emptied}{claimed}"), "erasure")] {
+        let checks = crate::chain::after(&database, &sql, None).await;
+        let wrong = crate::chain::said(&checks, "chain").unwrap_err();
+        assert!(wrong.contains(expected), "{wrong}");
+    }
+}

@@ -1,0 +1,166 @@
+// The dialogs by which a researcher corrects, adds a note, erases words, and records a withdrawal.
+
+import { get, post, Refused } from "../shared/api.js";
+import { askIn, askReason } from "../shared/dialogs.js";
+import { byId, make, setText } from "../shared/dom.js";
+import { answerName, correctable, hint, read, soFar, written } from "./correction_words.js";
+
+/**
+ * @typedef {object} Asked
+ * @property {string} heading
+ * @property {string} consequence
+ * @property {{ label: string, options: { value: string, text: string }[] }} [which] what is chosen from a list
+ * @property {{ label: string, value: string, hint: string }} [text] what is written
+ * @property {(which: string) => void} [chosen] called when something of the list is chosen
+ * @property {(answer: { which: string, text: string, reason: string }) => Promise<void>} done
+ */
+
+/** @param {Asked} asked */
+function ask({ heading, consequence, which, text, chosen, done }) {
+  setText(byId("correct-heading"), heading);
+  setText(byId("correct-consequence"), consequence);
+  setText(byId("correct-so-far"), "");
+
+  const list = byId("correct-which", HTMLSelectElement);
+  byId("correct-which-field").hidden = !which;
+  setText(byId("correct-which-label"), which?.label ?? "");
+  list.replaceChildren(
+    ...(which?.options ?? []).map(({ value, text: name }) => make("option", { value }, name)),
+  );
+  list.onchange = () => chosen?.(list.value);
+
+  const field = byId("correct-new", HTMLTextAreaElement);
+  byId("correct-new-field").hidden = !text;
+  setText(byId("correct-new-label"), text?.label ?? "");
+  setText(byId("correct-hint"), text?.hint ?? "");
+  field.value = text?.value ?? "";
+
+  const reason = byId("correct-reason", HTMLInputElement);
+  reason.value = "";
+  chosen?.(list.value);
+  askIn(byId("correct-dialog", HTMLDialogElement), byId("correct-trouble"), () =>
+    done({ which: list.value, text: field.value.trim(), reason: reason.value.trim() }),
+  );
+}
+
+/**
+ * Records a correction, and shows the page anew.
+ *
+ * @param {string} session
+ * @param {Api.NewCorrection} correction
+ */
+async function record(session, correction) {
+  await post("/api/researcher/sessions/{session}/corrections", correction, { session });
+  location.reload();
+}
+
+/**
+ * Asks for the session's right participant.
+ *
+ * @param {string} session
+ * @param {string} old
+ * @param {string[]} participants
+ */
+export function correctParticipant(session, old, participants) {
+  const others = participants.filter((code) => code !== old);
+  ask({
+    heading: "Correct the participant",
+    consequence: `The session stands as recorded, with ${old}. The right code stands beside it, here and in exports.`,
+    which: { label: "Right participant", options: others.map((code) => ({ value: code, text: code })) },
+    done: ({ which, reason }) => record(session, { field: "participant", old, new: which, reason }),
+  });
+}
+
+/**
+ * Asks for the right answer to a question.
+ *
+ * @param {string} session
+ */
+export async function correctAnswer(session) {
+  const detail = await get("/api/researcher/sessions/{session}", { session });
+  const answers = correctable(detail.answers);
+  const find = (/** @type {string} */ key) => answers.find((answer) => answer.key === key);
+
+  ask({
+    heading: "Correct an answer",
+    consequence:
+      "The surgeon’s answer stays as it was given. The right one stands beside it, and scores are computed from it.",
+    which: {
+      label: "Answer",
+      options: answers.map((answer) => ({ value: answer.key, text: answerName(answer) })),
+    },
+    text: { label: "Right answer", value: "", hint: "" },
+    chosen: (key) => {
+      const answer = find(key);
+      if (!answer) return;
+      setText(byId("correct-so-far"), `So far: ${answer.corrected_words ?? answer.words}`);
+      setText(byId("correct-hint"), hint(answer.kind));
+      byId("correct-new", HTMLTextAreaElement).value = written(soFar(answer));
+    },
+    done: ({ which, text, reason }) => {
+      const answer = find(which);
+      const value = answer && read(answer.kind, text);
+      if (!answer || value == null) throw new Refused(422, `This is no answer. ${hint(answer?.kind)}`, true);
+      return record(session, { field: "value", record: which, old: soFar(answer), new: value, reason });
+    },
+  });
+}
+
+/**
+ * Asks for a note on a comment or an answer.
+ *
+ * @param {string} session
+ * @param {string} key
+ * @param {string} old
+ */
+export function askNote(session, key, old) {
+  ask({
+    heading: old ? "Change the note" : "Add a note",
+    consequence: "The surgeon’s words stay as they are. The note stands beside them, here and in exports.",
+    text: { label: "Note", value: old, hint: "" },
+    done: ({ text, reason }) => record(session, { field: "note", record: key, old, new: text, reason }),
+  });
+}
+
+/**
+ * Asks whether words are to be erased.
+ *
+ * @param {string} session
+ * @param {"comment" | "answer"} subject
+ * @param {string} key
+ */
+export function askErasure(session, subject, key) {
+  askReason({
+    heading: "Erase these words",
+    consequence:
+      "The words leave the database for good, with every note on them. Backups and exports made earlier still " +
+      "hold them. The record stays, and says that its words were erased, by whom and why. Do not repeat the words here.",
+    go: "Erase for good",
+    danger: true,
+    done: async (reason) => {
+      const path = "/api/researcher/sessions/{session}/erasures";
+      await post(path, { subject, record: key, reason }, { session });
+      location.reload();
+    },
+  });
+}
+
+/**
+ * Asks whether the participant withdraws.
+ *
+ * @param {string} session
+ */
+export function askWithdrawal(session) {
+  askReason({
+    heading: "The participant withdraws",
+    consequence:
+      "From now on this session’s data stay out of exports and analyses. That it was withdrawn remains on record. " +
+      "This cannot be undone. Words can be erased one by one as well.",
+    go: "Withdraw session",
+    danger: true,
+    done: async (reason) => {
+      await post("/api/researcher/sessions/{session}/withdraw", { reason }, { session });
+      location.reload();
+    },
+  });
+}

@@ -1,0 +1,83 @@
+// Radio buttons as the questions have them: a scale of numbers, or a few choices in words.
+
+import { make } from "../shared/dom.js";
+import { NOT_ANSWERED } from "./questions.js";
+
+/**
+ * @typedef {object} Choices
+ * @property {HTMLElement} element
+ * @property {(point: number | null) => void} check shows which is chosen, from 1
+ */
+
+/**
+ * Radio buttons from 1 to `points`, with what the ends mean.
+ *
+ * @param {string} name
+ * @param {{ points: number, low: string, high: string }} ends
+ * @param {(point: number) => void} choose
+ * @returns {Choices}
+ */
+export function drawScale(name, { points, low, high }, choose) {
+  // Room for the mark is kept, so that nothing moves when it comes or goes.
+  const ends = make(
+    "div",
+    { className: "ends" },
+    make("span", { "aria-hidden": "true" }, low),
+    make("span", { className: "gap" }, NOT_ANSWERED),
+    make("span", { "aria-hidden": "true" }, high),
+  );
+
+  const inputs = Array.from({ length: points }, (_, index) => {
+    const point = index + 1;
+    const meaning = point === 1 ? `, ${low}` : point === points ? `, ${high}` : "";
+    const label = `${point} of ${points}${meaning}`;
+    const input = make("input", { type: "radio", name, value: String(point), "aria-label": label });
+    input.addEventListener("change", () => choose(point));
+    return input;
+  });
+  const labels = inputs.map((input) =>
+    make("label", {}, input, make("span", { "aria-hidden": "true" }, input.value)),
+  );
+
+  return {
+    element: make("div", { className: "likert" }, make("div", { className: "points" }, ...labels), ends),
+    check: (point) => check(inputs, point),
+  };
+}
+
+/**
+ * Radio buttons with words on them.
+ *
+ * @param {string} name
+ * @param {string[]} words
+ * @param {(point: number) => void} choose
+ * @param {string} [className]
+ * @returns {Choices}
+ */
+export function drawWords(name, words, choose, className = "") {
+  const inputs = words.map((_, index) => {
+    const input = make("input", { type: "radio", name, value: String(index + 1) });
+    input.addEventListener("change", () => choose(index + 1));
+    return input;
+  });
+  const labels = inputs.map((input, index) => make("label", {}, input, make("span", {}, words[index])));
+  return {
+    element: make(
+      "div",
+      { className: `likert words ${className}` },
+      make("div", { className: "points" }, ...labels),
+    ),
+    check: (point) => check(inputs, point),
+  };
+}
+
+/**
+ * @param {HTMLInputElement[]} inputs
+ * @param {number | null} point
+ */
+function check(inputs, point) {
+  for (const [index, input] of inputs.entries()) {
+    const chosen = index + 1 === point;
+    if (input.checked !== chosen) input.checked = chosen;
+  }
+}

@@ -1,0 +1,107 @@
+// Workload indices, and a ranking with shared places, as forms.
+
+import { make } from "../shared/dom.js";
+import { drawScale, drawWords } from "./choices.js";
+import { NOT_ANSWERED } from "./questions.js";
+import { drawTrack } from "./track.js";
+
+/** @typedef {import("./question_form.js").Drawn} Drawn */
+
+/** Gradations of a workload scale, which count from 0 to 100 in steps of 5. */
+const GRADATIONS = 21;
+
+/**
+ * @param {import("./questions.js").WorkloadAnswer} answer
+ * @param {HTMLElement} heading
+ * @param {() => void} changed
+ * @returns {Drawn}
+ */
+export function drawWorkload(answer, heading, changed) {
+  const choose = (/** @type {number} */ item, /** @type {number} */ point) => {
+    answer.choose(item, point);
+    changed();
+  };
+
+  const scales = answer.scales.map(({ title, text, low, high }, item) => {
+    const words = (/** @type {number} */ value) => `${(value - 1) * 5} of 100`;
+    const line = { label: title, low, high, min: 1, max: GRADATIONS, graded: true, words };
+    const track = drawTrack(line, (value) => choose(item, value));
+    const about = make("p", { className: "about" }, text);
+    return {
+      element: make("fieldset", {}, make("legend", {}, title), about, track.element, gap()),
+      show: track.show,
+    };
+  });
+
+  const pairs = answer.pairs.map(({ first, second }, index) => {
+    const item = scales.length + index;
+    const names = [first, second].map((place) => answer.scales[place]?.title ?? "");
+    const choices = drawWords(`${answer.question.id}-${item}`, names, (point) => choose(item, point), "pair");
+    const legend = make("legend", { className: "visually-hidden" }, `${names[0]} or ${names[1]}`);
+    return { element: make("fieldset", {}, legend, choices.element, gap()), show: choices.check };
+  });
+
+  const items = [...scales, ...pairs];
+  const compare = make(
+    "p",
+    { className: "about" },
+    "In each pair, tap the one that contributed more to the workload.",
+  );
+  return {
+    nodes: [
+      heading,
+      make(
+        "div",
+        { className: "sus" },
+        ...scales.map(({ element }) => element),
+        pairs.length > 0 && compare,
+        ...pairs.map(({ element }) => element),
+      ),
+    ],
+    draw: () => {
+      for (const [item, { element, show }] of items.entries()) {
+        show(answer.points[item] || null);
+        element.classList.toggle("wanting", answer.wantedParts[item] ?? false);
+      }
+    },
+    wantedPart: () => items.find((_, item) => answer.wantedParts[item])?.element,
+  };
+}
+
+/**
+ * @param {import("./questions.js").PlacesAnswer} answer
+ * @param {HTMLElement} heading
+ * @param {() => void} changed
+ * @returns {Drawn}
+ */
+export function drawPlaces(answer, heading, changed) {
+  const ends = { points: answer.points.length, low: "Best", high: "Worst" };
+  const settings = answer.points.map((_, item) => {
+    const scale = drawScale(`${answer.question.id}-${item}`, ends, (place) => {
+      answer.choose(item, place);
+      changed();
+    });
+    const element = make("fieldset", {}, make("legend", {}, `Setting ${item + 1}`), scale.element);
+    return { element, check: scale.check };
+  });
+
+  const about = make("p", { className: "about" }, "Give each setting a place. Settings may share a place.");
+  return {
+    nodes: [
+      heading,
+      make("div", { className: "sus places" }, about, ...settings.map(({ element }) => element)),
+    ],
+    draw: () => {
+      for (const [item, { element, check }] of settings.entries()) {
+        check(answer.points[item] || null);
+        element.classList.toggle("wanting", answer.wantedParts[item] ?? false);
+      }
+    },
+    wantedPart: () => settings.find((_, item) => answer.wantedParts[item])?.element,
+  };
+}
+
+/** The mark of an item that is still open; room for it is kept. */
+function gap() {
+  return make("span", { className: "gap" }, NOT_ANSWERED);
+}
