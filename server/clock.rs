@@ -84,6 +84,11 @@ impl ManualClock {
         now.0 = now.0 + step;
         now.1 = now.1.saturating_add(step).unwrap_or(now.1);
     }
+
+    /// Sets the wall clock to `wall`, as somebody does who sets a machine's clock.
+    pub fn set_wall(&self, wall: Timestamp) {
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).1 = wall;
+    }
 }
 
 impl Clock for ManualClock {

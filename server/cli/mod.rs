@@ -8,12 +8,14 @@ mod export;
 mod inspect;
 mod interrupt;
 mod lens;
+mod library;
 mod output;
 mod policies;
 mod recording;
 mod restore;
 mod scan;
 mod serve;
+mod study;
 mod train;
 mod verify;
 
@@ -57,6 +59,8 @@ enum Command {
     /// Start the server: the live view, the control loop and the trial.
     #[command(after_help = serve::REAL_TIME)]
     Serve(serve::Arguments),
+    /// Plan a study of many sessions, open, close and lock it, and show where it stands.
+    Study(study::Arguments),
     /// Train a learned policy, or compare trainings.
     Train(train::Arguments),
     /// Check that an export, a data folder or a backup is complete, unchanged, and matches its commitments.
@@ -92,6 +96,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Recording(arguments) => recording::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
     }

@@ -17,11 +17,12 @@ use tokio::time::timeout;
 use tracing_subscriber::EnvFilter;
 
 use super::announce::{announcement, reachable};
+use super::library::protocols;
 use super::output::Failure;
 use crate::autofocus::{BlurRate, PolicyName, Registry, scripted, shipped};
 use crate::camera::{self, CameraSettings, calibration};
 use crate::clock::{Clock, SystemClock};
-use crate::conductor::{Conductor, Library, Parts};
+use crate::conductor::{Conductor, Parts};
 use crate::control::{self, Command, ControlLoop, Drive, Rig, Settings};
 use crate::http::keys::Keys;
 use crate::http::{self, App};
@@ -145,7 +146,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     tracing::info!("the chain of records is at {}", store.reader().head().await?);
     let keys = Keys::load_or_create(&arguments.data_dir)?;
     let mut seeded = seeded(arguments)?;
-    let library = protocols(arguments, &registry)?;
+    let library = protocols(arguments.protocols.as_deref(), &registry)?;
 
     let developer = Developer::new(&calibration);
     let mut rig = rig(arguments, &clock, developer.reconstructor().clone(), registry.clone(), seeded.random())?;
@@ -312,15 +313,6 @@ fn seeded(arguments: &Arguments) -> Result<ChaCha12Rng, Failure> {
         Some(seed) => ChaCha12Rng::seed_from_u64(seed),
         None => ChaCha12Rng::try_from_rng(&mut SysRng)?,
     })
-}
-
-/// The shipped protocols and those of the folder asked for, or of `trial-protocols` where there is one.
-fn protocols(arguments: &Arguments, registry: &Registry) -> Result<Library, Failure> {
-    let beside = Path::new("trial-protocols");
-
-    let folder = arguments.protocols.as_deref().or_else(|| beside.is_dir().then_some(beside));
-    let known: Vec<_> = registry.entries().into_iter().map(|entry| entry.name).collect();
-    Ok(Library::load(folder, &known)?)
 }
 
 /// Opens lens and camera.

@@ -5,34 +5,57 @@ use rand_chacha::ChaCha12Rng;
 use uuid::Uuid;
 
 use super::course::Course;
-use super::{ConductError, Shared};
+use super::{ConductError, Pen, Shared, StudySite};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
-use crate::store::{NewSession, Stamp};
+use crate::store::{Enrolment, NewSession, Stamp};
 use crate::trial::allocation::Seed;
 use crate::trial::commitment::Allocation;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::protocol::Protocol;
 use crate::trial::role::Role;
+use crate::trial::study::lists::List;
+use crate::trial::study::places::next_place;
+use crate::trial::study::refusal::StudyRefusal;
+
+/// What a new session gets.
+struct Drawn {
+    protocol: Protocol,
+    /// The seed of its set.
+    seed: Seed,
+    /// Its index in the set.
+    index: usize,
+    /// Its place in a study, if it is made in one.
+    enrolment: Option<Enrolment>,
+}
 
 impl Shared {
-    pub(super) async fn create(&self, by: Role, participant: &str, protocol: &str) -> Result<SessionId, ConductError> {
+    pub(super) async fn create(
+        &self,
+        by: Role,
+        participant: &str,
+        protocol: &str,
+        place: Option<StudySite>,
+    ) -> Result<SessionId, ConductError> {
         let mut pen = self.pen.lock().await;
         self.record_stops(&mut pen).await?;
         let current = CurrentSession::of(self.live().course.as_ref().map(|course| course.state.phase()));
         permission::check(by, Request::MakeSession, current)?;
-
         self.check_participant(participant).await?;
-        let protocol = self.runnable(protocol)?;
 
         let pen = &mut *pen;
+        let drawn = match place {
+            Some(place) => self.draw_in_study(place, protocol, participant).await?,
+            None => self.draw_outside(protocol, pen).await?,
+        };
+
+        let Drawn { protocol, seed, index, enrolment } = drawn;
         let random = if protocol.practice { &mut pen.practice_random } else { &mut pen.random };
-        let (seed, place) = self.draw_place(&protocol, random).await?;
-        let made = self.make(participant, &protocol, seed, place, random);
+        let made = self.make(participant, &protocol, seed, index, random);
         let Stamp { at, wall } = made.stamp;
         let created = Event { number: 1, by, at, wall, kind: EventKind::Created };
-        self.store.create_session(&made, &created).await?;
+        self.store.create_session(&made, &created, enrolment.as_ref()).await?;
 
         let session = made.session;
         let mut live = self.live();
@@ -40,6 +63,53 @@ impl Shared {
         self.publish(&live);
         self.wake();
         Ok(session)
+    }
+
+    /// An order for a session outside any study, by the protocol that is installed.
+    async fn draw_outside(&self, protocol: &str, pen: &mut Pen) -> Result<Drawn, ConductError> {
+        let protocol = self.library.get(protocol).cloned().ok_or_else(|| {
+            let name: String = protocol.chars().take(40).collect();
+            ConductError::NotFound(format!("there is no protocol '{name}'; there are: {}", self.library.names()))
+        })?;
+        self.check_runnable(&protocol)?;
+
+        let random = if protocol.practice { &mut pen.practice_random } else { &mut pen.random };
+        let (seed, index) = self.draw_place(&protocol, random).await?;
+        Ok(Drawn { protocol, seed, index, enrolment: None })
+    }
+
+    /// The next place in the list of a study's site, by the protocol as it was when the study was planned.
+    async fn draw_in_study(
+        &self,
+        StudySite { study, site }: StudySite,
+        protocol: &str,
+        participant: &str,
+    ) -> Result<Drawn, ConductError> {
+        let stored = self.studies.stored(&study).await?;
+        stored.state().check_takes_sessions()?;
+
+        let definition = &stored.definition;
+        let here = definition.site(&site).filter(|site| stored.sites.contains(&site.name));
+        let site = here.ok_or_else(|| StudyRefusal::UnknownSite { site, here: stored.sites.clone() })?;
+        let protocol = definition.protocol(protocol).ok_or_else(|| StudyRefusal::UnknownProtocol {
+            protocol: protocol.chars().take(40).collect(),
+            known: definition.protocols.iter().map(|protocol| protocol.name.clone()).collect(),
+        })?;
+        self.check_runnable(protocol)?;
+
+        let place = next_place(definition, &stored.sessions, site, &protocol.name, participant)?;
+        let lost = || ConductError::Storage(format!("the orders of study {study} are not in the database"));
+        let list = List::draw(&site.name, protocol, site.places(), stored.seed.ok_or_else(lost)?);
+        let drawn = list.places.get(place - 1).ok_or_else(lost)?;
+
+        let enrolment = Enrolment {
+            study: definition.name.as_str().to_owned(),
+            definition_sha256: definition.sha256(),
+            site: site.name.clone(),
+            protocol: protocol.name.clone(),
+            place,
+        };
+        Ok(Drawn { protocol: protocol.clone(), seed: drawn.seed, index: drawn.index, enrolment: Some(enrolment) })
     }
 
     async fn check_participant(&self, code: &str) -> Result<(), ConductError> {
@@ -51,20 +121,15 @@ impl Shared {
         Err(ConductError::NotFound(format!("there is no participant '{code}'; add the code first")))
     }
 
-    /// Protocol `name`, if every policy of it can run now.
-    fn runnable(&self, name: &str) -> Result<Protocol, ConductError> {
-        let protocol = self.library.get(name).ok_or_else(|| {
-            let name: String = name.chars().take(40).collect();
-            ConductError::NotFound(format!("there is no protocol '{name}'; there are: {}", self.library.names()))
-        })?;
-
+    /// Checks that every policy of `protocol` can run now.
+    fn check_runnable(&self, protocol: &Protocol) -> Result<(), ConductError> {
         for policy in &protocol.policies {
+            let name = &protocol.name;
             self.registry
                 .build(policy)
                 .map_err(|error| ConductError::Conflict(format!("protocol '{name}' cannot run: {error}")))?;
         }
-
-        Ok(protocol.clone())
+        Ok(())
     }
 
     /// The seed, and the place in the set that shares it: the first free place of a set that is

@@ -7,7 +7,9 @@ use crate::store::DeviceReport;
 use crate::trial::action::Action;
 use crate::trial::allocation::Seed;
 use crate::trial::grace::{Grace, Outstanding};
-use crate::trial::unblinding::Circumstances;
+use crate::trial::study::signature::Signature;
+use crate::trial::study::stage::Stage;
+use crate::trial::unblinding::{BlindedStudy, Circumstances};
 
 /// What of a session is needed to look up the circumstances of an action on it.
 #[derive(Clone, Copy)]
@@ -24,12 +26,14 @@ impl Subject {
 }
 
 impl Shared {
-    /// The circumstances that bear on `action`. Only unblinding asks for any.
+    /// The circumstances that bear on `action`. Only unblinding asks for any. `signature`: of whoever does it, where
+    /// they signed for an emergency.
     pub(super) async fn circumstances(
         &self,
         pen: &mut Pen,
         subject: Subject,
         action: &Action,
+        signature: Option<&Signature>,
     ) -> Result<Circumstances, ConductError> {
         if !matches!(action, Action::Unblind { .. }) {
             return Ok(Circumstances::default());
@@ -40,7 +44,21 @@ impl Shared {
         self.record_stops(pen).await?;
         let set = self.store.reader().balanced_set(subject.seed).await?;
         let outstanding = self.outstanding(subject.session, subject.grace).await?;
-        Ok(Circumstances { set: Some(set), outstanding })
+        let study = self.blinded_study(subject.session, signature.is_some()).await?;
+        Ok(Circumstances { set: Some(set), outstanding, study })
+    }
+
+    /// The study of `session`, if it belongs to one that is not unblinded.
+    async fn blinded_study(&self, session: SessionId, signed: bool) -> Result<Option<BlindedStudy>, ConductError> {
+        let reader = self.store.reader();
+        let Some(enrolment) = reader.enrolment(session).await? else { return Ok(None) };
+        let Some(study) = reader.study(&enrolment.study).await? else { return Ok(None) };
+        if study.state().stage == Stage::Unblinded {
+            return Ok(None);
+        }
+
+        let policies = study.definition.protocols.iter().flat_map(|protocol| protocol.policies.clone()).collect();
+        Ok(Some(BlindedStudy { name: study.definition.name, policies, signed }))
     }
 
     /// What may still come in for `session`, whose grace is `grace`, and would not count after

@@ -36,6 +36,8 @@ pub(super) struct Course {
     pub state: SessionState,
     /// Whether what is said still counts.
     pub grace: Grace,
+    /// When its study was locked, if it belongs to one that was.
+    study_locked: Option<Timestamp>,
     /// All its events, those that are not on the disk yet last.
     pub events: Vec<Event>,
     /// When each of them happened, by the server's clocks over its restarts.
@@ -104,6 +106,7 @@ impl Course {
             protocol,
             state,
             grace,
+            study_locked: None,
             events: Vec::new(),
             times: Vec::new(),
             clock,
@@ -127,6 +130,7 @@ impl Course {
             stored.protocol().map_err(|error| ConductError::Unreadable { session, reason: error.to_string() })?;
 
         let mut course = Self::without_events(stored.made, protocol, clock.clone());
+        course.study_locked = stored.study_locked;
         let at = |(run, event): (i64, Event)| (clock.clocks.wall(run, event.at), event);
         course.replay(stored.events.into_iter().map(at).collect());
         for (run, answer) in reader.answers(session).await? {
@@ -261,7 +265,7 @@ impl Course {
     fn replay(&mut self, events: Vec<(Timestamp, Event)>) {
         self.recorded = events.len();
         self.state = self.state.replayed(&[]);
-        self.grace = Grace::new(self.protocol.grace);
+        self.grace = Grace::new(self.protocol.grace).locked(self.study_locked);
         self.begin_at = None;
         self.events = Vec::with_capacity(events.len());
         self.times = Vec::with_capacity(events.len());

@@ -3,6 +3,7 @@
 use crate::ids::SessionId;
 use crate::store::StoreError;
 use crate::trial::refusal::Refusal;
+use crate::trial::study::refusal::StudyRefusal;
 
 /// Why the conductor did not do something.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -44,6 +45,12 @@ impl ConductError {
 impl From<StoreError> for ConductError {
     fn from(error: StoreError) -> Self {
         Self::Storage(error.to_string())
+    }
+}
+
+impl From<StudyRefusal> for ConductError {
+    fn from(refusal: StudyRefusal) -> Self {
+        Refusal::from(refusal).into()
     }
 }
 

@@ -14,9 +14,11 @@ use super::{ConductError, Live, Pen, Shared, views};
 use crate::control::{Command, Drive};
 use crate::ids::SessionId;
 use crate::trial::action::Action;
+use crate::trial::event::{Event, EventKind};
 use crate::trial::phase::Phase;
 use crate::trial::role::Role;
 use crate::trial::session::decide_restart;
+use crate::trial::study::signature::Signature;
 
 /// How long the screens wait for the disk to take what stopped a session before they show it as not
 /// recorded yet.
@@ -36,12 +38,13 @@ impl Shared {
         by: Role,
         session: SessionId,
         action: &Action,
+        signature: Option<&Signature>,
     ) -> Result<(), ConductError> {
         let under_way = self.live().course_of(session).is_some();
         match under_way {
             true if action.stops_the_lens() => self.stop(by, session, action).await,
-            true => self.move_on(by, session, action).await,
-            false => self.act_on_earlier(by, session, action).await,
+            true => self.move_on(by, session, action, signature).await,
+            false => self.act_on_earlier(by, session, action, signature).await,
         }
     }
 
@@ -67,7 +70,13 @@ impl Shared {
     }
 
     /// Does what takes effect only once it is on disk.
-    async fn move_on(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+    async fn move_on(
+        &self,
+        by: Role,
+        session: SessionId,
+        action: &Action,
+        signature: Option<&Signature>,
+    ) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         let events = loop {
             self.keep_time();
@@ -75,7 +84,7 @@ impl Shared {
 
             let subject = self.live().course_of(session).map(|course| Subject::of(course));
             let subject = subject.ok_or_else(ConductError::no_session)?;
-            let circumstances = self.circumstances(&mut pen, subject, action).await?;
+            let circumstances = self.circumstances(&mut pen, subject, action, signature).await?;
 
             let mut live = self.live();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
@@ -89,7 +98,7 @@ impl Shared {
             return Ok(());
         }
 
-        let written = self.store.append_events(session, &events).await;
+        let written = self.append(session, &events, signature).await;
 
         let mut live = self.live();
         if let Some(course) = live.course_of(session) {
@@ -104,12 +113,42 @@ impl Shared {
     }
 
     /// Acts on a session that is not the one in memory.
-    async fn act_on_earlier(&self, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+    async fn act_on_earlier(
+        &self,
+        by: Role,
+        session: SessionId,
+        action: &Action,
+        signature: Option<&Signature>,
+    ) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         let mut earlier = self.load(session).await?;
-        let circumstances = self.circumstances(&mut pen, Subject::of(&earlier), action).await?;
+        let circumstances = self.circumstances(&mut pen, Subject::of(&earlier), action, signature).await?;
         let events = earlier.begin_writing(by, action, &circumstances, self.clock.now(), self.clock.wall())?;
-        Ok(self.store.append_events(session, &events).await?)
+        self.append(session, &events, signature).await
+    }
+
+    /// Writes `events` of `session`. An emergency unblinding is recorded with its study, too.
+    async fn append(
+        &self,
+        session: SessionId,
+        events: &[Event],
+        signature: Option<&Signature>,
+    ) -> Result<(), ConductError> {
+        let unblinding = events.iter().find(|event| matches!(event.kind, EventKind::Unblinded { .. }));
+        let enrolment = match (unblinding, signature) {
+            (Some(unblinding), Some(signature)) => {
+                let enrolment = self.store.reader().enrolment(session).await?;
+                enrolment.map(|enrolment| (enrolment, unblinding, signature))
+            }
+            _ => None,
+        };
+
+        match enrolment {
+            Some((enrolment, unblinding, signature)) => {
+                self.studies.session_unblinded(&enrolment, session, events, unblinding, signature).await
+            }
+            None => Ok(self.store.append_events(session, events).await?),
+        }
     }
 
     pub(super) async fn load(&self, session: SessionId) -> Result<Course, ConductError> {

@@ -86,6 +86,11 @@ impl Library {
         self.protocols.get(name)
     }
 
+    /// All protocols, by name.
+    pub(super) fn protocols(&self) -> Vec<Protocol> {
+        self.protocols.values().cloned().collect()
+    }
+
     /// All names, separated by commas.
     #[must_use]
     pub fn names(&self) -> String {
@@ -95,16 +100,20 @@ impl Library {
     /// All of them, by name.
     #[must_use]
     pub fn summaries(&self) -> Vec<ProtocolSummary> {
-        let summary = |protocol: &Protocol| ProtocolSummary {
+        self.protocols.values().map(ProtocolSummary::of).collect()
+    }
+}
+
+impl ProtocolSummary {
+    pub(super) fn of(protocol: &Protocol) -> Self {
+        Self {
             name: protocol.name.clone(),
             title: protocol.title.clone(),
             researcher_title: protocol.researcher_title.clone(),
             practice: protocol.practice,
             settings: protocol.settings(),
             segment_seconds: protocol.segment_limit.as_secs(),
-        };
-
-        self.protocols.values().map(summary).collect()
+        }
     }
 }
 

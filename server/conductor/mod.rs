@@ -20,6 +20,9 @@ mod lens;
 mod library;
 mod remarks;
 mod reports;
+mod studies;
+mod study_changes;
+mod study_reports;
 mod timeline;
 mod views;
 
@@ -32,6 +35,8 @@ pub use beside::{ConsentLine, CorrectionLine, WithdrawalLine};
 pub use error::ConductError;
 pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
+pub use studies::Studies;
+pub use study_reports::{OpenStudy, SiteDetail, StudyDetail, StudyLine, StudyLogLine, StudyProtocol, StudySession};
 pub use timeline::{PauseSpan, Played, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint};
 
 use crate::autofocus::Registry;
@@ -45,6 +50,7 @@ use crate::trial::phase::Phase;
 use crate::trial::protocol::Record;
 use crate::trial::remark::{Holding, NewAnswer, NewComment};
 use crate::trial::role::Role;
+use crate::trial::study::signature::Signature;
 use crate::trial::view::{OperatorView, SurgeonView};
 use course::{Course, RunClock};
 
@@ -79,6 +85,7 @@ struct Shared {
     store: Store,
     control: ControlHandle,
     library: Library,
+    studies: Studies,
     registry: Registry,
     clock: Arc<dyn Clock>,
     /// The clocks of this start of the server and of those before.
@@ -95,6 +102,15 @@ struct Shared {
     changed: Notify,
     /// Wakes the task that records: there may be something to record.
     to_record: Notify,
+}
+
+/// Where in a study a session is to be made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StudySite {
+    /// The study's name.
+    pub study: String,
+    /// The site's name.
+    pub site: String,
 }
 
 struct Live {
@@ -151,10 +167,12 @@ impl Conductor {
             None => None,
         };
 
+        let studies = Studies::of_server(&store, &library, Arc::clone(&clock));
         let shared = Shared {
             store,
             control,
             library,
+            studies,
             registry,
             clock,
             run_clock,
@@ -208,9 +226,34 @@ impl Conductor {
     /// # Errors
     /// When one is under way already, or participant or protocol is unknown.
     pub async fn create(&self, by: Role, participant: &str, protocol: &str) -> Result<SessionId, ConductError> {
+        self.create_where(by, participant, protocol, None).await
+    }
+
+    /// Makes a session for `participant` by `protocol` of the study `place.study`: it gets the next place in the list
+    /// of `place.site`.
+    ///
+    /// # Errors
+    /// When one is under way already, the participant is unknown, or the study allows no such session.
+    pub async fn create_in_study(
+        &self,
+        by: Role,
+        participant: &str,
+        protocol: &str,
+        place: StudySite,
+    ) -> Result<SessionId, ConductError> {
+        self.create_where(by, participant, protocol, Some(place)).await
+    }
+
+    async fn create_where(
+        &self,
+        by: Role,
+        participant: &str,
+        protocol: &str,
+        place: Option<StudySite>,
+    ) -> Result<SessionId, ConductError> {
         let participant = participant.to_owned();
         let protocol = protocol.to_owned();
-        self.to_the_end(|shared| async move { shared.create(by, &participant, &protocol).await }).await
+        self.to_the_end(|shared| async move { shared.create(by, &participant, &protocol, place).await }).await
     }
 
     /// Moves session `session` on.
@@ -218,7 +261,22 @@ impl Conductor {
     /// # Errors
     /// When `by` may not, or the session is not where the action fits.
     pub async fn act(&self, by: Role, session: SessionId, action: Action) -> Result<(), ConductError> {
-        self.to_the_end(move |shared| async move { shared.act(by, session, &action).await }).await
+        self.to_the_end(move |shared| async move { shared.act(by, session, &action, None).await }).await
+    }
+
+    /// Unblinds one session of a study that is still blinded, signed by a person.
+    ///
+    /// # Errors
+    /// When `by` is not the researcher, the reason names a policy, or the session's order would tell another's.
+    pub async fn unblind_in_emergency(
+        &self,
+        by: Role,
+        session: SessionId,
+        signature: Signature,
+        despite_outstanding: bool,
+    ) -> Result<(), ConductError> {
+        let action = Action::Unblind { reason: signature.reason.clone(), despite_outstanding };
+        self.to_the_end(move |shared| async move { shared.act(by, session, &action, Some(&signature)).await }).await
     }
 
     /// Takes an ended session off the screens.

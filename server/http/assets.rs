@@ -52,6 +52,8 @@ static ASSETS: &[Asset] = &assets![
     "researcher/playhead.js",
     "researcher/session.js",
     "researcher/svg.js",
+    "researcher/studies.js",
+    "researcher/study.js",
     "researcher/timeline.js",
     "researcher/timeline_drawing.js",
     "researcher/timeline_words.js",

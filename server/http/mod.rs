@@ -23,6 +23,7 @@ pub mod roles;
 pub mod security;
 mod shutdown;
 mod state;
+mod studies;
 mod surgeon;
 
 pub use state::{App, AppState, Metrics};
@@ -61,6 +62,7 @@ pub fn router(app: AppState) -> Router {
         .merge(researcher::routes())
         .merge(playback::routes())
         .merge(records::routes())
+        .merge(studies::routes())
         .merge(export::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())

@@ -18,7 +18,7 @@ use super::security::Nonce;
 use super::surgeon::Act;
 use super::{App, AppState};
 use crate::autofocus::PolicyEntry;
-use crate::conductor::ProtocolSummary;
+use crate::conductor::{OpenStudy, ProtocolSummary, StudySite};
 use crate::ids::SessionId;
 use crate::trial::action::Focus;
 use crate::trial::consent::NewConsent;
@@ -80,6 +80,8 @@ struct Choices {
     participants: Vec<String>,
     /// Protocols.
     protocols: Vec<ProtocolSummary>,
+    /// Studies that take sessions now.
+    studies: Vec<OpenStudy>,
     /// Policies.
     #[schema(value_type = Vec<Object>)]
     policies: Vec<PolicyEntry>,
@@ -88,8 +90,12 @@ struct Choices {
 /// What the operator can choose from.
 #[utoipa::path(get, path = "/api/operator/choices", tag = "operator", responses((status = 200, body = Choices)))]
 async fn choices(_: Operator, State(app): State<AppState>) -> Result<Json<Choices>, Error> {
-    let participants = codes(&app).await?;
-    Ok(Json(Choices { participants, protocols: app.conductor.protocols(), policies: app.registry.entries() }))
+    Ok(Json(Choices {
+        participants: codes(&app).await?,
+        protocols: app.conductor.protocols(),
+        studies: app.conductor.open_studies().await?,
+        policies: app.registry.entries(),
+    }))
 }
 
 async fn codes(app: &App) -> Result<Vec<String>, Error> {
@@ -138,6 +144,18 @@ struct NewSession {
     participant: String,
     /// Protocol's name.
     protocol: String,
+    /// The study that it belongs to; none outside any study.
+    #[serde(default)]
+    study: Option<StudyPlace>,
+}
+
+/// Where in a study a session is to be made.
+#[derive(Debug, Deserialize, ToSchema)]
+struct StudyPlace {
+    /// The study's name.
+    study: String,
+    /// The site's name.
+    site: String,
 }
 
 type View = Json<Option<Arc<OperatorView>>>;
@@ -150,13 +168,23 @@ async fn session(_: Operator, State(app): State<AppState>) -> View {
     Json(app.operator_view.borrow().clone())
 }
 
-/// Prepares a session: draws its order, and waits for its start.
+/// Prepares a session: draws its order, or takes the next place of its study's list, and waits for its start.
 #[utoipa::path(post, path = "/api/operator/sessions", tag = "operator", request_body = NewSession, responses(
     (status = 200, body = Option<OperatorView>),
-    (status = 404, description = "No such participant or protocol", body = ErrorBody),
-    (status = 409, description = "A session is under way", body = ErrorBody)))]
+    (status = 404, description = "No such participant, protocol or study", body = ErrorBody),
+    (status = 409, description = "A session is under way, or the study allows no such session", body = ErrorBody),
+    (status = 422, description = "The study has no such site or protocol", body = ErrorBody)))]
 async fn create(_: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewSession>) -> Result<View, Error> {
-    app.conductor.create(Role::Operator, &new.participant, &new.protocol).await?;
+    let by = Role::Operator;
+    match new.study {
+        Some(StudyPlace { study, site }) => {
+            let place = StudySite { study, site };
+            app.conductor.create_in_study(by, &new.participant, &new.protocol, place).await?;
+        }
+        None => {
+            app.conductor.create(by, &new.participant, &new.protocol).await?;
+        }
+    }
     Ok(Json(app.operator_view.borrow().clone()))
 }
 

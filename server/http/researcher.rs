@@ -27,6 +27,7 @@ use crate::trial::instruments::Measure;
 use crate::trial::phase::SessionStatus;
 use crate::trial::question::AnswerValue;
 use crate::trial::role::Role;
+use crate::trial::study::signature::Signature;
 
 /// Points of the focal path for each setting: about as many as there are pixels to draw them on.
 const POINTS: u32 = 600;
@@ -34,6 +35,11 @@ const POINTS: u32 = 600;
 /// When a session was made, on the clock of the room.
 pub(super) fn made(line: &SessionLine) -> String {
     local(&line.created, "%Y-%m-%d %H:%M")
+}
+
+/// Whether any of `lines` belongs to a study.
+pub(super) fn in_studies(lines: &[SessionLine]) -> bool {
+    lines.iter().any(|line| line.study.is_some())
 }
 
 /// How far a session came, in words.
@@ -262,9 +268,13 @@ struct Unblind {
     /// Whether to do it though something may be outstanding, which would then not count any more.
     #[serde(default)]
     despite_outstanding: bool,
+    /// Who does it: needed for a session of a study that is still blinded.
+    #[serde(default)]
+    person: Option<String>,
 }
 
-/// Tells which policies ran; on a session still under way this is emergency unblinding and marked so for good.
+/// Tells which policies ran; on a session still under way, or of a study that is still blinded, this is emergency
+/// unblinding and marked so for good.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/unblind", tag = "researcher",
     params(("session" = SessionId, Path)),
     request_body = Unblind, responses(
@@ -272,14 +282,21 @@ struct Unblind {
     (status = 404, description = "No such session", body = ErrorBody),
     (status = 409, description = "Its order would tell that of another session of its balanced set, \
                                   or something may be outstanding", body = ErrorBody),
-    (status = 422, description = "No reason was given", body = ErrorBody)))]
+    (status = 422, description = "No reason was given, or nobody signed for a session of a study", body = ErrorBody)))]
 async fn unblind(
     _: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
-    JsonBody(Unblind { reason, despite_outstanding }): JsonBody<Unblind>,
+    JsonBody(Unblind { reason, despite_outstanding, person }): JsonBody<Unblind>,
 ) -> Result<StatusCode, Error> {
-    app.conductor.act(Role::Researcher, id, Action::Unblind { reason, despite_outstanding }).await?;
+    let by = Role::Researcher;
+    match person {
+        Some(person) => {
+            let signature = Signature::new(&person, &reason).map_err(ConductError::from)?;
+            app.conductor.unblind_in_emergency(by, id, signature, despite_outstanding).await?;
+        }
+        None => app.conductor.act(by, id, Action::Unblind { reason, despite_outstanding }).await?,
+    }
     Ok(StatusCode::NO_CONTENT)
 }
 

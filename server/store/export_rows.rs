@@ -2,14 +2,27 @@
 //! gather first.
 
 use futures_util::TryStreamExt;
+use jiff::Timestamp;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow, Row as _};
 
 use super::chain::Entry;
-use super::export::{AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, TelemetryRow, WeightsRow};
+use super::export::{
+    AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
+};
 use super::values::parsed;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
+
+/// What the database tells of a study's plan.
+pub(super) struct PlannedStudy {
+    /// SHA-256 of its definition.
+    pub definition_sha256: String,
+    /// JSON: the sites that this database runs.
+    pub sites: String,
+    /// When it was planned.
+    pub wall: Timestamp,
+}
 
 impl Reader {
     /// The starts of the server that `session` has records of.
@@ -28,6 +41,37 @@ impl Reader {
         .await?;
 
         rows.iter().map(run_row).collect()
+    }
+
+    /// The row of study `study`: what was planned.
+    pub(super) async fn export_study(&self, study: &str) -> Result<PlannedStudy, StoreError> {
+        let row = sqlx::query("SELECT definition_sha256, sites, wall FROM studies WHERE study = ?")
+            .bind(study)
+            .fetch_one(self.pool())
+            .await?;
+
+        Ok(PlannedStudy {
+            definition_sha256: row.try_get("definition_sha256")?,
+            sites: row.try_get("sites")?,
+            wall: parsed(&row, "wall")?,
+        })
+    }
+
+    /// The events of study `study` that are about all of it or about `session`.
+    pub(super) async fn export_study_events(
+        &self,
+        study: &str,
+        session: SessionId,
+    ) -> Result<Vec<StudyEventRow>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT * FROM study_events WHERE study = ? AND (session IS NULL OR session = ?) ORDER BY number",
+        )
+        .bind(study)
+        .bind(session.to_string())
+        .fetch_all(self.pool())
+        .await?;
+
+        rows.iter().map(study_event_row).collect()
     }
 
     /// Hands the blinded telemetry of `session` to `take`, row by row.
@@ -180,5 +224,27 @@ fn chain_row(row: &SqliteRow) -> Result<ChainRow, StoreError> {
         sealed: Some(entry.sealed),
         sealed_salt: row.try_get("sealed_salt")?,
         content: Some(entry.content),
+    })
+}
+
+fn study_event_row(row: &SqliteRow) -> Result<StudyEventRow, StoreError> {
+    let session: Option<String> = row.try_get("session")?;
+    let about_session = match session {
+        Some(_) => Some(parsed(row, "session")?),
+        None => None,
+    };
+
+    Ok(StudyEventRow {
+        study: row.try_get("study")?,
+        number: row.try_get("number")?,
+        wall: parsed(row, "wall")?,
+        run: row.try_get("run")?,
+        monotonic_ns: row.try_get("monotonic_ns")?,
+        role: row.try_get("role")?,
+        person: row.try_get("person")?,
+        kind: row.try_get("kind")?,
+        about_session,
+        commitment: row.try_get("commitment")?,
+        reason: row.try_get("reason")?,
     })
 }

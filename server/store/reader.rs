@@ -133,6 +133,7 @@ impl Reader {
     pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, StoreError> {
         let rows = sqlx::query(
             "SELECT session, wall, participant, protocol, practice,
+                 (SELECT study FROM study_sessions AS m WHERE m.session = s.session) AS study,
                  (SELECT kind FROM events AS e
                      WHERE e.session = s.session AND kind IN ('completed', 'aborted')) AS ended,
                  (SELECT count(*) FROM events AS e
@@ -262,6 +263,7 @@ fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
         corrected_participant: row.try_get("corrected_participant")?,
         protocol: row.try_get("protocol")?,
         practice: row.try_get("practice")?,
+        study: row.try_get("study")?,
         status: match ended.as_deref() {
             None => SessionStatus::UnderWay,
             Some("completed") => SessionStatus::Completed,

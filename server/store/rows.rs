@@ -125,6 +125,8 @@ pub struct SessionLine {
     pub protocol: String,
     /// Whether it is practice.
     pub practice: bool,
+    /// The study that it belongs to; none where it is outside any study.
+    pub study: Option<String>,
     /// How far it came.
     pub status: SessionStatus,
     /// Settings inspected to the end.

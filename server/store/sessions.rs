@@ -7,6 +7,8 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::chain;
+use super::session_events::insert_event;
+use super::studies::{Enrolment, enrol};
 use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
 use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use crate::autofocus::PolicyName;
@@ -55,6 +57,8 @@ pub struct StoredSession {
     pub run: i64,
     /// Its events so far, each with the start of the server that recorded it.
     pub events: Vec<(i64, Event)>,
+    /// When its study was locked, by the wall clock, if it belongs to one that was.
+    pub study_locked: Option<Timestamp>,
 }
 
 impl StoredSession {
@@ -81,19 +85,24 @@ impl StoredSession {
         for (run, event) in &self.events {
             grace.apply(&event.kind, clocks.wall(*run, event.at));
         }
-        grace
+        grace.locked(self.study_locked)
     }
 }
 
 impl Store {
-    /// Makes a session with its first event, or nothing.
+    /// Makes a session with its first event, and with its place in a study if it has one; or nothing.
     ///
     /// # Errors
     /// When the disk or database failed.
-    pub async fn create_session(&self, new: &NewSession, created: &Event) -> Result<(), StoreError> {
+    pub async fn create_session(
+        &self,
+        new: &NewSession,
+        created: &Event,
+        enrolment: Option<&Enrolment>,
+    ) -> Result<(), StoreError> {
         let _turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
-        let made = insert_session(&mut connection, self.inner.run, new, created).await;
+        let made = insert_session(&mut connection, self.inner.run, new, created, enrolment).await;
         drop_if_failed(connection, &made);
         made
     }
@@ -140,6 +149,7 @@ async fn insert_session(
     run: i64,
     new: &NewSession,
     created: &Event,
+    enrolment: Option<&Enrolment>,
 ) -> Result<(), StoreError> {
     let wall = new.stamp.wall.to_string();
     let mut transaction = begin(connection).await?;
@@ -175,6 +185,9 @@ async fn insert_session(
     }
 
     chain::append(&mut transaction, "session", &new.session.to_string(), &wall).await?;
+    if let Some(enrolment) = enrolment {
+        enrol(&mut transaction, new.session, enrolment, &wall).await?;
+    }
     insert_event(&mut transaction, run, new.session, created).await?;
     Ok(transaction.commit().await?)
 }
@@ -190,41 +203,6 @@ async fn insert_events(
         insert_event(&mut transaction, run, session, event).await?;
     }
     Ok(transaction.commit().await?)
-}
-
-async fn insert_event(
-    connection: &mut SqliteConnection,
-    run: i64,
-    session: SessionId,
-    event: &Event,
-) -> Result<(), StoreError> {
-    let wall = event.wall.to_string();
-    let payload = serde_json::to_string(&event.kind).map_err(|error| StoreError::Damaged(error.to_string()))?;
-
-    // A commit that the disk reported as failed may have reached it all the same: the same event again is the same
-    // event, and another one of its number is still refused.
-    let done = sqlx::query(
-        "INSERT INTO events (session, number, run, wall, monotonic_ns, role, kind, payload)
-         SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE NOT EXISTS (
-             SELECT 1 FROM events
-             WHERE session = ?1 AND number = ?2 AND run = ?3 AND monotonic_ns = ?5 AND role = ?6 AND payload = ?8)",
-    )
-    .bind(session.to_string())
-    .bind(event.number)
-    .bind(run)
-    .bind(&wall)
-    .bind(nanoseconds(event.at))
-    .bind(event.by.name())
-    .bind(event.kind.name())
-    .bind(payload)
-    .execute(&mut *connection)
-    .await?;
-
-    if done.rows_affected() == 1 {
-        chain::append(connection, "event", &format!("{session}/{}", event.number), &wall).await?;
-    }
-
-    Ok(())
 }
 
 impl Reader {
@@ -254,7 +232,12 @@ impl Reader {
             segments: self.segments(session).await?,
         };
 
-        Ok(Some(StoredSession { made, run: row.try_get("run")?, events: self.events(session).await? }))
+        Ok(Some(StoredSession {
+            made,
+            run: row.try_get("run")?,
+            events: self.events(session).await?,
+            study_locked: self.study_locked(session).await?,
+        }))
     }
 
     async fn segments(&self, session: SessionId) -> Result<Vec<(SegmentId, PolicyName)>, StoreError> {

@@ -11,7 +11,7 @@ use crate::trial::balanced_set::{BalancedSet, Member};
 use crate::trial::phase::SessionStatus;
 
 impl Reader {
-    /// The set of the latest session by the protocol with this hash and algorithm, if there is one.
+    /// The set of the latest session outside any study by the protocol with this hash and algorithm, if there is one.
     ///
     /// # Errors
     /// When the database failed.
@@ -21,7 +21,9 @@ impl Reader {
         algorithm: Algorithm,
     ) -> Result<Option<BalancedSet>, StoreError> {
         let latest = sqlx::query(
-            "SELECT seed FROM sessions WHERE protocol_sha256 = ? AND algorithm = ? ORDER BY rowid DESC LIMIT 1",
+            "SELECT seed FROM sessions WHERE protocol_sha256 = ? AND algorithm = ?
+                 AND session NOT IN (SELECT session FROM study_sessions)
+             ORDER BY rowid DESC LIMIT 1",
         )
         .bind(protocol_sha256)
         .bind(algorithm.name())

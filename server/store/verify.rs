@@ -9,6 +9,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use super::chain::check::{BlockToCheck, Found, FoundRow, Walk};
 use super::chain::{Entry, Head, all, hashes, unsealed};
 use super::export::verify::{Check, Verdict};
+use super::studies::check_studies;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
 use crate::trial::commitment::Allocation;
@@ -39,6 +40,7 @@ pub(super) async fn checks(snapshot: &Reader, expected: Option<Head>) -> Vec<Che
         check("database", whole(snapshot).await),
         check("chain", chain(snapshot, expected).await),
         check("commitments", commitments(snapshot).await),
+        check("studies", studies(snapshot).await),
     ]
 }
 
@@ -159,6 +161,11 @@ async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64
         }
     }
     Ok(waiting)
+}
+
+/// Whether each study is as it was planned, and its sessions have the orders drawn for them.
+async fn studies(snapshot: &Reader) -> Result<String, Wrong> {
+    Ok(check_studies(snapshot).await??)
 }
 
 /// Whether each session has the protocol and the order that it was made with.

@@ -161,7 +161,7 @@ impl EventKind {
             Self::Withdrawn { reason } => format!("Withdrawn: {reason}"),
             Self::Unblinded { reason, .. } if reason.is_empty() => "Unblinded by the researcher".to_owned(),
             Self::Unblinded { reason, emergency: false } => format!("Unblinded: {reason}"),
-            Self::Unblinded { reason, emergency: true } => format!("Unblinded while under way: {reason}"),
+            Self::Unblinded { reason, emergency: true } => format!("Unblinded in an emergency: {reason}"),
         }
     }
 }

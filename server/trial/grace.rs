@@ -19,13 +19,14 @@ pub struct Grace {
     length: Duration,
     ended: Option<Timestamp>,
     unblinded: Option<Timestamp>,
+    locked: Option<Timestamp>,
 }
 
 impl Grace {
     /// For a session just made, by a protocol that gives `length`.
     #[must_use]
     pub const fn new(length: Duration) -> Self {
-        Self { length, ended: None, unblinded: None }
+        Self { length, ended: None, unblinded: None, locked: None }
     }
 
     /// Takes in what happened at `at`.
@@ -37,19 +38,27 @@ impl Grace {
         }
     }
 
-    /// Until when what arrives counts: none while the session is under way. Unblinding ends that time; for a session
-    /// that was unblinded while under way it ends with the session.
+    /// Notes that the session's study was locked at `at`.
+    #[must_use]
+    pub const fn locked(self, at: Option<Timestamp>) -> Self {
+        Self { locked: at, ..self }
+    }
+
+    /// Until when what arrives counts: none while the session is under way. Unblinding ends that time, and so does
+    /// locking the session's study; for a session that was unblinded while under way it ends with the session.
     #[must_use]
     pub fn until(&self) -> Option<Timestamp> {
         let ended = self.ended?;
         let over = ended.saturating_add(self.length).unwrap_or(Timestamp::MAX);
-        Some(self.unblinded.map_or(over, |unblinded| over.min(unblinded.max(ended))))
+        let ends = [self.unblinded, self.locked];
+        Some(ends.into_iter().flatten().fold(over, |over, end| over.min(end.max(ended))))
     }
 
     /// Whether what arrives at `at` is too late to count.
     #[must_use]
     pub fn is_late(&self, at: Timestamp) -> bool {
-        self.until().is_some_and(|until| self.unblinded.is_some() || at > until)
+        let closed = self.unblinded.is_some() || self.locked.is_some();
+        self.until().is_some_and(|until| closed || at > until)
     }
 
     /// What unblinding at `now` would keep from counting, if anything: `None` also while the session is
@@ -61,7 +70,7 @@ impl Grace {
         devices: impl IntoIterator<Item = Option<(u32, Timestamp)>>,
     ) -> Option<Outstanding> {
         let ended = self.ended?;
-        if self.unblinded.is_some() {
+        if self.unblinded.is_some() || self.locked.is_some() {
             return None;
         }
         let empty_since_the_end = |(holding, told): (u32, Timestamp)| holding == 0 && told >= ended;

@@ -24,5 +24,6 @@ pub mod remark;
 pub mod role;
 pub mod session;
 pub mod standing;
+pub mod study;
 pub mod unblinding;
 pub mod view;

@@ -7,6 +7,9 @@ use super::grace::Outstanding;
 use super::refusal::Refusal;
 use super::role::Role;
 use super::session::{SessionState, decide};
+use super::study::definition::StudyName;
+use super::study::state::check_unblinding_reason;
+use crate::autofocus::PolicyName;
 use crate::clock::Moment;
 use crate::ids::SessionId;
 
@@ -17,6 +20,19 @@ pub struct Circumstances {
     pub set: Option<BalancedSet>,
     /// What may still come in for the session, and would not count after unblinding.
     pub outstanding: Option<Outstanding>,
+    /// The session's study, if it belongs to one that is not unblinded.
+    pub study: Option<BlindedStudy>,
+}
+
+/// A study of which one session is to be unblinded, and the others not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BlindedStudy {
+    /// Its name.
+    pub name: StudyName,
+    /// The policies that it compares.
+    pub policies: Vec<PolicyName>,
+    /// Whether somebody signed for an emergency.
+    pub signed: bool,
 }
 
 impl Circumstances {
@@ -35,14 +51,33 @@ impl Circumstances {
         now: Moment,
     ) -> Result<Vec<EventKind>, Refusal> {
         // Whoever may not is told so first, and nothing of other sessions.
-        let events = decide(state, by, action, now)?;
+        let mut events = decide(state, by, action, now)?;
 
-        if let Action::Unblind { despite_outstanding, .. } = action
+        if let Action::Unblind { despite_outstanding, reason } = action
             && !events.is_empty()
         {
+            self.check_study(reason)?;
             self.check_unblinding(session, *despite_outstanding)?;
         }
+
+        // In a study one session is unblinded only in an emergency, also after its end.
+        for event in &mut events {
+            if let EventKind::Unblinded { emergency, .. } = event {
+                *emergency |= self.study.is_some();
+            }
+        }
         Ok(events)
+    }
+
+    fn check_study(&self, reason: &str) -> Result<(), Refusal> {
+        let Some(study) = &self.study else { return Ok(()) };
+        if !study.signed {
+            return Err(Refusal::Invalid(format!(
+                "the session belongs to study {}; to unblind it alone is an emergency: say who does it (person)",
+                study.name
+            )));
+        }
+        Ok(check_unblinding_reason(reason, &study.policies)?)
     }
 
     fn check_unblinding(&self, session: SessionId, despite_outstanding: bool) -> Result<(), Refusal> {
@@ -113,12 +148,12 @@ mod tests {
     /// Another session of the set is under way.
     fn other_under_way() -> Circumstances {
         let members = vec![member(SESSION, 0, SessionStatus::Completed), member(OTHER, 1, SessionStatus::UnderWay)];
-        Circumstances { set: Some(BalancedSet { seed: Seed([7; 32]), members }), outstanding: None }
+        Circumstances { set: Some(BalancedSet { seed: Seed([7; 32]), members }), outstanding: None, study: None }
     }
 
     /// A surgeon's device has not said that it is empty.
     fn device_silent() -> Circumstances {
-        Circumstances { set: None, outstanding: Some(Outstanding { counts_until: None, devices: 1 }) }
+        Circumstances { outstanding: Some(Outstanding { counts_until: None, devices: 1 }), ..Circumstances::default() }
     }
 
     fn decided(

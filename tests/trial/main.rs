@@ -13,4 +13,5 @@ mod lens;
 mod remarks;
 mod sessions;
 mod storage;
+mod studies;
 mod verification;

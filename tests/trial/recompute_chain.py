@@ -48,6 +48,12 @@ OPEN = {
     "correction": ("corrections", "number session subject record field role wall run monotonic_ns"),
     "consent": ("consents", "number session text_version given_on medium role wall run monotonic_ns"),
     "erasure": ("erasures", "number session subject record role wall run monotonic_ns"),
+    "study": ("studies", "study definition_sha256 sites wall"),
+    "study-event": (
+        "study_events",
+        "study number wall run monotonic_ns role person kind about_session commitment",
+    ),
+    "study-session": ("study_sessions", "session study site protocol place"),
 }
 SEALED = {
     "event": ["reason"],
@@ -56,6 +62,7 @@ SEALED = {
     "correction": ["old_value", "new_value", "reason"],
     "consent": ["obtained_by"],
     "erasure": ["reason"],
+    "study-event": ["reason"],
 }
 
 
@@ -86,6 +93,9 @@ def main(folder):
         "correction": lambda row: row["number"],
         "consent": lambda row: row["number"],
         "erasure": lambda row: row["number"],
+        "study": lambda row: row["study"],
+        "study-event": lambda row: f"{row['study']}/{row['number']}",
+        "study-session": lambda row: row["session"],
     }
     records = {(kind, keys[kind](row)): row for kind, found in tables.items() for row in found}
 

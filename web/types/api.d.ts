@@ -222,7 +222,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Prepares a session: draws its order, and waits for its start. */
+        /** Prepares a session: draws its order, or takes the next place of its study's list, and waits for its start. */
         post: operations["operator_create"];
         delete?: never;
         options?: never;
@@ -392,7 +392,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Tells which policies ran; on a session still under way this is emergency unblinding and marked so for good. */
+        /**
+         * Tells which policies ran; on a session still under way, or of a study that is still blinded, this is emergency
+         *     unblinding and marked so for good.
+         */
         post: operations["researcher_unblind"];
         delete?: never;
         options?: never;
@@ -401,6 +404,42 @@ export interface paths {
         trace?: never;
     };
     "/api/researcher/sessions/{session}/withdraw": {
+    "/api/researcher/studies": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The studies, in the order in which they were planned. */
+        get: operations["researcher_list_studies"];
+        put?: never;
+        /** Plans a study. */
+        post: operations["researcher_plan_study"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/studies/{study}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** One study in detail. It tells no order. */
+        get: operations["researcher_study"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/studies/{study}/changes": {
         parameters: {
             query?: never;
             header?: never;
@@ -411,6 +450,8 @@ export interface paths {
         put?: never;
         /** Records that the participant withdrew: from now on the session's data stay out of exports. */
         post: operations["researcher_withdraw"];
+        /** Opens, closes, locks or unblinds a study, or records that a surgeon withdrew. */
+        post: operations["researcher_change_study"];
         delete?: never;
         options?: never;
         head?: never;
@@ -641,6 +682,40 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/researcher/studies": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The list of studies, and a form to plan one. */
+        get: operations["researcher_studies_page"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/researcher/studies/{study}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** One study. */
+        get: operations["researcher_study_page"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/static/{version}/{folder}/{name}": {
         parameters: {
             query?: never;
@@ -836,6 +911,13 @@ export interface components {
              */
             value: number;
         };
+        /** @description A change of a study, signed. */
+        ChangeStudy: components["schemas"]["StudyAction"] & {
+            /** @description Who does it. */
+            person: string;
+            /** @description Why. */
+            reason: string;
+        };
         /** @description What the operator can choose from. */
         Choices: {
             /** @description Codes of the participants. */
@@ -844,6 +926,8 @@ export interface components {
             policies: Record<string, never>[];
             /** @description Protocols. */
             protocols: components["schemas"]["ProtocolSummary"][];
+            /** @description Studies that take sessions now. */
+            studies: components["schemas"]["OpenStudy"][];
         };
         /** @description A comment for reading. */
         CommentLine: components["schemas"]["Said"] & {
@@ -1084,6 +1168,18 @@ export interface components {
             participant: string;
             /** @description Protocol's name. */
             protocol: string;
+            study?: components["schemas"]["StudyPlace"] | null;
+        };
+        /** @description A study that takes sessions now, for the operator to choose. Says nothing of its policies. */
+        OpenStudy: {
+            /** @description Its protocols, as they were when it was planned. */
+            protocols: components["schemas"]["ProtocolSummary"][];
+            /** @description The names of its sites that this database runs. */
+            sites: string[];
+            /** @description Its name. */
+            study: string;
+            /** @description Its title. */
+            title: string;
         };
         /** @description The session under way as the operator sees it. No policy either: the operator stands beside the surgeon. */
         OperatorView: components["schemas"]["SurgeonView"] & {
@@ -1103,6 +1199,11 @@ export interface components {
             /** @description Whether the participant withdrew. */
             withdrawn: boolean;
         };
+        /**
+         * @description How a protocol orders its segments.
+         * @enum {string}
+         */
+        Order: "shuffled" | "balanced";
         /** @description Where and when something was said, as the surgeon's page tells. */
         Origin: {
             /**
@@ -1163,6 +1264,26 @@ export interface components {
          * @enum {string}
          */
         Phase: "ready" | "notice" | "inspecting" | "questions" | "closing" | "completed" | "aborted";
+        /** @description What becomes of places whose session does not stand. */
+        PlaceRules: {
+            /** @description Of an aborted session. */
+            aborted: components["schemas"]["Replacement"];
+            /** @description Whether a surgeon may have a second session. */
+            repeated: components["schemas"]["Repetition"];
+            /** @description Of a session whose surgeon withdrew. */
+            withdrawn: components["schemas"]["Replacement"];
+        };
+        /** @description A study to be planned. */
+        PlanStudy: {
+            /** @description The definition: TOML, as docs/study.md describes it. */
+            definition: string;
+            /** @description Who plans it. */
+            person: string;
+            /** @description Why. */
+            reason: string;
+            /** @description The sites of it that this database runs; all of them where none are named. */
+            sites?: string[];
+        };
         /** @description A protocol for the operator to choose. Says nothing of its policies, for the operator stands beside the surgeon. */
         ProtocolSummary: {
             /** @description Name. */
@@ -1318,6 +1439,16 @@ export interface components {
             unavailable?: string | null;
         };
         /**
+         * @description Whether a surgeon who has a session that stands may have another by the same protocol.
+         * @enum {string}
+         */
+        Repetition: "refuse" | "next-spare";
+        /**
+         * @description What becomes of the place of a session that does not stand.
+         * @enum {string}
+         */
+        Replacement: "keep" | "same-place" | "next-spare";
+        /**
          * @description Who acts; kept with every event.
          * @enum {string}
          */
@@ -1418,6 +1549,8 @@ export interface components {
             settings: number;
             /** @description How far it came. */
             status: components["schemas"]["SessionStatus"];
+            /** @description The study that it belongs to; none where it is outside any study. */
+            study?: string | null;
             /** @description Whether it was told which policies ran. */
             unblinded: boolean;
             /** @description Whether the participant withdrew: its data stay out of exports. */
@@ -1489,6 +1622,141 @@ export interface components {
              * @description To, seconds; none while it lasts.
              */
             to?: number | null;
+        };
+        /** @description A site of a study. */
+        Site: {
+            /** @description Its name: lower case letters, digits and dashes. */
+            name: string;
+            /** @description Further places at the end of each list, which the rules open one by one. */
+            spares: number;
+            /** @description Surgeons planned: the places of each list that are open from the beginning. */
+            surgeons: number;
+            /** @description Its title. */
+            title: string;
+        };
+        /** @description A site of a study. */
+        SiteDetail: components["schemas"]["Site"] & {
+            /** @description Whether this database runs it. */
+            here: boolean;
+            /** @description Sessions that were made there. */
+            sessions: number;
+        };
+        /**
+         * @description How far a study has come.
+         * @enum {string}
+         */
+        Stage: "planned" | "open" | "closed" | "locked" | "unblinded";
+        /** @description What a person wants to do to a study. */
+        StudyAction: {
+            /** @enum {string} */
+            change: "open";
+        } | {
+            /** @enum {string} */
+            change: "close";
+        } | {
+            /** @enum {string} */
+            change: "lock";
+            /** @description Whether to do it though what a surgeon's device still holds would then not count. */
+            despite_outstanding?: boolean;
+        } | {
+            /** @enum {string} */
+            change: "unblind";
+        } | {
+            /** @enum {string} */
+            change: "withdraw";
+            /** @description The session. */
+            session: components["schemas"]["SessionId"];
+        };
+        /** @description A study in detail. */
+        StudyDetail: components["schemas"]["StudyLine"] & {
+            /** @description How it will be analysed. */
+            analysis: string;
+            /** @description The line to print, publish or mail before the first session; none before the orders were drawn. */
+            commitment_line?: string | null;
+            /** @description Its definition, byte for byte. */
+            definition: string;
+            /** @description SHA-256 of its definition: the same at every site. */
+            definition_sha256: string;
+            /** @description What happened to it, oldest first. */
+            log: components["schemas"]["StudyLogLine"][];
+            /** @description Who may unblind all of it. */
+            may_unblind: string[];
+            /** @description How its sessions are ordered. */
+            order: components["schemas"]["Order"];
+            /**
+             * @description While it is closed: sessions for which a surgeon's device may still hold something that locking would keep from
+             *     counting.
+             */
+            outstanding: number;
+            /** @description Its protocols. */
+            protocols: components["schemas"]["StudyProtocol"][];
+            /** @description What becomes of places whose session does not stand. */
+            rules: components["schemas"]["PlaceRules"];
+            /** @description Its sites. */
+            sites: components["schemas"]["SiteDetail"][];
+            /** @description Its sessions, in the order in which they were made. */
+            study_sessions: components["schemas"]["StudySession"][];
+            /** @description What to do when a list is used up. */
+            when_used_up: string;
+        };
+        /** @description A study in a list. */
+        StudyLine: {
+            /** @description Sessions that were made in it. */
+            sessions: number;
+            /** @description How far it has come. */
+            stage: components["schemas"]["Stage"];
+            /** @description Its name. */
+            study: string;
+            /** @description Surgeons planned at the sites that this database runs. */
+            surgeons: number;
+            /** @description Its title. */
+            title: string;
+        };
+        /** @description An event of a study in words. */
+        StudyLogLine: {
+            /** @description When, by the wall clock. */
+            at: string;
+            /** @description By which way: a role, or the command line. */
+            by: string;
+            /** @description Who, as the person said. */
+            person: string;
+            /** @description Why. */
+            reason: string;
+            /** @description What happened. */
+            text: string;
+        };
+        /** @description Where in a study a session is to be made. */
+        StudyPlace: {
+            /** @description The site's name. */
+            site: string;
+            /** @description The study's name. */
+            study: string;
+        };
+        /** @description A protocol of a study. */
+        StudyProtocol: {
+            /** @description Its name. */
+            name: string;
+            /** @description SHA-256 of its text. */
+            sha256: string;
+        };
+        /** @description A session of a study. */
+        StudySession: {
+            /** @description Participant's code. */
+            participant: string;
+            /** @description Its place in the list of both, from 1. */
+            place: number;
+            /** @description Its protocol. */
+            protocol: string;
+            /** @description The session. */
+            session: components["schemas"]["SessionId"];
+            /** @description Its site. */
+            site: string;
+            /** @description How far it came. */
+            status: components["schemas"]["SessionStatus"];
+            /** @description Whether it was told which policies ran. */
+            unblinded: boolean;
+            /** @description Whether its surgeon withdrew. */
+            withdrawn: boolean;
         };
         /** @description A session as the surgeon's browser gets it. Everything in it is the same whatever the policy. */
         SurgeonView: {
@@ -1609,6 +1877,8 @@ export interface components {
         Unblind: {
             /** @description Whether to do it though something may be outstanding, which would then not count any more. */
             despite_outstanding?: boolean;
+            /** @description Who does it: needed for a session of a study that is still blinded. */
+            person?: string | null;
             /** @description Kept in the audit trail. */
             reason: string;
         };
@@ -3205,7 +3475,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description No such participant or protocol */
+            /** @description No such participant, protocol or study */
             404: {
                 headers: {
                     [name: string]: unknown;
@@ -3224,7 +3494,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description A session is under way */
+            /** @description A session is under way, or the study allows no such session */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -3263,14 +3533,13 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The body is JSON, but not as described */
+            /** @description The study has no such site or protocol */
             422: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
                 };
             };
             /** @description The server failed; its log says more */
@@ -4414,7 +4683,468 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description No reason was given */
+            /** @description No reason was given, or nobody signed for a session of a study */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_list_studies: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StudyLine"][];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_plan_study: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PlanStudy"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StudyDetail"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description There is a study of this name */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The definition is malformed, or a person or reason is missing */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_study: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StudyDetail"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such study */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_change_study: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ChangeStudy"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StudyDetail"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The study names others who may */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such study */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It does not fit where the study stands */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description A person or reason is missing, or the reason names a policy */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -5848,6 +6578,197 @@ export interface operations {
                 };
             };
             /** @description No such session */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_studies_page: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_study_page: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such study */
             404: {
                 headers: {
                     [name: string]: unknown;

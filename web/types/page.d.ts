@@ -17,6 +17,7 @@ declare global {
     type CommentLine = Schemas["CommentLine"];
     type Focus = Schemas["Focus"];
     type LogLine = Schemas["LogLine"];
+    type OpenStudy = Schemas["OpenStudy"];
     type OperatorView = Schemas["OperatorView"];
     type Origin = Schemas["Origin"];
     type NewConsent = Schemas["NewConsent"];
@@ -31,6 +32,7 @@ declare global {
     type SessionDetail = Schemas["SessionDetail"];
     type SetAside = Schemas["SetAside"];
     type Setting = Schemas["Setting"];
+    type StudyAction = Schemas["StudyAction"];
     type SurgeonView = Schemas["SurgeonView"];
     type Timeline = Schemas["Timeline"];
     type TimelineComment = Schemas["TimelineComment"];

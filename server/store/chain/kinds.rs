@@ -193,9 +193,45 @@ const ERASURE: Kind = Kind {
     order: "number",
 };
 
+const STUDY: Kind = Kind {
+    name: "study",
+    table: "studies",
+    open: &["study", "definition_sha256", "sites", "wall"],
+    sealed: &[],
+    select: "SELECT study AS chain_key, NULL AS chain_session, rowid AS chain_order, study, definition_sha256, sites,
+         wall FROM studies",
+    one: "study = ?",
+    order: "rowid",
+};
+
+const STUDY_EVENT: Kind = Kind {
+    name: "study-event",
+    table: "study_events",
+    open: &["study", "number", "wall", "run", "monotonic_ns", "role", "person", "kind", "about_session", "commitment"],
+    sealed: &["reason"],
+    select: "SELECT study || '/' || number AS chain_key, NULL AS chain_session, 0 AS chain_order, study, number, wall,
+         run, monotonic_ns, role, person, kind, session AS about_session, commitment, reason FROM study_events",
+    one: "study = ? AND number = ?",
+    order: "study, number",
+};
+
+const STUDY_SESSION: Kind = Kind {
+    name: "study-session",
+    table: "study_sessions",
+    open: &["session", "study", "site", "protocol", "place"],
+    sealed: &[],
+    select: "SELECT session AS chain_key, session AS chain_session, 0 AS chain_order, session, study, site, protocol,
+         place FROM study_sessions",
+    one: "session = ?",
+    order: "session",
+};
+
 /// Every kind but telemetry, which is sealed in blocks.
-pub const KINDS: [Kind; 11] =
-    [RUN, PARTICIPANT, SESSION, EVENT, COMMENT, ANSWER, DEVICE, ACCESS, CORRECTION, CONSENT, ERASURE];
+pub const KINDS: [Kind; 14] =
+    [
+        RUN, PARTICIPANT, SESSION, EVENT, COMMENT, ANSWER, DEVICE, ACCESS, CORRECTION, CONSENT, ERASURE, STUDY, STUDY_EVENT,
+        STUDY_SESSION,
+    ];
 
 /// The kind called `name`.
 pub fn kind(name: &str) -> Option<&'static Kind> {

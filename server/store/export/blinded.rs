@@ -13,6 +13,7 @@ use super::description::{
 };
 use super::folder::Folder;
 use super::scores::Scored;
+use super::study::ExportedStudy;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::remarks::said_columns;
@@ -58,6 +59,7 @@ pub struct Blinded {
     withdrawals: Vec<Withdrawal>,
     clocks: RunClocks,
     grace: Grace,
+    study: Option<ExportedStudy>,
 }
 
 impl Blinded {
@@ -92,6 +94,7 @@ impl Blinded {
             consents: reader.consents(session).await?,
             erasures: reader.erasures(session).await?,
             withdrawals: reader.withdrawals(session).await?,
+            study: ExportedStudy::of(reader, session).await?,
         })
     }
 
@@ -130,9 +133,16 @@ impl Blinded {
         copy(folder, &mut copies, &self.consent_rows()).await?;
         copy(folder, &mut copies, &self.erasure_rows()).await?;
         copy(folder, &mut copies, &self.withdrawal_rows()).await?;
+        let study = self.study.as_ref();
+        copy(folder, &mut copies, &ExportedStudy::study_rows(study)).await?;
+        copy(folder, &mut copies, &ExportedStudy::session_rows(study)).await?;
+        copy(folder, &mut copies, ExportedStudy::event_rows(study)).await?;
         folder.json("session.json", &Value::Object(copies)).await?;
 
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
+        if let Some(study) = study {
+            folder.file("study.toml", study.definition().as_bytes()).await?;
+        }
 
         let mut chain = folder.begin()?;
         reader.export_chain(async |row| chain.row(&own.told_of(row)).await).await?;
@@ -157,6 +167,8 @@ impl Blinded {
                 "practice": self.line.practice,
                 "blinded": !unblinded,
                 "unblinded": self.unblinded(),
+                "study": self.study.as_ref().map(ExportedStudy::name),
+                "study_definition_sha256": self.study.as_ref().map(ExportedStudy::definition_sha256),
                 "chain": { "number": head.number, "hash": head.hash },
             },
         })
@@ -171,6 +183,7 @@ impl Blinded {
             runs: runs.iter().map(|row| row.run.to_string()).collect(),
             devices: devices.iter().map(|(number, ..)| number.to_string()).collect(),
             unblindings: self.events.iter().filter(unblinding).map(key).collect(),
+            study: self.study.iter().flat_map(ExportedStudy::keys).collect(),
         }
     }
 
@@ -179,12 +192,18 @@ impl Blinded {
         self.line.status == SessionStatus::UnderWay
     }
 
-    const fn unblinded(&self) -> &'static str {
+    fn unblinded(&self) -> &'static str {
         match (self.line.unblinded, self.line.emergency) {
             (false, _) => "no",
             (true, false) => "after-end",
+            (true, true) if self.ended_before_unblinding() => "emergency-after-end",
             (true, true) => "while-under-way",
         }
+    }
+
+    fn ended_before_unblinding(&self) -> bool {
+        let before = self.events.iter().take_while(|(_, event)| !matches!(event.kind, EventKind::Unblinded { .. }));
+        before.into_iter().any(|(_, event)| matches!(event.kind, EventKind::Completed | EventKind::Aborted { .. }))
     }
 
     fn setting(&self, segment: Option<SegmentId>) -> Option<usize> {
@@ -425,6 +444,8 @@ struct OwnRows {
     devices: BTreeSet<String>,
     /// Its unblinding, whose reason may name a policy.
     unblindings: BTreeSet<String>,
+    /// Its study, and the events of that which the export tells.
+    study: BTreeSet<String>,
 }
 
 impl OwnRows {
@@ -435,6 +456,7 @@ impl OwnRows {
         let own = match kind {
             "run" => self.runs.contains(key),
             "device" => self.devices.contains(key),
+            "study" | "study-event" => self.study.contains(key),
             _ => row.session.as_ref() == Some(&self.session),
         };
 

@@ -90,7 +90,7 @@ table! {
         comments: i64 = means("Comments kept"),
         monotonic_ns: i64 = MONOTONIC.since(4),
         unblinded: &'static str =
-            means("no; after-end; or while-under-way, which is emergency unblinding"),
+            means("no; after-end; emergency-after-end; or while-under-way, which is emergency unblinding, too"),
         counts_until: Option<Timestamp> = means(
             "Until when what arrived counts: the session's end and the protocol's grace_minutes, or \
              unblinding if that came first; empty while the session is under way",
@@ -439,6 +439,69 @@ table! {
 }
 
 table! {
+    name: "studies",
+    description: "The study that the session belongs to; without a row where it is outside any study",
+    key: [study],
+    row:
+    /// A study.
+    #[derive(Debug, Clone)]
+    StudyRow {
+        study: String = means("The study's name: the same at every site").since(5),
+        title: String = means("Its title").since(5),
+        definition_sha256: String = means("SHA-256 of study.toml: the same at every site").since(5),
+        sites: String = means("JSON: the names of its sites that this database runs").since(5),
+        wall: Timestamp = means("When it was planned, by the server's wall clock").in_unit("UTC").since(5),
+        stage: &'static str = means("planned, open, closed, locked or unblinded").since(5),
+        commitment: Option<String> =
+            means("SHA-256 published when it was first opened; commits to the orders of all its places here").since(5),
+    }
+}
+
+table! {
+    name: "study_sessions",
+    description: "The session's place in its study; without a row where it is outside any study",
+    key: [session],
+    row:
+    /// The place of a session in a study.
+    #[derive(Debug, Clone)]
+    StudySessionRow {
+        session: SessionId = SESSION.since(5),
+        study: String = means("The study's name").since(5),
+        site: String = means("The site's name").since(5),
+        protocol: String = means("The protocol's name").since(5),
+        place: usize = means("Place in the list of site and protocol, from 1; tells nothing of the order").since(5),
+    }
+}
+
+table! {
+    name: "study_events",
+    description:
+        "What happened to the study as a whole, and to this session in it. Numbers that are missing are of \
+         other sessions",
+    key: [study, number],
+    row:
+    /// An event of a study.
+    #[derive(Debug, Clone)]
+    StudyEventRow {
+        study: String = means("The study's name").since(5),
+        number: i64 = means("Order of the event in the study, from 1").since(5),
+        wall: Timestamp = WALL.since(5),
+        run: Option<i64> = means("Start of the server that recorded it; empty for the command line").since(5),
+        monotonic_ns: Option<i64> = MONOTONIC.since(5),
+        role: String = means("By which way: researcher, or command-line").since(5),
+        person: String = means("Who, as the person said").since(5),
+        kind: String = means(
+            "planned, opened, closed, locked, unblinded, session-withdrawn, or session-unblinded, which is \
+             emergency unblinding of one session",
+        )
+        .since(5),
+        about_session: Option<SessionId> = means("The session that it is about; empty for the whole study").since(5),
+        commitment: Option<String> = means("Of the first opening: commits to all orders").since(5),
+        reason: String = means("Reason given").since(5),
+    }
+}
+
+table! {
     name: "chain",
     description:
         "The chain of all records of the database up to this export, in order: of the rows that are not \
@@ -455,7 +518,7 @@ table! {
         kind: Option<String> =
             means(
             "Kind of the record: run, session, event, comment, answer, device, access, correction, consent, \
-             erasure or telemetry",
+             erasure, telemetry, study, study-event or study-session",
         )
         .since(4),
         key: Option<String> = means("The record's key").since(4),
@@ -569,7 +632,7 @@ table! {
 }
 
 /// Every table that an export may have.
-pub const ALL: [Table; 20] = [
+pub const ALL: [Table; 23] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -584,6 +647,9 @@ pub const ALL: [Table; 20] = [
     ConsentRow::TABLE,
     ErasureRow::TABLE,
     WithdrawalRow::TABLE,
+    StudyRow::TABLE,
+    StudySessionRow::TABLE,
+    StudyEventRow::TABLE,
     ChainRow::TABLE,
     TelemetryRow::TABLE,
     AllocationRow::TABLE,

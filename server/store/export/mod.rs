@@ -8,6 +8,7 @@ mod error;
 mod folder;
 mod recordings;
 mod scores;
+mod study;
 mod table;
 mod unblinded;
 pub mod verify;
@@ -18,7 +19,7 @@ use serde::Serialize;
 
 pub use self::description::ALL as TABLES;
 pub(super) use self::description::{
-    AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, TelemetryRow, WeightsRow,
+    AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
 };
 pub use self::destination::ZipStream;
 pub use self::error::ExportError;

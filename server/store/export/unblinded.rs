@@ -7,13 +7,19 @@ use super::ExportError;
 use super::description::AllocationRow;
 use super::folder::Folder;
 use crate::autofocus::PolicyName;
-use crate::ids::SegmentId;
+use crate::ids::{SegmentId, SessionId};
 use crate::store::sessions::StoredSession;
 use crate::store::{NewSession, Reader, StoreError};
+use crate::trial::allocation::Order;
 use crate::trial::event::EventKind;
+use crate::trial::study::lists::Lists;
+use crate::trial::study::stage::Stage;
 
 /// Why the seed is not told.
 const SEED_WITHHELD: &str = "it would unblind other sessions of the same balanced set; unblind those and export again";
+
+/// Why the orders of the session's study are not told.
+const STUDY_WITHHELD: &str = "they would unblind other sessions of the study; unblind all of it and export again";
 
 /// A session's allocation. There is one only for a session that was unblinded.
 pub struct Unblinded {
@@ -21,6 +27,34 @@ pub struct Unblinded {
     reason: String,
     /// Whether the seed may be told: not while it would unblind another session of its set.
     seed_told: bool,
+    /// The orders of its study.
+    study: StudyOrders,
+}
+
+/// What may be told of the orders of a session's study.
+enum StudyOrders {
+    /// The session is outside any study.
+    Outside,
+    /// Nothing: the study is blinded.
+    Withheld,
+    /// All of them, as they were committed to.
+    Told(String),
+}
+
+impl StudyOrders {
+    async fn of(reader: &Reader, session: SessionId) -> Result<Self, StoreError> {
+        let Some(enrolment) = reader.enrolment(session).await? else { return Ok(Self::Outside) };
+        let study = reader.study(&enrolment.study).await?;
+        let seed = study.as_ref().and_then(|study| study.seed);
+        let (Some(study), Some(seed)) = (study, seed) else {
+            return Err(StoreError::Damaged(format!("the orders of study {} are not there", enrolment.study)));
+        };
+
+        if study.state().stage != Stage::Unblinded {
+            return Ok(Self::Withheld);
+        }
+        Ok(Self::Told(Lists::draw(&study.definition, &study.sites, seed).statement()))
+    }
 }
 
 impl Unblinded {
@@ -32,8 +66,11 @@ impl Unblinded {
         });
 
         let Some(reason) = reason else { return Ok(None) };
-        let seed_told = reader.balanced_set(stored.made.seed).await?.may_tell_seed();
-        Ok(Some(Self { made: stored.made.clone(), reason, seed_told }))
+        let study = StudyOrders::of(reader, stored.made.session).await?;
+        // In a study the seed of a balanced set also tells the orders of places that nobody has taken yet.
+        let tells_others = stored.made.algorithm.order() == Order::Balanced && matches!(study, StudyOrders::Withheld);
+        let seed_told = !tells_others && reader.balanced_set(stored.made.seed).await?.may_tell_seed();
+        Ok(Some(Self { made: stored.made.clone(), reason, seed_told, study }))
     }
 
     /// Writes its files.
@@ -67,6 +104,11 @@ impl Unblinded {
 
     fn json(&self) -> Value {
         let schedule: Vec<_> = self.made.segments.iter().map(|(_, policy)| policy).collect();
+        let (statement, withheld) = match &self.study {
+            StudyOrders::Outside => (None, None),
+            StudyOrders::Withheld => (None, Some(STUDY_WITHHELD)),
+            StudyOrders::Told(statement) => (Some(statement), None),
+        };
         json!({
             "session": self.made.session,
             "algorithm": self.made.algorithm,
@@ -77,6 +119,8 @@ impl Unblinded {
             "schedule": schedule,
             "commitment": self.made.commitment,
             "unblinding_reason": self.reason,
+            "study_statement": statement,
+            "study_statement_withheld": withheld,
         })
     }
 }

@@ -17,7 +17,7 @@ pub struct ProtocolError {
 }
 
 /// Something wrong at a place in the text.
-pub(super) struct Fault {
+pub(in crate::trial) struct Fault {
     /// Bytes of the text at fault.
     pub span: Range<usize>,
     /// The key, where it is known already.

@@ -34,6 +34,21 @@ impl Protocol {
     pub fn parse(source: &str, file: &str, known: &[PolicyName]) -> Result<Self, ProtocolError> {
         parse(source, known).map_err(|fault| fault.in_file(file, source))
     }
+
+    /// Reads a protocol as it was kept with a study: the policies that it names are known, whatever this version has.
+    ///
+    /// # Errors
+    /// When this version cannot read it otherwise.
+    pub fn parse_kept(source: &str, file: &str) -> Result<Self, ProtocolError> {
+        #[derive(Deserialize)]
+        struct Policies {
+            policies: Vec<PolicyName>,
+        }
+
+        let kept: Result<Policies, Fault> = toml::from_str(source).map_err(Fault::from);
+        let Policies { policies } = kept.map_err(|fault| fault.in_file(file, source))?;
+        Self::parse(source, file, &policies)
+    }
 }
 
 #[derive(Deserialize)]
@@ -212,7 +227,12 @@ fn consent_version(given: &Spanned<String>) -> Result<String, Fault> {
     Err(Fault::new(given.span(), "consent_version", message))
 }
 
-fn between<T>(value: &Spanned<T>, key: &str, range: std::ops::RangeInclusive<T>, unit: &str) -> Result<T, Fault>
+pub(in crate::trial) fn between<T>(
+    value: &Spanned<T>,
+    key: &str,
+    range: std::ops::RangeInclusive<T>,
+    unit: &str,
+) -> Result<T, Fault>
 where
     T: PartialOrd + Copy + std::fmt::Display,
 {
@@ -224,7 +244,7 @@ where
     Err(Fault::new(value.span(), key, message))
 }
 
-fn identifier(value: &Spanned<String>, key: &str) -> Result<(), Fault> {
+pub(in crate::trial) fn identifier(value: &Spanned<String>, key: &str) -> Result<(), Fault> {
     let text = value.get_ref();
     let fits = (1..=40).contains(&text.len())
         && text.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'-');

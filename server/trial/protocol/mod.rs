@@ -1,7 +1,7 @@
 //! Protocols: what a trial compares, for how long, and what it asks. Written in TOML
 //! (docs/trial.md); valid once parsed.
 
-mod fault;
+pub(in crate::trial) mod fault;
 mod file;
 
 use std::sync::Arc;
@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 pub use fault::ProtocolError;
+pub(in crate::trial) use file::{between, identifier};
 
 use super::allocation::Order;
 use super::question::Question;

@@ -18,6 +18,7 @@ mod proxy;
 mod recording_card;
 mod screenshots;
 mod scripts;
+mod study_page;
 mod tabs;
 mod theatre;
 mod trial;

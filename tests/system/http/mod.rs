@@ -17,3 +17,4 @@ mod seed;
 mod service;
 mod sizes;
 mod stopping;
+pub mod studies;

@@ -12,6 +12,10 @@ import { protocolWords } from "./session_words.js";
 const participants = byId("participant", HTMLSelectElement);
 const protocols = byId("protocol", HTMLSelectElement);
 const policies = byId("policy", HTMLSelectElement);
+const studies = byId("study", HTMLSelectElement);
+
+/** What stands in the list of studies for a session outside any. */
+const OUTSIDE = "outside";
 
 /** @type {Api.Choices | null} */
 let choices = null;
@@ -39,11 +43,8 @@ function draw(now, participant) {
     now.participants.map((code) => ({ value: code, label: code })),
     participant,
   );
-  fill(
-    protocols,
-    now.protocols.map(({ name, researcher_title: label }) => ({ value: name, label })),
-    protocols.value,
-  );
+  drawStudies(now);
+  drawProtocols(now);
   const fixed = [
     { value: UNTOLD, label: "Hidden during a session", hidden: true },
     { value: BY_HAND, label: "By hand" },
@@ -57,9 +58,55 @@ function draw(now, participant) {
   drawSummary();
 }
 
+/**
+ * Whoever has no open study never hears of one. With one, nothing is chosen beforehand: a session
+ * that was meant for the study must not end up outside.
+ *
+ * @param {Api.Choices} now
+ */
+function drawStudies(now) {
+  const open = now.studies.flatMap(({ study, title, sites }) =>
+    sites.map((site) => ({ value: `${study}/${site}`, label: `${title} (${study}), ${site}` })),
+  );
+  byId("study-choice").hidden = open.length === 0;
+  studies.required = open.length > 0;
+  fill(
+    studies,
+    [{ value: "", label: "Choose…" }, ...open, { value: OUTSIDE, label: "Outside any study" }],
+    studies.value,
+  );
+}
+
+/** The study and site that are chosen. */
+function chosenStudy() {
+  const [study = "", site = ""] = studies.value.split("/");
+  return site ? { study, site } : undefined;
+}
+
+/**
+ * The protocols that can be chosen: in a study those of its plan.
+ *
+ * @param {Api.Choices} now
+ */
+function offeredProtocols(now) {
+  const chosen = chosenStudy();
+  const study = now.studies.find((open) => open.study === chosen?.study);
+  return study ? study.protocols : now.protocols;
+}
+
+/** @param {Api.Choices} now */
+function drawProtocols(now) {
+  fill(
+    protocols,
+    offeredProtocols(now).map(({ name, researcher_title: label }) => ({ value: name, label })),
+    protocols.value,
+  );
+}
+
 function drawSummary() {
   // With its title: the list cuts long ones off.
-  const protocol = choices?.protocols.find(({ name }) => name === protocols.value);
+  const offered = choices ? offeredProtocols(choices) : [];
+  const protocol = offered.find(({ name }) => name === protocols.value);
   setText(byId("protocol-summary"), protocol ? protocolWords(protocol) : "");
 }
 
@@ -94,11 +141,19 @@ export function followChoices(drawn, prepare) {
     drawn();
   }
 
+  studies.addEventListener("change", () => {
+    if (choices) drawProtocols(choices);
+    drawSummary();
+  });
   protocols.addEventListener("change", drawSummary);
   byId("new-session", HTMLFormElement).addEventListener("submit", async (event) => {
     event.preventDefault();
     try {
-      const wanted = { participant: participants.value, protocol: protocols.value };
+      const wanted = {
+        participant: participants.value,
+        protocol: protocols.value,
+        study: chosenStudy(),
+      };
       await prepare(post("/api/operator/sessions", wanted));
       tell(byId("session-trouble"), "");
     } catch (error) {
@@ -108,6 +163,8 @@ export function followChoices(drawn, prepare) {
 
   // Another operator may have added participants.
   for (const way of ["pointerenter", "focus"]) participants.addEventListener(way, refresh);
+  // And a researcher may have opened or closed a study.
+  for (const way of ["pointerenter", "focus"]) studies.addEventListener(way, refresh);
   byId("add-participant").onclick = () => {
     askIn(byId("participant-dialog", HTMLDialogElement), byId("participant-trouble"), add);
   };

@@ -2,7 +2,7 @@
 // together; unblinding asks for a reason.
 
 import { get, inWords, post } from "../shared/api.js";
-import { askReason } from "../shared/dialogs.js";
+import { askReason, askSigned } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { clockText } from "../shared/text.js";
 import { askErasure, askNote, askWithdrawal, correctAnswer, correctParticipant } from "./corrections.js";
@@ -16,6 +16,8 @@ const page = byId("session").dataset;
 const session = page.session ?? "";
 const ended = page.ended === "true";
 const unblinded = page.unblinded === "true";
+/** Empty where the session is outside any study. */
+const study = page.study ?? "";
 
 /** @type {Api.Timeline | null} */
 let timeline = null;
@@ -263,18 +265,31 @@ async function unblind() {
     "The session is still under way. Unblinding now is an emergency measure. The audit trail and every " +
     "export will always say so. The surgeon’s and operator’s pages still do not show the policies.";
 
-  askReason({
-    heading: ended ? "Unblind this session" : "Emergency unblinding",
-    consequence: ended ? usual : emergency,
+  const ofStudy =
+    `This session belongs to study ${study}, which stays blinded. To unblind one session alone is an emergency ` +
+    `measure. Who did it and why stands in every export: name no policy in the reason.${late}`;
+
+  const isEmergency = !ended || study !== "";
+  const asked = {
+    heading: isEmergency ? "Emergency unblinding" : "Unblind this session",
+    consequence: study ? ofStudy : ended ? usual : emergency,
     confirm: open ? "Unblind anyway" : undefined,
-    go: ended ? "Unblind" : "Unblind now",
+    go: isEmergency ? "Unblind now" : "Unblind",
     danger: true,
-    done: async (reason) => {
-      const path = "/api/researcher/sessions/{session}/unblind";
-      await post(path, { reason, despite_outstanding: open !== null }, { session });
-      location.reload();
-    },
-  });
+  };
+
+  /**
+   * @param {string} reason
+   * @param {string} [person]
+   */
+  async function done(reason, person) {
+    const path = "/api/researcher/sessions/{session}/unblind";
+    await post(path, { reason, person, despite_outstanding: open !== null }, { session });
+    location.reload();
+  }
+
+  if (study) askSigned({ ...asked, done });
+  else askReason({ ...asked, done: (reason) => done(reason) });
 }
 
 byId("show-path").onclick = async () => {

@@ -1,7 +1,7 @@
 // Dialogs that ask for something. They stay open, and say why, until it has been done.
 
 import { inWords } from "./api.js";
-import { byId, setText } from "./dom.js";
+import { byId, make, setText } from "./dom.js";
 
 /**
  * @typedef {object} Ask
@@ -65,10 +65,21 @@ export function askReason(ask) {
 }
 
 /**
- * @param {Ask & { done: (reason: string) => Promise<void> }} ask
- * @param {boolean} reasoned whether a reason has to be given
+ * Asks for a reason and for who gives it.
+ *
+ * @param {Ask & { people?: string[], done: (reason: string, person: string) => Promise<void> }} ask `people`: names to
+ *   choose from
  */
-function openReasonDialog(ask, reasoned) {
+export function askSigned(ask) {
+  openReasonDialog(ask, true, ask.people ?? []);
+}
+
+/**
+ * @param {Ask & { done: (reason: string, person: string) => Promise<void> }} ask
+ * @param {boolean} reasoned whether a reason has to be given
+ * @param {string[]} [people] names to choose from, where a person has to be named
+ */
+function openReasonDialog(ask, reasoned, people) {
   setText(byId("reason-heading"), ask.heading);
   setText(byId("reason-consequence"), ask.consequence);
 
@@ -81,6 +92,12 @@ function openReasonDialog(ask, reasoned) {
   reason.required = reasoned;
   reason.value = "";
 
+  const person = byId("person", HTMLInputElement);
+  byId("person-field").hidden = !people;
+  person.required = Boolean(people);
+  person.value = "";
+  byId("people").replaceChildren(...(people ?? []).map((name) => make("option", { value: name })));
+
   byId("reason-confirm").hidden = !ask.confirm;
   setText(byId("reason-confirm-text"), ask.confirm ?? "");
   const confirmed = byId("reason-confirmed", HTMLInputElement);
@@ -88,6 +105,6 @@ function openReasonDialog(ask, reasoned) {
   confirmed.checked = false;
 
   askIn(byId("reason-dialog", HTMLDialogElement), byId("reason-trouble"), () =>
-    ask.done(reason.value.trim()),
+    ask.done(reason.value.trim(), person.value.trim()),
   );
 }

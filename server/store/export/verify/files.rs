@@ -4,6 +4,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::store::export::table::FORMAT;
+
 pub fn text(folder: &Path, file: &str) -> Result<String, String> {
     std::fs::read_to_string(folder.join(file)).map_err(|error| format!("{file}: {error}"))
 }
@@ -31,4 +33,13 @@ pub fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, Str
 
 pub fn session_cell(folder: &Path, column: &str) -> Result<String, String> {
     cells(folder, "sessions.csv", column)?.into_iter().next().ok_or_else(|| "sessions.csv has no session".to_owned())
+}
+
+/// The format of the export, which says what columns it has.
+pub fn format(folder: &Path) -> Result<u64, String> {
+    let format = json(folder, "datapackage.json")?["parfocal"]["format"].as_u64().unwrap_or(1);
+    if format > FORMAT {
+        return Err(format!("a newer version of parfocal wrote it (format {format}); verify it with that version"));
+    }
+    Ok(format)
 }

@@ -4,6 +4,7 @@
 mod allocation;
 mod chain;
 mod files;
+mod study;
 mod verdict;
 
 use std::collections::BTreeSet;
@@ -18,13 +19,14 @@ pub use verdict::Verdict;
 use crate::store::Head;
 use crate::store::export::description::{
     ALL, AccessRow, AnswerRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow,
-    RunRow, ScoreRow, SegmentRow, SessionRow, WithdrawalRow,
+    RunRow, ScoreRow, SegmentRow, SessionRow, StudyEventRow, StudyRow, StudySessionRow, WithdrawalRow,
 };
 use crate::store::export::folder::SUMS;
-use crate::store::export::table::{FORMAT, Row, Table};
+use crate::store::export::table::{Row, Table};
 use allocation::{commitment, schedule};
 use chain::chain;
-use files::{cells, csv, json, session_cell, text};
+use files::{cells, csv, format, json, session_cell, text};
+use study::study;
 use verdict::Outcome;
 
 /// One thing checked.
@@ -60,6 +62,7 @@ pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
         check("protocol", protocol(folder)),
         check("commitment", commitment(folder)),
         check("schedule", schedule(folder)),
+        check("study", study(folder)),
         check("chain", chained(folder, expected)),
     ]
 }
@@ -127,15 +130,6 @@ fn columns(folder: &Path) -> Outcome {
     Ok(Verdict::Passed(format!("{rows} rows are as described")))
 }
 
-/// The format of the export, which says what columns it has.
-fn format(folder: &Path) -> Result<u64, String> {
-    let format = json(folder, "datapackage.json")?["parfocal"]["format"].as_u64().unwrap_or(1);
-    if format > FORMAT {
-        return Err(format!("a newer version of parfocal wrote it (format {format}); verify it with that version"));
-    }
-    Ok(format)
-}
-
 fn events(folder: &Path) -> Outcome {
     let count = numbered(folder, "events.csv")?;
     let kinds = cells(folder, "events.csv", "kind")?;
@@ -199,7 +193,7 @@ const UNBLINDED: [(&str, u64); 5] = [
 ];
 
 /// Tables that session.json repeats.
-const COPIED: [Table; 14] = [
+const COPIED: [Table; 17] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -214,6 +208,9 @@ const COPIED: [Table; 14] = [
     ConsentRow::TABLE,
     ErasureRow::TABLE,
     WithdrawalRow::TABLE,
+    StudyRow::TABLE,
+    StudySessionRow::TABLE,
+    StudyEventRow::TABLE,
 ];
 
 fn copies(folder: &Path) -> Outcome {

@@ -1,0 +1,16 @@
+//! The protocols that a command works with.
+
+use std::path::Path;
+
+use super::output::Failure;
+use crate::autofocus::Registry;
+use crate::conductor::Library;
+
+/// The shipped protocols and those of the folder asked for, or of `trial-protocols` where there is one.
+pub fn protocols(folder: Option<&Path>, registry: &Registry) -> Result<Library, Failure> {
+    let beside = Path::new("trial-protocols");
+
+    let folder = folder.or_else(|| beside.is_dir().then_some(beside));
+    let known: Vec<_> = registry.entries().into_iter().map(|entry| entry.name).collect();
+    Ok(Library::load(folder, &known)?)
+}

@@ -1,0 +1,236 @@
+//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, and shows where it stands.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::{Args, Subcommand};
+use getrandom::SysRng;
+use rand::SeedableRng;
+use rand_chacha::ChaCha12Rng;
+
+use super::library::protocols;
+use super::output::{Failure, print};
+use crate::autofocus::Registry;
+use crate::clock::SystemClock;
+use crate::conductor::{Studies, StudyDetail};
+use crate::store::{Reader, StoreError, StoredStudy};
+use crate::trial::study::signature::{Signature, Way};
+use crate::trial::study::state::Change;
+
+/// Arguments of `parfocal study`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Plan a study by a definition; docs/study.md explains its keys.
+    New(New),
+    /// Let sessions be made. The first time, draw the orders and print the commitment to them.
+    Open(Move),
+    /// Let no more sessions be made.
+    Close(Move),
+    /// Lock a closed study: nothing of it can be changed any more.
+    Lock(Lock),
+    /// Print where a study stands, also while a server runs; without a name, all studies.
+    Show(Show),
+}
+
+#[derive(Debug, Args)]
+struct New {
+    /// The definition: a TOML file.
+    definition: PathBuf,
+    /// A site that this database runs; may be repeated; all sites of the definition by default.
+    #[arg(long = "site", value_name = "NAME")]
+    sites: Vec<String>,
+    /// Folder with more trial protocols; `trial-protocols` by default, if it exists.
+    #[arg(long, value_name = "DIR")]
+    protocols: Option<PathBuf>,
+    #[command(flatten)]
+    signed: Signed,
+}
+
+#[derive(Debug, Args)]
+struct Move {
+    /// Name of the study.
+    study: String,
+    #[command(flatten)]
+    signed: Signed,
+}
+
+#[derive(Debug, Args)]
+struct Lock {
+    /// Name of the study.
+    study: String,
+    /// Lock it though a surgeon's device may still hold something, which would then not count.
+    #[arg(long)]
+    despite_outstanding: bool,
+    #[command(flatten)]
+    signed: Signed,
+}
+
+#[derive(Debug, Args)]
+struct Signed {
+    /// Who does it: kept with the change.
+    #[arg(long, value_name = "PERSON")]
+    by: String,
+    /// Why: kept with the change.
+    #[arg(long, value_name = "TEXT")]
+    reason: String,
+    /// Folder of the server's database. No server may run on it.
+    #[arg(long, value_name = "DIR", default_value = "data")]
+    data_dir: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct Show {
+    /// Name of the study.
+    study: Option<String>,
+    /// Folder of the server's database.
+    #[arg(long, value_name = "DIR", default_value = "data")]
+    data_dir: PathBuf,
+    /// Print it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Does what the arguments say.
+///
+/// # Errors
+/// When there is no database, a server has it open, or the study's rules refuse.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(async {
+        match &arguments.action {
+            Action::New(new) => plan(new).await,
+            Action::Open(open) => change(&open.study, Change::Open, &open.signed).await,
+            Action::Close(close) => change(&close.study, Change::Close, &close.signed).await,
+            Action::Lock(lock) => {
+                let despite_outstanding = lock.despite_outstanding;
+                change(&lock.study, Change::Lock { despite_outstanding }, &lock.signed).await
+            }
+            Action::Show(show) => self::show(show).await,
+        }
+    })
+}
+
+async fn plan(new: &New) -> Result<(), Failure> {
+    let file = new.definition.display().to_string();
+    let definition =
+        std::fs::read_to_string(&new.definition).map_err(|error| format!("cannot read {file}: {error}"))?;
+
+    let studies = open(&new.signed.data_dir, new.protocols.as_deref()).await?;
+    let signature = new.signed.signature()?;
+    let planned = studies.plan(Way::CommandLine, &definition, &file, &new.sites, signature).await?;
+    tell(&studies, planned.as_str()).await
+}
+
+async fn change(study: &str, change: Change, signed: &Signed) -> Result<(), Failure> {
+    let studies = open(&signed.data_dir, None).await?;
+    let mut random = ChaCha12Rng::try_from_rng(&mut SysRng)?;
+    studies.change(Way::CommandLine, study, change, signed.signature()?, None, &mut random).await?;
+    tell(&studies, study).await
+}
+
+async fn open(folder: &Path, protocol_folder: Option<&Path>) -> Result<Studies, Failure> {
+    let library = protocols(protocol_folder, &Registry::standard())?;
+    let opened = Studies::open(folder, &library, Arc::new(SystemClock)).await;
+    opened.map_err(|error| match error {
+        StoreError::InUse { folder, .. } => {
+            let folder = folder.display();
+            format!("a server runs on {folder}; use its page /researcher/studies, or stop it and try again").into()
+        }
+        error => error.into(),
+    })
+}
+
+impl Signed {
+    fn signature(&self) -> Result<Signature, Failure> {
+        Ok(Signature::new(&self.by, &self.reason)?)
+    }
+}
+
+/// Prints where `study` stands after a change, with the chain's head.
+async fn tell(studies: &Studies, study: &str) -> Result<(), Failure> {
+    let detail = studies.detail(study).await?;
+    let head = studies.reader().head().await?;
+    studies.close().await;
+    print(&format!("{}chain {head}\n", in_short(&detail)))
+}
+
+async fn show(show: &Show) -> Result<(), Failure> {
+    let reader = Reader::open(&show.data_dir).await?;
+    let names = match &show.study {
+        Some(name) => vec![name.clone()],
+        None => reader.study_names().await?,
+    };
+
+    let mut details = Vec::new();
+    for name in names {
+        let study: Option<StoredStudy> = reader.study(&name).await?;
+        let study = study.ok_or_else(|| format!("there is no study '{name}'; `parfocal study show` lists all"))?;
+        details.push(StudyDetail::of(&study));
+    }
+
+    if show.json {
+        let json = match (&show.study, details.first()) {
+            (Some(_), Some(detail)) => serde_json::to_string(detail)?,
+            _ => serde_json::to_string(&details)?,
+        };
+        return print(&(json + "\n"));
+    }
+    match &show.study {
+        Some(_) => print(&details.iter().map(whole).collect::<String>()),
+        None if details.is_empty() => print("no studies yet\n"),
+        None => print(&details.iter().map(in_short).collect::<String>()),
+    }
+}
+
+/// A few lines on a study.
+fn in_short(detail: &StudyDetail) -> String {
+    let line = &detail.line;
+    let mut text = format!(
+        "{}: {}, {} of {} planned surgeons' sessions made: {}\n",
+        line.study,
+        line.stage.name(),
+        line.sessions,
+        line.surgeons,
+        line.title
+    );
+    if let Some(commitment) = &detail.commitment_line {
+        let _ = writeln!(text, "{commitment}");
+    }
+    text
+}
+
+/// All of a study but its orders.
+fn whole(detail: &StudyDetail) -> String {
+    let mut text = in_short(detail);
+    let _ = writeln!(text, "definition {}", detail.definition_sha256);
+    for protocol in &detail.protocols {
+        let _ = writeln!(text, "protocol {} {}", protocol.name, protocol.sha256);
+    }
+    for each in &detail.sites {
+        let site = &each.site;
+        let here = if each.here { "" } else { ", not here" };
+        let _ = writeln!(
+            text,
+            "site {}: {} surgeons, {} spare places, {} sessions{here}",
+            site.name, site.surgeons, site.spares, each.sessions
+        );
+    }
+    for session in &detail.study_sessions {
+        let _ = writeln!(
+            text,
+            "session {} {} {} {} place {}",
+            session.session, session.participant, session.site, session.protocol, session.place
+        );
+    }
+    for event in &detail.log {
+        let _ = writeln!(text, "{:.0} {} ({}): {}: {}", event.at, event.person, event.by, event.text, event.reason);
+    }
+    text
+}

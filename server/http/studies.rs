@@ -1,0 +1,220 @@
+//! The researcher's pages on studies, and what they send: plan, open, close, lock, unblind, withdrawals.
+
+use askama::Template;
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::response::Html;
+use serde::Deserialize;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
+use super::roles::Researcher;
+use super::security::Nonce;
+use crate::conductor::{ConductError, StudyDetail, StudyLine, StudySession};
+use crate::trial::allocation::Order;
+use crate::trial::phase::SessionStatus;
+use crate::trial::role::Role;
+use crate::trial::study::definition::{Repetition, Replacement};
+use crate::trial::study::signature::Signature;
+use crate::trial::study::stage::Stage;
+use crate::trial::study::state::Change;
+
+#[derive(Template)]
+#[template(path = "studies.html")]
+struct ListPage {
+    nonce: String,
+    studies: Vec<StudyLine>,
+}
+
+/// The list of studies, and a form to plan one.
+#[utoipa::path(get, path = "/researcher/studies", tag = "researcher",
+    responses((status = 200, description = "The page", content_type = "text/html")))]
+async fn studies_page(_: Researcher, State(app): State<AppState>, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
+    let studies = app.conductor.studies().lines().await?;
+    ListPage { nonce, studies }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+#[derive(Template)]
+#[template(path = "study.html")]
+struct StudyPage {
+    nonce: String,
+    chain: String,
+    detail: StudyDetail,
+}
+
+impl StudyPage {
+    /// The stage's name, for the page's script.
+    const fn stage(&self) -> &'static str {
+        self.detail.line.stage.name()
+    }
+
+    /// The stage in words.
+    const fn stage_words(&self) -> &'static str {
+        match self.detail.line.stage {
+            Stage::Planned => "Planned. Opening it draws the orders; then sessions can be made.",
+            Stage::Open => "Open. The operator can make sessions in it.",
+            Stage::Closed => "Closed. No sessions can be made. It can be opened again, or locked for good.",
+            Stage::Locked => "Locked. Nothing changes any more. It can be unblinded.",
+            Stage::Unblinded => "Unblinded. Each session tells which policy ran in which setting.",
+        }
+    }
+
+    const fn may_open(&self) -> bool {
+        matches!(self.detail.line.stage, Stage::Planned | Stage::Closed)
+    }
+
+    const fn may_withdraw(&self) -> bool {
+        matches!(self.detail.line.stage, Stage::Open | Stage::Closed)
+    }
+
+    const fn order(&self) -> &'static str {
+        match self.detail.order {
+            Order::Balanced => "balanced, in sets",
+            Order::Shuffled => "shuffled, each session by itself",
+        }
+    }
+}
+
+/// What becomes of a place, in words.
+pub(super) const fn replacement(rule: &Replacement) -> &'static str {
+    match rule {
+        Replacement::Keep => "its place stays used; nobody is added",
+        Replacement::SamePlace => "the next session takes its place and order",
+        Replacement::NextSpare => "its place stays used; a spare place opens",
+    }
+}
+
+/// Whether a surgeon may have a second session, in words.
+pub(super) const fn repetition(rule: &Repetition) -> &'static str {
+    match rule {
+        Repetition::Refuse => "refused",
+        Repetition::NextSpare => "takes the next place; a spare place opens",
+    }
+}
+
+/// How far a session came, in words.
+pub(super) const fn session_state(session: &StudySession) -> &'static str {
+    match session.status {
+        SessionStatus::UnderWay => "under way",
+        SessionStatus::Completed => "completed",
+        SessionStatus::Aborted => "aborted",
+    }
+}
+
+/// One study.
+#[utoipa::path(get, path = "/researcher/studies/{study}", tag = "researcher",
+    params(("study" = String, Path)), responses(
+    (status = 200, description = "The page", content_type = "text/html"),
+    (status = 404, description = "No such study", body = ErrorBody)))]
+async fn study_page(
+    _: Researcher,
+    State(app): State<AppState>,
+    Nonce(nonce): Nonce,
+    Path(name): Path<String>,
+) -> Result<Html<String>, Error> {
+    let detail = app.conductor.studies().detail(&name).await?;
+    let chain = super::researcher::chain_words(&app).await;
+    StudyPage { nonce, chain, detail }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// The studies, in the order in which they were planned.
+#[utoipa::path(get, path = "/api/researcher/studies", tag = "researcher",
+    responses((status = 200, body = Vec<StudyLine>)))]
+async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<StudyLine>>, Error> {
+    Ok(Json(app.conductor.studies().lines().await?))
+}
+
+/// One study in detail. It tells no order.
+#[utoipa::path(get, path = "/api/researcher/studies/{study}", tag = "researcher",
+    params(("study" = String, Path)), responses(
+    (status = 200, body = StudyDetail), (status = 404, description = "No such study", body = ErrorBody)))]
+async fn study(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(name): Path<String>,
+) -> Result<Json<StudyDetail>, Error> {
+    Ok(Json(app.conductor.studies().detail(&name).await?))
+}
+
+/// A study to be planned.
+#[derive(Debug, Deserialize, ToSchema)]
+struct PlanStudy {
+    /// The definition: TOML, as docs/study.md describes it.
+    definition: String,
+    /// The sites of it that this database runs; all of them where none are named.
+    #[serde(default)]
+    sites: Vec<String>,
+    /// Who plans it.
+    #[schema(pattern = r"\S")]
+    person: String,
+    /// Why.
+    #[schema(pattern = r"\S")]
+    reason: String,
+}
+
+/// Plans a study.
+#[utoipa::path(post, path = "/api/researcher/studies", tag = "researcher", request_body = PlanStudy, responses(
+    (status = 200, body = StudyDetail),
+    (status = 409, description = "There is a study of this name", body = ErrorBody),
+    (status = 422, description = "The definition is malformed, or a person or reason is missing", body = ErrorBody)))]
+async fn plan_study(
+    _: Researcher,
+    State(app): State<AppState>,
+    JsonBody(plan): JsonBody<PlanStudy>,
+) -> Result<Json<StudyDetail>, Error> {
+    let PlanStudy { definition, sites, person, reason } = plan;
+    let signature = signed(&person, &reason)?;
+    let name = app.conductor.plan_study(Role::Researcher, definition, sites, signature).await?;
+    Ok(Json(app.conductor.studies().detail(name.as_str()).await?))
+}
+
+/// A change of a study, signed.
+#[derive(Debug, Deserialize, ToSchema)]
+struct ChangeStudy {
+    /// What is to be done.
+    #[serde(flatten)]
+    change: Change,
+    /// Who does it.
+    #[schema(pattern = r"\S")]
+    person: String,
+    /// Why.
+    #[schema(pattern = r"\S")]
+    reason: String,
+}
+
+/// Opens, closes, locks or unblinds a study, or records that a surgeon withdrew.
+#[utoipa::path(post, path = "/api/researcher/studies/{study}/changes", tag = "researcher",
+    params(("study" = String, Path)), request_body = ChangeStudy, responses(
+    (status = 200, body = StudyDetail),
+    (status = 403, description = "The study names others who may", body = ErrorBody),
+    (status = 404, description = "No such study", body = ErrorBody),
+    (status = 409, description = "It does not fit where the study stands", body = ErrorBody),
+    (status = 422, description = "A person or reason is missing, or the reason names a policy", body = ErrorBody)))]
+async fn change_study(
+    _: Researcher,
+    State(app): State<AppState>,
+    Path(name): Path<String>,
+    JsonBody(wanted): JsonBody<ChangeStudy>,
+) -> Result<Json<StudyDetail>, Error> {
+    let signature = signed(&wanted.person, &wanted.reason)?;
+    app.conductor.change_study(Role::Researcher, name.clone(), wanted.change, signature).await?;
+    Ok(Json(app.conductor.studies().detail(&name).await?))
+}
+
+/// The signature of a change.
+fn signed(person: &str, reason: &str) -> Result<Signature, Error> {
+    Signature::new(person, reason).map_err(|refusal| ConductError::from(refusal).into())
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(studies_page))
+        .routes(routes!(study_page))
+        .routes(routes!(list_studies, plan_study))
+        .routes(routes!(study))
+        .routes(routes!(change_study))
+}

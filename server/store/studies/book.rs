@@ -1,0 +1,115 @@
+//! The book of studies: written by the server, or by a command while no server runs.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+
+use super::writing::{change_study, insert_study};
+use super::{NewStudy, StudyChange};
+use crate::store::database::lock;
+use crate::store::schema::DATABASE;
+use crate::store::values::drop_if_failed;
+use crate::store::{Reader, Store, StoreError};
+use crate::trial::study::definition::StudyName;
+
+/// Writes studies. Clone freely.
+#[derive(Clone)]
+pub struct StudyBook {
+    way: Way,
+    reader: Reader,
+}
+
+#[derive(Clone)]
+enum Way {
+    /// Within the server.
+    Server(Store),
+    /// From the command line. The lock keeps servers out, so that nobody decides on what is being changed.
+    CommandLine { pool: SqlitePool, _lock: Arc<File> },
+}
+
+impl StudyBook {
+    /// That of the server.
+    #[must_use]
+    pub fn of_server(store: &Store) -> Self {
+        Self { way: Way::Server(store.clone()), reader: store.reader().clone() }
+    }
+
+    /// That of data folder `folder`, for a command.
+    ///
+    /// # Errors
+    /// When there is no database, a server has it open, or it is not of this version.
+    pub async fn open(folder: &Path) -> Result<Self, StoreError> {
+        let file = folder.join(DATABASE);
+        if !file.is_file() {
+            return Err(StoreError::Missing(file));
+        }
+
+        let lock = Arc::new(lock(folder)?);
+        let reader = Reader::open(folder).await?;
+        let options = SqliteConnectOptions::new()
+            .filename(&file)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5))
+            .synchronous(SqliteSynchronous::Full);
+        let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
+        Ok(Self { way: Way::CommandLine { pool, _lock: lock }, reader })
+    }
+
+    /// The start of the server that writes in it; none for a command.
+    #[must_use]
+    pub fn run(&self) -> Option<i64> {
+        match &self.way {
+            Way::Server(store) => Some(store.run()),
+            Way::CommandLine { .. } => None,
+        }
+    }
+
+    /// For reading.
+    #[must_use]
+    pub const fn reader(&self) -> &Reader {
+        &self.reader
+    }
+
+    /// Plans a study with its first event. On disk when this returns.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn plan(&self, new: &NewStudy, planned: &StudyChange) -> Result<(), StoreError> {
+        let (pool, _turn) = match &self.way {
+            Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),
+            Way::CommandLine { pool, .. } => (pool, None),
+        };
+
+        let mut connection = pool.acquire().await?;
+        let done = insert_study(&mut connection, self.run(), new, planned).await;
+        drop_if_failed(connection, &done);
+        done
+    }
+
+    /// Writes `change` of `study` with all that goes with it, or nothing. On disk when this returns.
+    ///
+    /// # Errors
+    /// When the disk or database failed.
+    pub async fn change(&self, study: &StudyName, change: &StudyChange) -> Result<(), StoreError> {
+        let (pool, _turn) = match &self.way {
+            Way::Server(store) => (&store.inner.trial, Some(store.turn().await)),
+            Way::CommandLine { pool, .. } => (pool, None),
+        };
+
+        let mut connection = pool.acquire().await?;
+        let done = change_study(&mut connection, self.run(), study, change).await;
+        drop_if_failed(connection, &done);
+        done
+    }
+
+    /// Ends its connections where it has its own.
+    pub async fn close(&self) {
+        if let Way::CommandLine { pool, .. } = &self.way {
+            self.reader.close().await;
+            pool.close().await;
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Whether the studies of a database are as they were planned, and their sessions have the orders that were drawn.
+
+use sqlx::Row;
+
+use super::StoredStudy;
+use crate::autofocus::PolicyName;
+use crate::store::{Reader, StoreError};
+use crate::trial::study::lists::Lists;
+use crate::trial::study::places::Enrolled;
+
+/// Checks every study that `snapshot` has: what was found, in words, or what is wrong.
+pub(in crate::store) async fn check_studies(snapshot: &Reader) -> Result<Result<String, String>, StoreError> {
+    let names = snapshot.study_names().await?;
+    let mut sessions = 0;
+    for name in &names {
+        match check_study(snapshot, name).await? {
+            Ok(checked) => sessions += checked,
+            Err(problem) => return Ok(Err(format!("studies: study {name}: {problem}"))),
+        }
+    }
+
+    let studies = names.len();
+    Ok(Ok(format!("{studies} studies are as planned; {sessions} of their sessions have the orders committed to")))
+}
+
+/// How many sessions of study `name` were checked, or what is wrong.
+async fn check_study(snapshot: &Reader, name: &str) -> Result<Result<usize, String>, StoreError> {
+    // Reading it compares the protocols with the hashes in the definition.
+    let Some(study) = snapshot.study(name).await? else { return Ok(Err("it is not there".to_owned())) };
+
+    let row = sqlx::query("SELECT definition_sha256 FROM studies WHERE study = ?").bind(name);
+    let planned: String = row.fetch_one(snapshot.pool()).await?.try_get("definition_sha256")?;
+    if planned != study.definition.sha256() || study.definition.name.as_str() != name {
+        return Ok(Err("its definition was changed since it was planned".to_owned()));
+    }
+
+    let lists = match committed_lists(&study) {
+        Ok(lists) => lists,
+        Err(problem) => return Ok(Err(problem)),
+    };
+    for enrolled in &study.sessions {
+        if let Err(problem) = check_session(snapshot, lists.as_ref(), enrolled).await? {
+            return Ok(Err(format!("session {}: {problem}", enrolled.session)));
+        }
+    }
+    Ok(Ok(study.sessions.len()))
+}
+
+/// The orders of `study` if they are those committed to; none where it was never opened.
+fn committed_lists(study: &StoredStudy) -> Result<Option<Lists>, String> {
+    let (seed, commitment) = match (study.seed, study.state().commitment) {
+        (None, None) => return Ok(None),
+        (Some(seed), Some(commitment)) => (seed, commitment),
+        (None, Some(_)) => return Err("the seed of its orders is missing".to_owned()),
+        (Some(_), None) => return Err("its orders were drawn, and nothing commits to them".to_owned()),
+    };
+
+    let lists = Lists::draw(&study.definition, &study.sites, seed);
+    if lists.commitment() != commitment {
+        return Err("its orders, sites or seed were changed since they were drawn".to_owned());
+    }
+    Ok(Some(lists))
+}
+
+async fn check_session(
+    snapshot: &Reader,
+    lists: Option<&Lists>,
+    enrolled: &Enrolled,
+) -> Result<Result<(), String>, StoreError> {
+    let Some(stored) = snapshot.session(enrolled.session).await? else {
+        return Ok(Err("it is not there".to_owned()));
+    };
+    let place = lists.and_then(|lists| lists.place(&enrolled.site, &enrolled.protocol, enrolled.place));
+    let Some(place) = place else {
+        return Ok(Err(format!("the list of {} has no place {}", enrolled.site, enrolled.place)));
+    };
+
+    let made = stored.made;
+    let schedule: Vec<PolicyName> = made.segments.into_iter().map(|(_, policy)| policy).collect();
+    let same = made.protocol == enrolled.protocol
+        && made.seed == place.seed
+        && made.set_index == place.index
+        && schedule == place.schedule;
+    Ok(if same { Ok(()) } else { Err(format!("its order is not that of place {} in its list", enrolled.place)) })
+}

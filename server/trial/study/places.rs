@@ -1,0 +1,122 @@
+//! Which place of its list a new session gets: the rules of the definition, and nobody's choice.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::definition::{Definition, PlaceRules, Repetition, Replacement, Site};
+use super::refusal::StudyRefusal;
+use crate::ids::SessionId;
+use crate::trial::phase::SessionStatus;
+
+/// A session of a study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Enrolled {
+    /// The session.
+    pub session: SessionId,
+    /// Its participant's code.
+    pub participant: String,
+    /// Its site.
+    pub site: String,
+    /// Its protocol.
+    pub protocol: String,
+    /// Its place in the list of both, from 1.
+    pub place: usize,
+    /// How far it came.
+    pub status: SessionStatus,
+    /// Whether it was unblinded.
+    pub unblinded: bool,
+    /// Whether its surgeon withdrew.
+    pub withdrawn: bool,
+}
+
+impl Enrolled {
+    /// What becomes of its place; none where the session stands.
+    const fn replacement(&self, rules: PlaceRules) -> Option<Replacement> {
+        let rule = match (self.withdrawn, self.status) {
+            (true, _) => rules.withdrawn,
+            (false, SessionStatus::Aborted) => rules.aborted,
+            (false, SessionStatus::UnderWay | SessionStatus::Completed) => return None,
+        };
+        // Whoever knows the order could tell it to the next surgeon.
+        Some(match rule {
+            Replacement::SamePlace if self.unblinded => Replacement::NextSpare,
+            rule => rule,
+        })
+    }
+
+    /// Whether a further session of its participant by the same protocol is a repetition.
+    fn stands(&self, rules: PlaceRules) -> bool {
+        matches!(self.replacement(rules), None | Some(Replacement::Keep))
+    }
+}
+
+/// The place, from 1, of a new session of `participant` at `site` by `protocol`. `sessions` are all sessions of the
+/// study, in the order in which they were made.
+///
+/// # Errors
+/// When the participant may not have a session, or no place is left.
+pub fn next_place(
+    definition: &Definition,
+    sessions: &[Enrolled],
+    site: &Site,
+    protocol: &str,
+    participant: &str,
+) -> Result<usize, StudyRefusal> {
+    let rules = definition.rules;
+    if sessions.iter().any(|session| session.participant == participant && session.withdrawn) {
+        return Err(StudyRefusal::Withdrew { participant: participant.to_owned() });
+    }
+
+    let list: Vec<&Enrolled> =
+        sessions.iter().filter(|session| session.site == site.name && session.protocol == protocol).collect();
+    // A surgeon who works at two sites is one surgeon.
+    let repeats = sessions
+        .iter()
+        .any(|session| session.participant == participant && session.protocol == protocol && session.stands(rules));
+    if repeats && rules.repeated == Repetition::Refuse {
+        return Err(StudyRefusal::Repeated { participant: participant.to_owned() });
+    }
+
+    if let Some(place) = given_back(&list, rules) {
+        return Ok(place);
+    }
+
+    let next = list.iter().map(|session| session.place).max().unwrap_or(0) + 1;
+    let opened = spares_opened(&list, rules) + usize::from(repeats);
+    let open = site.places().min(site.surgeons + opened);
+    if next > open {
+        return Err(StudyRefusal::UsedUp {
+            site: site.name.clone(),
+            open,
+            places: site.places(),
+            advice: definition.when_used_up.clone(),
+        });
+    }
+    Ok(next)
+}
+
+/// The first place whose latest session gave it back.
+fn given_back(list: &[&Enrolled], rules: PlaceRules) -> Option<usize> {
+    let places: BTreeSet<usize> = list.iter().map(|session| session.place).collect();
+    places.into_iter().find(|&place| {
+        let mut at_this_place = list.iter().filter(move |session| session.place == place);
+        // Once the order of a place has become known, nobody takes it again.
+        let known = at_this_place.clone().any(|session| session.unblinded);
+        let latest = at_this_place.next_back();
+        !known && latest.is_some_and(|session| session.replacement(rules) == Some(Replacement::SamePlace))
+    })
+}
+
+/// How many spare places the sessions of a list have opened.
+fn spares_opened(list: &[&Enrolled], rules: PlaceRules) -> usize {
+    let mut latest = BTreeMap::new();
+    for session in list {
+        latest.insert(session.place, session);
+    }
+    let opens = latest.into_values().filter(|session| session.replacement(rules) == Some(Replacement::NextSpare));
+    let replaced = opens.count();
+
+    let mut standing = BTreeSet::new();
+    let standing_sessions = list.iter().filter(|session| session.stands(rules));
+    let repeated = standing_sessions.filter(|session| !standing.insert(session.participant.as_str())).count();
+    replaced + repeated
+}

@@ -1,0 +1,233 @@
+//! Where a study stands, and what may be done to it then.
+
+use std::collections::BTreeSet;
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::definition::Definition;
+use super::event::{StudyEvent, StudyEventKind};
+use super::places::Enrolled;
+use super::refusal::StudyRefusal;
+use super::signature::{Signature, Way};
+use super::stage::Stage;
+use crate::autofocus::PolicyName;
+use crate::ids::SessionId;
+use crate::trial::phase::SessionStatus;
+use crate::trial::role::Role;
+
+/// What a person wants to do to a study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "change", rename_all = "kebab-case")]
+#[schema(as = StudyAction)]
+pub enum Change {
+    /// To let sessions be made. The first time, the orders are drawn.
+    Open,
+    /// To let no more sessions be made.
+    Close,
+    /// To let nothing be changed any more.
+    Lock {
+        /// Whether to do it though what a surgeon's device still holds would then not count.
+        #[serde(default)]
+        despite_outstanding: bool,
+    },
+    /// To tell which policies ran.
+    Unblind,
+    /// To record that the surgeon of a session withdrew.
+    Withdraw {
+        /// The session.
+        session: SessionId,
+    },
+}
+
+/// Where a study stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StudyState {
+    /// How far it has come.
+    pub stage: Stage,
+    /// The commitment to its orders, once they were drawn.
+    pub commitment: Option<String>,
+    /// When it was locked, by the wall clock.
+    pub locked: Option<Timestamp>,
+    /// Sessions whose surgeon withdrew.
+    pub withdrawn: BTreeSet<SessionId>,
+    /// How many events it has.
+    pub events: u32,
+}
+
+/// What bears on a change besides the study's own state.
+#[derive(Debug, Clone, Copy)]
+pub struct StudyCircumstances<'a> {
+    /// What was planned.
+    pub definition: &'a Definition,
+    /// The study's sessions.
+    pub sessions: &'a [Enrolled],
+    /// A session that the operator's page shows, whether or not it has ended.
+    pub on_screens: Option<SessionId>,
+    /// Sessions for which a surgeon's device may still hold something that counts.
+    pub outstanding: usize,
+}
+
+impl StudyState {
+    /// The state after `events`.
+    #[must_use]
+    pub fn after(events: &[StudyEvent]) -> Self {
+        let mut state =
+            Self { stage: Stage::Planned, commitment: None, locked: None, withdrawn: BTreeSet::new(), events: 0 };
+        events.iter().for_each(|event| state.apply(event));
+        state
+    }
+
+    fn apply(&mut self, event: &StudyEvent) {
+        self.events = event.number;
+        match &event.kind {
+            StudyEventKind::Planned => self.stage = Stage::Planned,
+            StudyEventKind::Opened { commitment } => {
+                self.stage = Stage::Open;
+                if let Some(commitment) = commitment {
+                    self.commitment = Some(commitment.clone());
+                }
+            }
+            StudyEventKind::Closed => self.stage = Stage::Closed,
+            StudyEventKind::Locked => {
+                self.stage = Stage::Locked;
+                self.locked = Some(event.wall);
+            }
+            StudyEventKind::Unblinded => self.stage = Stage::Unblinded,
+            StudyEventKind::SessionWithdrawn { session } => {
+                self.withdrawn.insert(*session);
+            }
+            StudyEventKind::SessionUnblinded { .. } => {}
+        }
+    }
+
+    /// Checks `change` by a person who signed with `signature`.
+    ///
+    /// # Errors
+    /// When it does not fit where the study stands, or the person may not.
+    pub fn check(
+        &self,
+        change: Change,
+        way: Way,
+        signature: &Signature,
+        circumstances: StudyCircumstances<'_>,
+    ) -> Result<(), StudyRefusal> {
+        check_way(way)?;
+        match change {
+            Change::Open => self.check_open(),
+            Change::Close => self.check_close(),
+            Change::Lock { despite_outstanding } => self.check_lock(circumstances, despite_outstanding),
+            Change::Unblind => self.check_unblind(signature, circumstances.definition),
+            Change::Withdraw { session } => self.check_withdrawal(session, circumstances.sessions),
+        }
+    }
+
+    /// Checks whether sessions can be made.
+    ///
+    /// # Errors
+    /// When the study is not open.
+    pub const fn check_takes_sessions(&self) -> Result<(), StudyRefusal> {
+        match self.stage {
+            Stage::Open => Ok(()),
+            stage => Err(StudyRefusal::NotOpen(stage)),
+        }
+    }
+
+    const fn check_open(&self) -> Result<(), StudyRefusal> {
+        match self.stage {
+            Stage::Planned | Stage::Closed => Ok(()),
+            Stage::Open => Err(StudyRefusal::AlreadyOpen),
+            Stage::Locked | Stage::Unblinded => Err(StudyRefusal::Locked),
+        }
+    }
+
+    const fn check_close(&self) -> Result<(), StudyRefusal> {
+        match self.stage {
+            Stage::Open => Ok(()),
+            Stage::Planned => Err(StudyRefusal::NotOpenedYet),
+            Stage::Closed => Err(StudyRefusal::AlreadyClosed),
+            Stage::Locked | Stage::Unblinded => Err(StudyRefusal::Locked),
+        }
+    }
+
+    fn check_lock(&self, circumstances: StudyCircumstances<'_>, despite_outstanding: bool) -> Result<(), StudyRefusal> {
+        match self.stage {
+            Stage::Closed => {}
+            Stage::Planned | Stage::Open => return Err(StudyRefusal::NotClosed(self.stage)),
+            Stage::Locked | Stage::Unblinded => return Err(StudyRefusal::Locked),
+        }
+
+        let StudyCircumstances { sessions, on_screens, outstanding, .. } = circumstances;
+        let goes_on =
+            |session: &&Enrolled| session.status == SessionStatus::UnderWay || on_screens == Some(session.session);
+        if let Some(session) = sessions.iter().find(goes_on) {
+            return Err(StudyRefusal::SessionUnderWay { participant: session.participant.clone() });
+        }
+
+        if outstanding > 0 && !despite_outstanding {
+            return Err(StudyRefusal::Outstanding { sessions: outstanding });
+        }
+        Ok(())
+    }
+
+    fn check_unblind(&self, signature: &Signature, definition: &Definition) -> Result<(), StudyRefusal> {
+        match self.stage {
+            Stage::Locked => {}
+            Stage::Unblinded => return Err(StudyRefusal::AlreadyUnblinded),
+            Stage::Planned | Stage::Open | Stage::Closed => return Err(StudyRefusal::NotLocked(self.stage)),
+        }
+
+        if !definition.may_unblind.contains(&signature.person) {
+            let may = definition.may_unblind.clone();
+            return Err(StudyRefusal::MayNotUnblind { person: signature.person.clone(), may });
+        }
+        let policies = definition.protocols.iter().flat_map(|protocol| &protocol.policies);
+        check_unblinding_reason(&signature.reason, policies)
+    }
+
+    fn check_withdrawal(&self, session: SessionId, sessions: &[Enrolled]) -> Result<(), StudyRefusal> {
+        let enrolled = sessions.iter().find(|enrolled| enrolled.session == session);
+        let enrolled = enrolled.ok_or(StudyRefusal::UnknownSession)?;
+        let participant = enrolled.participant.clone();
+
+        if matches!(self.stage, Stage::Locked | Stage::Unblinded) {
+            return Err(StudyRefusal::Locked);
+        }
+        if enrolled.status == SessionStatus::UnderWay {
+            return Err(StudyRefusal::SessionUnderWay { participant });
+        }
+        if self.withdrawn.contains(&session) {
+            return Err(StudyRefusal::AlreadyWithdrawn { participant });
+        }
+        Ok(())
+    }
+}
+
+/// Checks whether a study may be changed by `way`.
+///
+/// # Errors
+/// When only another role may.
+pub fn check_way(way: Way) -> Result<(), StudyRefusal> {
+    match way {
+        Way::CommandLine | Way::Role(Role::Researcher) => Ok(()),
+        Way::Role(_) => Err(StudyRefusal::NotTheResearcher),
+    }
+}
+
+/// Checks that the reason of an unblinding, which every export tells, names none of `policies`. A name
+/// without a dash ("fixed") is a plain word too, and may be used as one.
+///
+/// # Errors
+/// When it does.
+pub fn check_unblinding_reason<'a>(
+    reason: &str,
+    policies: impl IntoIterator<Item = &'a PolicyName>,
+) -> Result<(), StudyRefusal> {
+    let reason = reason.to_lowercase();
+    let mut names = policies.into_iter().map(PolicyName::as_str).filter(|name| name.contains('-'));
+    match names.find(|name| reason.contains(name)) {
+        Some(policy) => Err(StudyRefusal::ReasonNamesPolicy { policy: policy.to_owned() }),
+        None => Ok(()),
+    }
+}

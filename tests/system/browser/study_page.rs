@@ -1,0 +1,126 @@
+//! A study on the pages: planned, opened, used by the operator, closed, locked, unblinded by its statistician.
+
+use super::driver::{Browser, Driver};
+use super::screenshots::shoot;
+use super::theatre::operator;
+use super::wait::until;
+use crate::http::studies::{definition, server};
+use crate::support::Server;
+
+async fn researcher(driver: &Driver, server: &Server) -> Browser {
+    let browser = driver.browser().await;
+    browser.open(&server.url(&format!("/enter?key={}", server.key("researcher")))).await;
+    browser
+}
+
+/// Signs in the dialog and goes on.
+async fn sign(page: &Browser, person: &str, reason: &str) {
+    page.type_into("#reason", reason).await;
+    page.type_into("#person", person).await;
+    page.click("#reason-go").await;
+}
+
+/// The operator prepares a session in the study and ends it again.
+async fn a_session(operator: &Browser) {
+    // The page may still be growing above the button, so that a click meets something else.
+    until("the dialog for a new participant", || async {
+        operator.is("#participant-dialog", "open").await || {
+            operator.try_click("#add-participant").await;
+            false
+        }
+    })
+    .await;
+    operator.type_into("#code", "S-01").await;
+    operator.click("#participant-dialog [type=submit]").await;
+    operator.sees_no("#participant-dialog").await;
+
+    // With a study open nothing is chosen beforehand.
+    operator.sees("#study-choice", "Study").await;
+    assert_eq!(operator.value("#study").await, "");
+    operator.select("#study", "scope-2026/leeds").await;
+    operator.select("#protocol", "pair").await;
+    assert_eq!(operator.count("#protocol option").await, 1, "the study's protocols alone");
+    shoot(operator, "operator-11-study").await;
+
+    operator.click("#new-session [type=submit]").await;
+    operator.sees("#phase", "Ready to start").await;
+    operator.click_labelled("#session-actions", "Abort").await;
+    operator.type_into("#reason", "The light failed").await;
+    operator.click("#reason-go").await;
+    operator.click_labelled("#session-actions", "Close and prepare").await;
+    operator.sees("#new-session", "Prepare session").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_study_is_led_from_the_pages() {
+    let driver = Driver::start();
+    let (_protocols, server) = server();
+    let operator = operator(&driver, &server).await;
+    operator.sees("#new-session", "Prepare session").await;
+    operator.sees_no("#study-choice").await;
+
+    let page = researcher(&driver, &server).await;
+    page.sees("nav", "Studies").await;
+    page.open(&server.url("/researcher/studies")).await;
+    page.sees("main", "No studies yet").await;
+    page.paste("#definition", &definition().replace("spares = 1", "spares = 1000")).await;
+    page.type_into("#planner", "Dr Lead").await;
+    page.type_into("#plan-reason", "Ethics approved it").await;
+    page.click("#plan-go").await;
+    page.sees("#plan-trouble", "key 'spares': must be from 0 to 500 places, not 1000").await;
+    shoot(&page, "study-1-malformed").await;
+    page.paste("#definition", &definition()).await;
+    page.click("#plan-go").await;
+
+    page.sees("#stage", "planned").await;
+    page.sees("main", "Leeds General Infirmary").await;
+    page.click("#open").await;
+    shoot(&page, "study-2-opening").await;
+    sign(&page, "Dr Lead", "The first surgeon comes").await;
+    page.sees("#stage", "open").await;
+    page.sees("#commitment", "parfocal study scope-2026 definition").await;
+
+    operator.reload().await;
+    a_session(&operator).await;
+
+    page.reload().await;
+    page.sees("main", "aborted").await;
+    shoot(&page, "study-3-open").await;
+    page.click_labelled("td", "Withdraw").await;
+    sign(&page, "Dr Lead", "The surgeon asked for it").await;
+    page.sees("td .badge.warn", "withdrawn").await;
+
+    page.click("#close").await;
+    sign(&page, "Dr Lead", "The last surgeon was here").await;
+    page.sees("#stage", "closed").await;
+    page.click("#lock").await;
+    // The tablet may still hold something: the page wants to be told that it is known.
+    page.sees("#reason-confirm", "Lock anyway").await;
+    page.click("#reason-confirmed").await;
+    sign(&page, "Dr Lead", "The data are complete").await;
+    page.sees("#stage", "locked").await;
+
+    page.click("#unblind").await;
+    sign(&page, "Dr Lead", "The analysis begins").await;
+    page.sees("#reason-trouble", "'Dr Lead' is not among those who may unblind this study").await;
+    shoot(&page, "study-4-refused").await;
+    page.clear("#person").await;
+    page.type_into("#person", "Trial statistician").await;
+    page.click("#reason-go").await;
+    page.sees("#stage", "unblinded").await;
+    page.sees(".study-events", "Study unblinded: The analysis begins").await;
+    shoot(&page, "study-5-unblinded").await;
+
+    page.open(&server.url("/researcher")).await;
+    page.sees("tbody", "scope-2026").await;
+    shoot(&page, "study-6-sessions").await;
+    page.click("td a.button").await;
+    page.sees(".unblinded", "hill-climber").await;
+    page.open(&server.url("/researcher/studies")).await;
+    page.sees("tbody", "unblinded").await;
+    shoot(&page, "study-7-studies").await;
+
+    for browser in [&page, &operator] {
+        assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
+    }
+}

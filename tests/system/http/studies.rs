@@ -1,0 +1,290 @@
+//! Studies on a real server: over HTTP, by the command line, and what operator and surgeon are sent meanwhile.
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+
+use reqwest::{Method, StatusCode};
+use rustix::process::Signal;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+use tempfile::TempDir;
+
+use super::live::{Heard, Page};
+use crate::support::{Server, client};
+
+const PROTOCOL: &str = include_str!("pair.toml");
+
+/// A definition of a study of that protocol at one site, for two surgeons.
+pub fn definition() -> String {
+    let sha256 = hex::encode(Sha256::digest(PROTOCOL));
+    format!(
+        "name = \"scope-2026\"\ntitle = \"Two settings in the eyes of two surgeons\"\norder = \"balanced\"\n\
+         aborted = \"same-place\"\nwithdrawn = \"next-spare\"\nrepeated = \"refuse\"\n\
+         when_used_up = \"Call the trial office.\"\nmay_unblind = [\"Trial statistician\"]\n\
+         analysis = \"Wilcoxon signed-rank test on sharpness\"\n\
+         [[protocols]]\nname = \"pair\"\nsha256 = \"{sha256}\"\n\
+         [[sites]]\nname = \"leeds\"\ntitle = \"Leeds General Infirmary\"\nsurgeons = 2\nspares = 1\n"
+    )
+}
+
+/// A folder with the protocol, and a server on another that reads it.
+pub fn server() -> (TempDir, Server) {
+    let protocols = tempfile::tempdir().unwrap();
+    std::fs::write(protocols.path().join("pair.toml"), PROTOCOL).unwrap();
+    let server = on(Arc::new(tempfile::tempdir().unwrap()), protocols.path());
+    (protocols, server)
+}
+
+fn on(data: Arc<TempDir>, protocols: &Path) -> Server {
+    Server::on(data, &["--bind", "127.0.0.1:0", "--protocols", protocols.to_str().unwrap()])
+}
+
+/// All that came back, headers included, and the status.
+async fn ask(server: &Server, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
+    let request = client().request(method, server.url(path)).bearer_auth(server.key(role)).json(body);
+    let response = request.send().await.unwrap();
+    (response.status(), response.text().await.unwrap())
+}
+
+async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
+    let (status, said) = ask(server, role, Method::POST, path, &body).await;
+    assert!(status.is_success(), "{path} {body}: {status} {said}");
+    serde_json::from_str(&said).unwrap_or_default()
+}
+
+async fn refused(server: &Server, role: &str, path: &str, body: Value) -> (u16, String) {
+    let (status, said) = ask(server, role, Method::POST, path, &body).await;
+    assert!(!status.is_success(), "{path} {body}: {said}");
+    (status.as_u16(), said)
+}
+
+/// Plans the study and opens it.
+pub async fn open(server: &Server) -> Value {
+    let plan = json!({"definition": definition(), "person": "Dr Lead", "reason": "ethics approved it"});
+    post(server, "researcher", "/api/researcher/studies", plan).await;
+    let opening = json!({"change": "open", "person": "Dr Lead", "reason": "the first surgeon comes"});
+    post(server, "researcher", "/api/researcher/studies/scope-2026/changes", opening).await
+}
+
+fn new_session(participant: &str) -> Value {
+    let study = json!({"study": "scope-2026", "site": "leeds"});
+    json!({"participant": participant, "protocol": "pair", "study": study})
+}
+
+async fn act(server: &Server, role: &str, action: Value) {
+    post(server, role, &format!("/api/{role}/actions"), action).await;
+}
+
+/// The session under way as the surgeon sees it.
+async fn view(server: &Server, heard: &mut Vec<String>) -> Value {
+    let (_, said) = ask(server, "surgeon", Method::GET, "/api/surgeon/session", &Value::Null).await;
+    let view = serde_json::from_str(&said).unwrap();
+    heard.push(said);
+    view
+}
+
+/// What of the orders stands in the database: seeds and policies in the order in which they run.
+async fn secrets(server: &Server) -> Vec<String> {
+    let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
+    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let sql = "SELECT seed FROM study_seeds UNION SELECT seed FROM sessions
+               UNION SELECT group_concat(policy, ',') FROM segments GROUP BY session";
+    let found: Vec<String> = sqlx::query_scalar(sql).fetch_all(&pool).await.unwrap();
+    pool.close().await;
+    found
+}
+
+#[tokio::test]
+async fn during_a_studys_session_nobody_is_sent_anything_of_an_order() {
+    let (_protocols, server) = server();
+    open(&server).await;
+    let mut surgeon_page = Page::open(&server, "surgeon").await;
+    let mut operator_page = Page::open(&server, "operator").await;
+    let mut surgeon = Vec::new();
+    let mut others = Vec::new();
+
+    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
+    let (status, made) = ask(&server, "operator", Method::POST, "/api/operator/sessions", &new_session("S-01")).await;
+    assert_eq!(status, StatusCode::OK, "{made}");
+    others.push(made);
+    let session = view(&server, &mut surgeon).await["session"].clone();
+    act(&server, "operator", json!({"session": session, "action": "start"})).await;
+
+    for _ in 0..2 {
+        let segment = view(&server, &mut surgeon).await["segment"].clone();
+        let tap = |action: &str| json!({"session": session, "action": action, "segment": segment});
+        act(&server, "surgeon", tap("acknowledge")).await;
+        surgeon_page.watch(3).await;
+        operator_page.watch(3).await;
+        act(&server, "surgeon", tap("finish-segment")).await;
+
+        for (role, path) in [
+            ("surgeon", "/surgeon"),
+            ("operator", "/operator"),
+            ("operator", "/api/operator/choices"),
+            ("operator", "/api/operator/session"),
+            ("operator", "/metrics"),
+            ("researcher", "/researcher"),
+            ("researcher", "/researcher/studies"),
+            ("researcher", "/researcher/studies/scope-2026"),
+            ("researcher", "/api/researcher/studies"),
+            ("researcher", "/api/researcher/studies/scope-2026"),
+            ("researcher", "/api/researcher/sessions"),
+        ] {
+            let (status, said) = ask(&server, role, Method::GET, path, &Value::Null).await;
+            assert_eq!(status, StatusCode::OK, "{path}");
+            if role == "surgeon" { surgeon.push(said) } else { others.push(said) }
+        }
+    }
+    assert_eq!(view(&server, &mut surgeon).await["phase"], "completed");
+
+    let texts = |page: Page| {
+        page.heard.into_iter().map(|heard| match heard {
+            Heard::Text(text) => text,
+            Heard::Frame(header) => header.to_string(),
+        })
+    };
+    surgeon.extend(texts(surgeon_page));
+    others.extend(texts(operator_page));
+
+    for heard in &surgeon {
+        for telling in ["climber", "mgm", "mlr", "scope-2026", "leeds"] {
+            let heard = heard.to_lowercase();
+            assert!(!heard.contains(telling), "'{telling}' in {heard}");
+        }
+    }
+
+    let secrets = secrets(&server).await;
+    assert_eq!(secrets.len(), 3, "the study's seed, the set's, one order");
+    for secret in &secrets {
+        assert!(secret.len() > 30, "{secret}");
+        for heard in surgeon.iter().chain(&others) {
+            assert!(!heard.contains(secret.as_str()), "'{secret}' in {heard}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_not_fit() {
+    let (_protocols, server) = server();
+    let studies = "/api/researcher/studies";
+    let changes = "/api/researcher/studies/scope-2026/changes";
+    let signed = |change: &str| json!({"change": change, "person": "Dr Lead", "reason": "as planned"});
+
+    let malformed = definition().replace("surgeons = 2", "surgeons = 0");
+    let plan = json!({"definition": malformed, "person": "Dr Lead", "reason": "x"});
+    let (status, said) = refused(&server, "researcher", studies, plan).await;
+    assert!(status == 422 && said.contains("key 'surgeons': must be from 1 to 500"), "{said}");
+    let unsigned = json!({"definition": definition(), "person": " ", "reason": "x"});
+    assert_eq!(refused(&server, "researcher", studies, unsigned).await.0, 422);
+    assert_eq!(refused(&server, "researcher", changes, signed("open")).await.0, 404);
+    let plan = json!({"definition": definition(), "person": "Dr Lead", "reason": "x"});
+    assert_eq!(refused(&server, "operator", studies, plan).await.0, 403);
+
+    let study = open(&server).await;
+    let line = study["commitment_line"].as_str().unwrap().to_owned();
+    let hash = hex::encode(Sha256::digest(definition()));
+    assert!(line.starts_with(&format!("parfocal study scope-2026 definition {hash} orders ")), "{line}");
+    assert_eq!(refused(&server, "researcher", changes, signed("open")).await.0, 409);
+    let (_, page) = ask(&server, "researcher", Method::GET, "/researcher/studies/scope-2026", &Value::Null).await;
+    assert!(page.contains(&line), "the line stands on the page");
+
+    // The operator is offered it while it is open, and a session of it is one more row in its page.
+    let choices = async || {
+        let (_, said) = ask(&server, "operator", Method::GET, "/api/operator/choices", &Value::Null).await;
+        serde_json::from_str::<Value>(&said).unwrap()["studies"].clone()
+    };
+    assert_eq!(choices().await[0]["sites"], json!(["leeds"]));
+    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
+    let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
+    let session = made["session"].clone();
+    post(&server, "researcher", changes, signed("close")).await;
+    assert_eq!(choices().await, json!([]));
+    assert_eq!(refused(&server, "researcher", changes, signed("lock")).await.0, 409);
+
+    act(&server, "operator", json!({"session": session, "action": "abort", "reason": "a trial run"})).await;
+    post(&server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+    let (status, said) = refused(&server, "researcher", changes, signed("lock")).await;
+    assert!(status == 409 && said.contains("despite_outstanding"), "{said}");
+    let mut lock = signed("lock");
+    lock["despite_outstanding"] = true.into();
+    post(&server, "researcher", changes, lock).await;
+    assert_eq!(refused(&server, "researcher", changes, signed("unblind")).await.0, 403);
+
+    let unblind = json!({"change": "unblind", "person": "Trial statistician", "reason": "the data are locked"});
+    let study = post(&server, "researcher", changes, unblind).await;
+    assert_eq!(study["stage"], "unblinded");
+    let path = format!("/api/researcher/sessions/{}", session.as_str().unwrap());
+    let (_, detail) = ask(&server, "researcher", Method::GET, &path, &Value::Null).await;
+    let detail: Value = serde_json::from_str(&detail).unwrap();
+    assert_eq!((detail["study"].as_str(), detail["emergency"].as_bool()), (Some("scope-2026"), Some(false)));
+    assert_eq!(detail["unblinding"]["policies"].as_array().unwrap().len(), 2);
+}
+
+/// What `parfocal study` says to `arguments` on `data`, and whether it succeeded.
+fn study(arguments: &[&str], data: &Path) -> (bool, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    let output = command.arg("study").args(arguments).arg("--data-dir").arg(data).output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.success(), String::from_utf8(said).unwrap())
+}
+
+#[tokio::test]
+async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
+    let (protocols, mut server) = server();
+    let data = Arc::clone(&server.data);
+    let folder = protocols.path().to_str().unwrap().to_owned();
+    let file = protocols.path().join("study.definition");
+    std::fs::write(&file, definition()).unwrap();
+    let file = file.to_str().unwrap();
+    let signature = ["--by", "Dr Lead", "--reason", "as planned"];
+    let new = [&["new", file, "--protocols", &folder][..], &signature].concat();
+
+    let (done, said) = study(&new, data.path());
+    assert!(!done && said.contains("a server runs on") && said.contains("/researcher/studies"), "{said}");
+    assert_eq!(study(&["show"], data.path()), (true, "no studies yet\n".to_owned()));
+    assert!(server.end(Signal::TERM));
+
+    let (done, said) = study(&new, data.path());
+    assert!(done && said.starts_with("scope-2026: planned, 0 of 2 planned surgeons' sessions made"), "{said}");
+    let (done, said) = study(&new, data.path());
+    assert!(!done && said.contains("there is a study 'scope-2026' already"), "{said}");
+
+    let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());
+    assert!(done && said.contains("parfocal study scope-2026 definition") && said.contains("chain "), "{said}");
+    let line = said.lines().nth(1).unwrap().to_owned();
+    let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());
+    assert!(!done && said == "parfocal: the study is open already\n", "{said}");
+    let (done, said) = study(&[&["lock", "scope-2026"][..], &signature].concat(), data.path());
+    assert!(!done && said.contains("close it first"), "{said}");
+    let (done, said) = study(&["open", "another", "--by", "x", "--reason", "y"], data.path());
+    assert!(!done && said.contains("there is no study 'another'; there are: scope-2026"), "{said}");
+
+    // A session of it on a server that no longer has the protocol: the study kept its own.
+    let none = tempfile::tempdir().unwrap();
+    let server = on(Arc::clone(&data), none.path());
+    post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
+    let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
+    assert_eq!(made["title"], "Comparison of two focus settings");
+    let session = made["session"].clone();
+    act(&server, "operator", json!({"session": session, "action": "abort", "reason": "over"})).await;
+    let (done, said) = study(&["show", "scope-2026"], data.path());
+    assert!(done && said.contains(&line) && said.contains("S-01 leeds pair place 1"), "{said}");
+    let (_, said) = study(&["show", "scope-2026", "--json"], data.path());
+    let shown: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!((shown["stage"].as_str(), shown["commitment_line"].as_str()), (Some("open"), Some(line.as_str())));
+    drop(server);
+
+    let (done, said) = study(&[&["close", "scope-2026"][..], &signature].concat(), data.path());
+    assert!(done, "{said}");
+    let (done, said) = study(&[&["lock", "scope-2026"][..], &signature].concat(), data.path());
+    assert!(!done && said.contains("despite_outstanding"), "{said}");
+    let (done, said) = study(&[&["lock", "scope-2026", "--despite-outstanding"][..], &signature].concat(), data.path());
+    assert!(done && said.starts_with("scope-2026: locked"), "{said}");
+
+    let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(data.path()).output().unwrap();
+    let said = String::from_utf8(verified.stdout).unwrap();
+    assert!(verified.status.success() && said.contains("1 studies are as planned; 1 of their sessions"), "{said}");
+}

@@ -1,0 +1,107 @@
+//! Blinding within a study: emergency unblinding of one session, and what nobody is told ahead of time.
+
+use parfocal::conductor::ConductError;
+use parfocal::store::export::export;
+use parfocal::store::export::verify::verify;
+use parfocal::trial::action::Action;
+use parfocal::trial::event::EventKind;
+use parfocal::trial::role::Role;
+use serde_json::Value;
+
+use super::*;
+use crate::exports::{failed, json, rows};
+use crate::fixture::PARTICIPANT;
+
+async fn emergency(trial: &Trial, session: SessionId, reason: &str) -> Result<(), ConductError> {
+    let signature = Signature::new("Dr Ward", reason).unwrap();
+    trial.conductor.unblind_in_emergency(Role::Researcher, session, signature, true).await
+}
+
+#[tokio::test]
+async fn one_session_is_unblinded_only_in_an_emergency_that_somebody_signs() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = whole(&mut trial, PARTICIPANT, "leeds").await;
+
+    let unsigned = Action::Unblind { reason: "curious".to_owned(), despite_outstanding: true };
+    let refused = trial.conductor.act(Role::Researcher, session, unsigned).await.unwrap_err().to_string();
+    assert!(refused.contains("the session belongs to study scope-2026") && refused.contains("say who"), "{refused}");
+    let naming = emergency(&trial, session, "was it mgm-hill-climber?").await.unwrap_err().to_string();
+    assert!(naming.contains("the reason names the policy 'mgm-hill-climber'"), "{naming}");
+    let signature = Signature::new("Dr Ward", "bleeding").unwrap();
+    let by_operator = trial.conductor.unblind_in_emergency(Role::Operator, session, signature, true).await;
+    assert!(matches!(by_operator, Err(ConductError::Forbidden(_))), "{by_operator:?}");
+    assert_eq!(detail(&trial).await.log.len(), 2);
+
+    emergency(&trial, session, "an adverse event").await.unwrap();
+    let study = detail(&trial).await;
+    let last = study.log.last().unwrap();
+    assert_eq!(
+        (last.text.as_str(), last.person.as_str(), last.reason.as_str()),
+        ("Emergency unblinding of the session of S-01", "Dr Ward", "an adverse event")
+    );
+    assert!(study.study_sessions[0].unblinded);
+
+    let events = trial.store.reader().events(session).await.unwrap();
+    let (_, event) = events.last().unwrap();
+    assert!(matches!(event.kind, EventKind::Unblinded { emergency: true, .. }), "{event:?}");
+}
+
+#[tokio::test]
+async fn a_session_under_way_is_unblinded_in_an_emergency_and_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = prepare(&trial, PARTICIPANT, "leeds").await.unwrap();
+    trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
+    emergency(&trial, session, "an adverse event").await.unwrap();
+
+    let shown = serde_json::to_string(&trial.operator_view()).unwrap();
+    assert!(!shown.contains("climber") && !shown.contains("adverse"), "{shown}");
+    for _ in 0..2 {
+        trial.whole_setting().await;
+    }
+    assert_eq!(detail(&trial).await.log.len(), 3);
+    let line = &trial.conductor.sessions(false).await.unwrap()[0];
+    assert!(line.unblinded && line.emergency);
+}
+
+#[tokio::test]
+async fn every_export_tells_an_emergency_and_none_tells_an_order_ahead_of_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = whole(&mut trial, PARTICIPANT, "leeds").await;
+    emergency(&trial, session, "an adverse event").await.unwrap();
+
+    for unblinded in [false, true] {
+        let out = folder.path().join(format!("export-{unblinded}"));
+        export(&trial.recorder(), session, &out, unblinded).await.unwrap();
+        let checks = verify(&out, None);
+        assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+
+        let events = rows(&out, "study_events");
+        let last = events.last().unwrap();
+        assert_eq!(
+            (last["kind"].as_str(), last["person"].as_str(), last["reason"].as_str()),
+            ("session-unblinded", "Dr Ward", "an adverse event")
+        );
+        assert_eq!(rows(&out, "sessions")[0]["unblinded"], "emergency-after-end");
+        assert_eq!(json(&out, "datapackage.json")["parfocal"]["study"], STUDY);
+        assert_eq!(rows(&out, "study_sessions")[0]["place"], "1");
+    }
+
+    // Its set has another place, which nobody has taken yet: the seed would tell that one's order.
+    let allocation = json(&folder.path().join("export-true"), "allocation.json");
+    assert_eq!((&allocation["seed"], &allocation["study_statement"]), (&Value::Null, &Value::Null));
+    assert!(allocation["study_statement_withheld"].as_str().unwrap().contains("unblind all of it"), "{allocation}");
+}
+
+#[tokio::test]
+async fn sessions_outside_a_study_never_share_the_seed_of_its_sets() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let inside = whole(&mut trial, PARTICIPANT, "leeds").await;
+    let outside = trial.conductor.create(Role::Operator, "S-02", "pair").await.unwrap();
+    let seed = async |session| trial.store.reader().session(session).await.unwrap().unwrap().made.seed;
+    assert!(seed(inside).await != seed(outside).await);
+    assert_eq!(trial.store.reader().enrolment(outside).await.unwrap(), None);
+}

@@ -1,0 +1,149 @@
+//! Studies: their definition, their places, their life, and what of them is exported and verified.
+
+mod blinding;
+mod course;
+mod definition;
+mod evidence;
+mod places;
+
+use std::path::Path;
+
+use parfocal::conductor::{ConductError, StudyDetail, StudySite};
+use parfocal::ids::SessionId;
+use parfocal::trial::action::Action;
+use parfocal::trial::protocol::Protocol;
+use parfocal::trial::role::Role;
+use parfocal::trial::study::signature::Signature;
+use parfocal::trial::study::state::Change;
+
+use crate::fixture::Trial;
+
+pub const STUDY: &str = "scope-2026";
+
+/// Who may unblind the study.
+pub const STATISTICIAN: &str = "Trial statistician, Leeds";
+
+/// A protocol in balanced order: two policies, so that two sessions are a set.
+pub const PROTOCOL: &str = r#"
+name = "pair"
+title = "Comparison of two focus settings"
+researcher_title = "Two hill-climbers, once each"
+policies = ["mgm-hill-climber", "mlr-hill-climber"]
+repeats = 1
+order = "balanced"
+segment_seconds = 60
+"#;
+
+/// The protocol, installed.
+pub fn protocol() -> Protocol {
+    Protocol::parse(PROTOCOL, "pair.toml", &crate::fixture::known()).unwrap()
+}
+
+/// A definition of a study of that protocol, at two sites.
+pub fn definition() -> String {
+    format!(
+        r#"name = "{STUDY}"
+title = "Two hill-climbers in the eyes of five surgeons"
+order = "balanced"
+aborted = "next-spare"
+withdrawn = "next-spare"
+repeated = "refuse"
+when_used_up = "Call the trial office."
+may_unblind = ["{STATISTICIAN}"]
+analysis = "Wilcoxon signed-rank test on sharpness"
+
+[[protocols]]
+name = "pair"
+sha256 = "{}"
+
+[[sites]]
+name = "leeds"
+title = "Leeds General Infirmary"
+surgeons = 2
+spares = 2
+
+[[sites]]
+name = "london"
+title = "King's College Hospital"
+surgeons = 3
+spares = 0
+"#,
+        hex::encode(protocol().sha256())
+    )
+}
+
+pub fn signed(reason: &str) -> Signature {
+    Signature::new("Dr Lead", reason).unwrap()
+}
+
+/// A server with the protocol in its library.
+pub async fn a_trial(folder: &Path) -> Trial {
+    a_trial_from(folder, 5).await
+}
+
+/// The same, whose random source begins with `seed`.
+pub async fn a_trial_from(folder: &Path, seed: u64) -> Trial {
+    std::fs::write(folder.join("pair.toml"), PROTOCOL).unwrap();
+    let trial = Trial::start_with(folder, Some(folder), seed).await;
+    for code in ["S-02", "S-03", "S-04", "S-05"] {
+        trial.conductor.add_participant(Role::Operator, code).await.unwrap();
+    }
+    trial
+}
+
+/// Plans the study.
+pub async fn plan(trial: &Trial, definition: String) -> Result<String, ConductError> {
+    let planned = trial.conductor.plan_study(Role::Researcher, definition, Vec::new(), signed("ethics approved it"));
+    planned.await.map(|name| name.as_str().to_owned())
+}
+
+/// Changes the study, as the lead does.
+pub async fn change(trial: &Trial, change: Change) -> Result<(), ConductError> {
+    trial.conductor.change_study(Role::Researcher, STUDY.to_owned(), change, signed("as planned")).await
+}
+
+/// A study that is open.
+pub async fn opened(folder: &Path) -> Trial {
+    let trial = a_trial(folder).await;
+    plan(&trial, definition()).await.unwrap();
+    change(&trial, Change::Open).await.unwrap();
+    trial
+}
+
+pub async fn detail(trial: &Trial) -> StudyDetail {
+    trial.conductor.studies().detail(STUDY).await.unwrap()
+}
+
+/// Prepares a session of `participant` in the study at `site`.
+pub async fn prepare(trial: &Trial, participant: &str, site: &str) -> Result<SessionId, ConductError> {
+    let place = StudySite { study: STUDY.to_owned(), site: site.to_owned() };
+    trial.conductor.create_in_study(Role::Operator, participant, "pair", place).await
+}
+
+/// A session of `participant` in the study at `site`, from its start to its end, off the screens.
+pub async fn whole(trial: &mut Trial, participant: &str, site: &str) -> SessionId {
+    let session = prepare(trial, participant, site).await.unwrap();
+    trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
+    for _ in 0..2 {
+        trial.whole_setting().await;
+    }
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+    session
+}
+
+/// A session of `participant` in the study at `site` that is aborted.
+pub async fn aborted(trial: &Trial, participant: &str, site: &str) -> SessionId {
+    let session = prepare(trial, participant, site).await.unwrap();
+    let abort = Action::Abort { reason: "the light failed".to_owned() };
+    trial.conductor.act(Role::Operator, session, abort).await.unwrap();
+    trial.conductor.dismiss(Role::Operator, session).unwrap();
+    session
+}
+
+/// Closes and locks the study, unblinds all of it.
+pub async fn to_the_end(trial: &Trial) {
+    change(trial, Change::Close).await.unwrap();
+    change(trial, Change::Lock { despite_outstanding: true }).await.unwrap();
+    let signature = Signature::new(STATISTICIAN, "the database is locked").unwrap();
+    trial.conductor.change_study(Role::Researcher, STUDY.to_owned(), Change::Unblind, signature).await.unwrap();
+}

@@ -1,0 +1,36 @@
+// The list of studies, and the form to plan one from its definition.
+
+import { inWords, post } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+
+const definition = byId("definition", HTMLTextAreaElement);
+const go = byId("plan-go", HTMLButtonElement);
+
+/** The sites that were named: none stands for all. */
+function sites() {
+  const named = byId("sites", HTMLInputElement).value.split(",");
+  return named.map((site) => site.trim()).filter((site) => site !== "");
+}
+
+byId("file", HTMLInputElement).addEventListener("change", async (event) => {
+  const chosen = /** @type {HTMLInputElement} */ (event.target).files?.[0];
+  if (chosen) definition.value = await chosen.text();
+});
+
+byId("plan", HTMLFormElement).addEventListener("submit", async (event) => {
+  event.preventDefault();
+  go.disabled = true;
+  try {
+    const { study } = await post("/api/researcher/studies", {
+      definition: definition.value,
+      sites: sites(),
+      person: byId("planner", HTMLInputElement).value.trim(),
+      reason: byId("plan-reason", HTMLInputElement).value.trim(),
+    });
+    location.assign(`/researcher/studies/${study}`);
+  } catch (error) {
+    setText(byId("plan-trouble"), inWords(error));
+  } finally {
+    go.disabled = false;
+  }
+});

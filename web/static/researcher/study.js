@@ -1,0 +1,122 @@
+// One study: every change of it asks who does it, and why.
+
+import { get, post } from "../shared/api.js";
+import { askSigned } from "../shared/dialogs.js";
+import { byId } from "../shared/dom.js";
+import { tellTrouble } from "../shared/trouble.js";
+
+const study = byId("study").dataset.study ?? "";
+
+/** @typedef {import("../shared/dialogs.js").Ask} Ask */
+
+/**
+ * Asks for a signature, makes the change, and shows what became of the study.
+ *
+ * @param {Ask} ask
+ * @param {Api.StudyAction} change
+ * @param {string[]} [people] who may do it
+ */
+function askAndChange(ask, change, people) {
+  askSigned({
+    ...ask,
+    people,
+    done: async (reason, person) => {
+      const path = "/api/researcher/studies/{study}/changes";
+      await post(path, { ...change, reason, person }, { study });
+      location.reload();
+    },
+  });
+}
+
+function open() {
+  const first = document.getElementById("commitment") === null;
+  askAndChange(
+    {
+      heading: first ? "Draw the orders and open the study" : "Open the study again",
+      consequence: first
+        ? "The orders of all places are drawn now, once. Then this page shows the line that commits to them. " +
+          "Nobody is shown an order."
+        : "Sessions can be made in it again. Its orders stay as they were drawn.",
+      go: first ? "Draw and open" : "Open",
+    },
+    { change: "open" },
+  );
+}
+
+function close() {
+  askAndChange(
+    {
+      heading: "Close the study",
+      consequence: "No sessions can be made in it until it is opened again.",
+      go: "Close",
+    },
+    { change: "close" },
+  );
+}
+
+async function lock() {
+  const { outstanding } = await get("/api/researcher/studies/{study}", { study });
+  const still =
+    outstanding === 0
+      ? ""
+      : ` For ${outstanding} of its sessions a surgeon’s tablet may still hold something.`;
+  askAndChange(
+    {
+      heading: "Lock the study",
+      consequence:
+        "No session can be made any more, and no withdrawal recorded. What still arrives is kept and marked late, " +
+        `but does not count. This cannot be undone.${still}`,
+      confirm: outstanding === 0 ? undefined : "Lock anyway",
+      go: "Lock",
+      danger: true,
+    },
+    { change: "lock", despite_outstanding: outstanding > 0 },
+  );
+}
+
+async function unblind() {
+  const { may_unblind: people } = await get("/api/researcher/studies/{study}", { study });
+  askAndChange(
+    {
+      heading: "Unblind the whole study",
+      consequence:
+        "You and everyone with these pages will see which policy ran in which setting of every session. " +
+        "This cannot be undone. The reason stands in every export: name no policy in it.",
+      go: "Unblind",
+      danger: true,
+    },
+    { change: "unblind" },
+    people,
+  );
+}
+
+/** @param {HTMLButtonElement} button */
+function withdraw(button) {
+  const { withdraw: session = "", participant = "" } = button.dataset;
+  askAndChange(
+    {
+      heading: `${participant} withdrew`,
+      consequence:
+        "What becomes of the place is stated in the plan. The surgeon’s words stay in the database.",
+      go: "Record the withdrawal",
+      danger: true,
+    },
+    { change: "withdraw", session },
+  );
+}
+
+/** @type {Record<string, () => void | Promise<void>>} */
+const actions = { open, close, lock, unblind };
+for (const [id, action] of Object.entries(actions)) {
+  // The page has the buttons that fit where the study stands.
+  document.getElementById(id)?.addEventListener("click", async () => {
+    try {
+      await action();
+    } catch (error) {
+      tellTrouble(byId("study-trouble"), error);
+    }
+  });
+}
+for (const button of document.querySelectorAll("button")) {
+  if (button.dataset.withdraw) button.addEventListener("click", () => withdraw(button));
+}
