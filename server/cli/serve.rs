@@ -13,6 +13,7 @@ use rand_chacha::ChaCha12Rng;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
+use tokio::task::JoinHandle;
 use tokio::time::timeout;
 use tracing_subscriber::EnvFilter;
 
@@ -241,16 +242,18 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         tracing::error!("the control loop does not stop; exiting without it");
     }
 
-    let last_words = async {
-        let _ = tokio::join!(writer, ending.record_the_rest());
-        if let Ok(head) = store.reader().head().await {
-            tracing::info!("the chain of records ends at {head}");
-        }
-        store.close().await;
-    };
-    let _ = timeout(GRACE, last_words).await;
+    let _ = timeout(GRACE, store_the_rest(&store, &ending, writer)).await;
 
     Ok(())
+}
+
+/// Waits until the disk has what is still to be written, and closes the database.
+async fn store_the_rest(store: &Store, conductor: &Conductor, telemetry: JoinHandle<()>) {
+    let _ = tokio::join!(telemetry, conductor.record_the_rest());
+    if let Ok(head) = store.reader().head().await {
+        tracing::info!("the chain of records ends at {head}");
+    }
+    store.close().await;
 }
 
 /// Keeps a thread at real-time priority that never pauses from freezing the machine.

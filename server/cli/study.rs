@@ -193,7 +193,7 @@ async fn show(show: &Show) -> Result<(), Failure> {
 fn in_short(detail: &StudyDetail) -> String {
     let line = &detail.line;
     let mut text = format!(
-        "{}: {}, {} of {} planned surgeons' sessions made: {}\n",
+        "{}: {}; sessions: {}; surgeons planned here: {}; {}\n",
         line.study,
         line.stage.name(),
         line.sessions,
@@ -218,7 +218,7 @@ fn whole(detail: &StudyDetail) -> String {
         let here = if each.here { "" } else { ", not here" };
         let _ = writeln!(
             text,
-            "site {}: {} surgeons, {} spare places, {} sessions{here}",
+            "site {}: surgeons {}, spare places {}, sessions {}{here}",
             site.name, site.surgeons, site.spares, each.sessions
         );
     }

@@ -98,9 +98,9 @@ impl Shared {
         self.check_runnable(protocol)?;
 
         let place = next_place(definition, &stored.sessions, site, &protocol.name, participant)?;
-        let lost = || ConductError::Storage(format!("the orders of study {study} are not in the database"));
-        let list = List::draw(&site.name, protocol, site.places(), stored.seed.ok_or_else(lost)?);
-        let drawn = list.places.get(place - 1).ok_or_else(lost)?;
+        let missing = || ConductError::Storage(format!("the orders of study {study} are not in the database"));
+        let list = List::draw(&site.name, protocol, site.places(), stored.seed.ok_or_else(missing)?);
+        let drawn = list.places.get(place - 1).ok_or_else(missing)?;
 
         let enrolment = Enrolment {
             study: definition.name.as_str().to_owned(),

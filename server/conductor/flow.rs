@@ -109,7 +109,7 @@ impl Shared {
 
         self.show_and_drive();
         self.wake();
-        Ok(written?)
+        written
     }
 
     /// Acts on a session that is not the one in memory.

@@ -131,7 +131,11 @@ impl Studies {
                 sessions = self.unblindings(&study, &signature.reason).await?;
                 StudyEventKind::Unblinded
             }
-            Change::Withdraw { session } => StudyEventKind::SessionWithdrawn { session },
+            Change::Withdraw { session } => {
+                let withdrawn = EventKind::Withdrawn { reason: signature.reason.clone() };
+                sessions.push((session, vec![self.next_event(session, withdrawn).await?]));
+                StudyEventKind::SessionWithdrawn { session }
+            }
         };
 
         let event = StudyEvent { number: state.events + 1, way, signature, wall: self.clock.wall(), kind };
@@ -223,17 +227,19 @@ impl Studies {
         study: &StoredStudy,
         reason: &str,
     ) -> Result<Vec<(SessionId, Vec<Event>)>, ConductError> {
-        let at = self.clock.now();
-        let wall = self.clock.wall();
         let mut unblindings = Vec::new();
-
         for enrolled in study.sessions.iter().filter(|enrolled| !enrolled.unblinded) {
-            let events = self.reader().events(enrolled.session).await?;
-            let number = events.last().map_or(0, |(_, event)| event.number) + 1;
             let kind = EventKind::Unblinded { reason: reason.to_owned(), emergency: false };
-            unblindings.push((enrolled.session, vec![Event { number, by: Role::Researcher, at, wall, kind }]));
+            unblindings.push((enrolled.session, vec![self.next_event(enrolled.session, kind).await?]));
         }
         Ok(unblindings)
+    }
+
+    /// The next event of a session that nobody is at.
+    async fn next_event(&self, session: SessionId, kind: EventKind) -> Result<Event, ConductError> {
+        let events = self.reader().events(session).await?;
+        let number = events.last().map_or(0, |(_, event)| event.number) + 1;
+        Ok(Event { number, by: Role::Researcher, at: self.clock.now(), wall: self.clock.wall(), kind })
     }
 }
 

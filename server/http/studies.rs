@@ -79,7 +79,7 @@ impl StudyPage {
 }
 
 /// What becomes of a place, in words.
-pub(super) const fn replacement(rule: &Replacement) -> &'static str {
+pub(super) const fn replacement(rule: Replacement) -> &'static str {
     match rule {
         Replacement::Keep => "its place stays used; nobody is added",
         Replacement::SamePlace => "the next session takes its place and order",
@@ -88,7 +88,7 @@ pub(super) const fn replacement(rule: &Replacement) -> &'static str {
 }
 
 /// Whether a surgeon may have a second session, in words.
-pub(super) const fn repetition(rule: &Repetition) -> &'static str {
+pub(super) const fn repetition(rule: Repetition) -> &'static str {
     match rule {
         Repetition::Refuse => "refused",
         Repetition::NextSpare => "takes the next place; a spare place opens",

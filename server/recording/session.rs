@@ -50,7 +50,7 @@ pub enum AnyRecording {
     /// Mosaics.
     Mosaic(Box<Recording>),
     /// Pictures of the view.
-    View(ViewRecording),
+    View(Box<ViewRecording>),
 }
 
 impl AnyRecording {
@@ -60,7 +60,7 @@ impl AnyRecording {
     /// When there is none, it is of another version, or its description is invalid or damaged.
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         match Recording::open(folder) {
-            Err(RecordingError::View(_)) => ViewRecording::open(folder).map(Self::View),
+            Err(RecordingError::View(_)) => ViewRecording::open(folder).map(Box::new).map(Self::View),
             opened => opened.map(Box::new).map(Self::Mosaic),
         }
     }

@@ -111,6 +111,7 @@ pub struct Participant {
 
 /// A session in a list. Says nothing of policies.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[allow(clippy::struct_excessive_bools, reason = "facts that the list shows each by itself")]
 pub struct SessionLine {
     /// Session.
     pub session: SessionId,

@@ -81,7 +81,7 @@ async fn a_correction_stands_beside_the_original_on_the_page_and_in_the_export()
     assert!(detail.corrections[1].about.starts_with("Answer on setting 1: With this setting"), "{detail:?}");
     let sus = detail.answers.iter().find(|line| line.key == usability).unwrap();
     assert_eq!((sus.sus_score, sus.scores[0].value), (Some(67.5), Some(100.0)), "as given, and as corrected");
-    let timeline = trial.conductor.timeline(session, 10).await.unwrap();
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
     assert_eq!(timeline.comments[1].note.as_deref(), Some("said of the monitor"));
     assert!(detail.log.iter().any(|line| line.text == "Answer corrected: the surgeon said so on the phone"));
 

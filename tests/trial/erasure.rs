@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use parfocal::conductor::ConductError;
-use parfocal::ids::SessionId;
+use parfocal::ids::{IdempotencyKey, SessionId};
 use parfocal::store::backup::backup;
 use parfocal::store::export::export;
 use parfocal::store::export::verify::verify;
@@ -35,7 +35,7 @@ fn holding(folder: &Path, text: &str) -> Vec<PathBuf> {
 
 const NOWHERE: [PathBuf; 0] = [];
 
-fn erasure(subject: Erasable, record: impl ToString) -> NewErasure {
+fn erasure(subject: Erasable, record: IdempotencyKey) -> NewErasure {
     NewErasure { subject, record: record.to_string(), reason: "names a patient".to_owned() }
 }
 
@@ -97,7 +97,7 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
     }
 
     // The records stay, each with when and by whom.
-    let timeline = trial.conductor.timeline(session, 10).await.unwrap();
+    let timeline = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap();
     let erased: Vec<_> = timeline.comments.iter().filter(|comment| comment.erased.is_some()).collect();
     assert_eq!((timeline.comments.len(), erased.len(), erased[0].key), (61, 1, comment.key));
     let detail = trial.conductor.session_detail(session).await.unwrap();

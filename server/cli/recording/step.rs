@@ -15,7 +15,7 @@ use crate::recording::Recording;
 pub struct Arguments {
     /// Folder of the recording.
     folder: PathBuf,
-    /// The policy: a name of `parfocal policies`, or file:PATH of a TorchScript file.
+    /// The policy: a name of `parfocal policies`, or `file:PATH` of a TorchScript file.
     #[arg(long, value_name = "NAME")]
     policy: String,
     /// The table to write: a row for each frame.

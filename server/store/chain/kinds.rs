@@ -227,15 +227,26 @@ const STUDY_SESSION: Kind = Kind {
 };
 
 /// Every kind but telemetry, which is sealed in blocks.
-pub const KINDS: [Kind; 14] =
-    [
-        RUN, PARTICIPANT, SESSION, EVENT, COMMENT, ANSWER, DEVICE, ACCESS, CORRECTION, CONSENT, ERASURE, STUDY, STUDY_EVENT,
-        STUDY_SESSION,
-    ];
+pub const KINDS: [Kind; 14] = [
+    RUN,
+    PARTICIPANT,
+    SESSION,
+    EVENT,
+    COMMENT,
+    ANSWER,
+    DEVICE,
+    ACCESS,
+    CORRECTION,
+    CONSENT,
+    ERASURE,
+    STUDY,
+    STUDY_EVENT,
+    STUDY_SESSION,
+];
 
 /// The kind called `name`.
 pub fn kind(name: &str) -> Option<&'static Kind> {
-    static ALL: [Kind; 11] = KINDS;
+    static ALL: [Kind; KINDS.len()] = KINDS;
     ALL.iter().find(|kind| kind.name == name)
 }
 

@@ -95,8 +95,7 @@ impl Reader {
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'completed') AS completed,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'aborted') AS aborted,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'unblinded') AS unblinded,
-                 EXISTS (SELECT 1 FROM study_events AS e
-                     WHERE e.session = m.session AND e.kind = 'session-withdrawn') AS withdrawn
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'withdrawn') AS withdrawn
              FROM study_sessions AS m JOIN sessions AS s USING (session) WHERE m.study = ? ORDER BY s.rowid",
         )
         .bind(study)

@@ -20,7 +20,7 @@ pub(in crate::store) async fn check_studies(snapshot: &Reader) -> Result<Result<
     }
 
     let studies = names.len();
-    Ok(Ok(format!("{studies} studies are as planned; {sessions} of their sessions have the orders committed to")))
+    Ok(Ok(format!("studies as planned: {studies}; sessions with the order of their place: {sessions}")))
 }
 
 /// How many sessions of study `name` were checked, or what is wrong.

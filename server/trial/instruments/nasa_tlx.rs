@@ -30,6 +30,7 @@ fn scales() -> Vec<Scale> {
 }
 
 /// The six ratings and their mean, none where a rating is missing.
+#[must_use]
 pub fn measures(scales: &[Scale], items: &[u8]) -> Vec<Measure> {
     let mut measures = workload::ratings(scales, items);
     let ratings: Vec<Option<f64>> = measures.iter().map(|rating| rating.value).collect();

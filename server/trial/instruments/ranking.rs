@@ -42,10 +42,11 @@ fn shared_ranks(places: &[u8]) -> Vec<Option<f64>> {
     if places.contains(&0) {
         return vec![None; places.len()];
     }
+    // Settings in better places take up the ranks up to `better`; those in this place the next, up to `up_to_it`.
     let rank = |place: &u8| {
         let better = places.iter().filter(|other| *other < place).count();
-        let sharing = places.iter().filter(|other| *other == place).count();
-        Some(better as f64 + (sharing as f64 + 1.0) / 2.0)
+        let up_to_it = places.iter().filter(|other| *other <= place).count();
+        Some(f64::midpoint(better as f64 + 1.0, up_to_it as f64))
     };
     places.iter().map(rank).collect()
 }

@@ -50,6 +50,7 @@ fn weights(scales: usize, pairs: &[Pair], choices: &[u8]) -> Option<Vec<f64>> {
 
 /// The six ratings and their mean; with pairs also the six weights and the weighted index. What needs a missing item is
 /// missing too.
+#[must_use]
 pub fn measures(scales: &[Scale], pairs: &[Pair], items: &[u8]) -> Vec<Measure> {
     let (gradations, choices) = items.split_at_checked(scales.len()).unwrap_or((items, &[]));
     let mut measures = workload::ratings(scales, gradations);

@@ -7,6 +7,7 @@ use super::measure::{Measure, given};
 pub const ITEMS: usize = 10;
 
 /// Whether these are points of its items, or a part of them.
+#[must_use]
 pub fn fits(items: &[u8]) -> bool {
     items.len() == ITEMS && items.iter().all(|item| *item <= 5) && items.iter().any(|item| *item > 0)
 }
@@ -24,6 +25,7 @@ pub fn score(items: &[u8]) -> Option<f64> {
 }
 
 /// The items and the score.
+#[must_use]
 pub fn measures(items: &[u8]) -> Vec<Measure> {
     let item = |(number, &point): (usize, &u8)| {
         Measure::item(format!("item-{number}"), format!("Item {number}"), given(point))

@@ -23,8 +23,8 @@ pub struct Lists {
     definition_sha256: String,
     /// What all of it was drawn from.
     seed: Seed,
-    /// The lists, by site and then by protocol, in the definition's order.
-    lists: Vec<List>,
+    /// Each list, by site and then by protocol, in the definition's order.
+    each: Vec<List>,
 }
 
 /// The list of a site and a protocol.
@@ -64,14 +64,14 @@ impl Lists {
             study: definition.name.as_str().to_owned(),
             definition_sha256: definition.sha256(),
             seed,
-            lists: lists.collect(),
+            each: lists.collect(),
         }
     }
 
     /// Place `number`, from 1, of the list of `site` and `protocol`.
     #[must_use]
     pub fn place(&self, site: &str, protocol: &str, number: usize) -> Option<&Place> {
-        let list = self.lists.iter().find(|list| list.site == site && list.protocol == protocol)?;
+        let list = self.each.iter().find(|list| list.site == site && list.protocol == protocol)?;
         list.places.get(number.checked_sub(1)?)
     }
 
@@ -85,7 +85,7 @@ impl Lists {
             self.seed.to_hex(),
         );
 
-        for list in &self.lists {
+        for list in &self.each {
             let _ = writeln!(text, "list {} {} {}", list.site, list.protocol, list.algorithm);
             for (place, number) in list.places.iter().zip(1..) {
                 let _ = writeln!(text, "place {number} {}", in_words(&place.schedule));
@@ -106,11 +106,11 @@ impl List {
     #[must_use]
     pub fn draw(site: &str, protocol: &Protocol, places: usize, seed: Seed) -> Self {
         let algorithm = protocol.order.algorithm();
-        let size = algorithm.set_size(protocol.policies.len());
+        let in_a_set = algorithm.set_size(protocol.policies.len());
 
         let place = |place: usize| {
-            let seed = set_seed(seed, site, &protocol.name, place / size + 1);
-            let index = place % size;
+            let seed = set_seed(seed, site, &protocol.name, place / in_a_set + 1);
+            let index = place % in_a_set;
             let order = algorithm.draw(seed, protocol.policies.len(), protocol.repeats, index);
             let schedule = order.into_iter().map(|policy| protocol.policies[policy].clone()).collect();
             Place { seed, index, schedule }

@@ -1,7 +1,5 @@
 //! Where a study stands, and what may be done to it then.
 
-use std::collections::BTreeSet;
-
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -50,8 +48,6 @@ pub struct StudyState {
     pub commitment: Option<String>,
     /// When it was locked, by the wall clock.
     pub locked: Option<Timestamp>,
-    /// Sessions whose surgeon withdrew.
-    pub withdrawn: BTreeSet<SessionId>,
     /// How many events it has.
     pub events: u32,
 }
@@ -73,9 +69,10 @@ impl StudyState {
     /// The state after `events`.
     #[must_use]
     pub fn after(events: &[StudyEvent]) -> Self {
-        let mut state =
-            Self { stage: Stage::Planned, commitment: None, locked: None, withdrawn: BTreeSet::new(), events: 0 };
-        events.iter().for_each(|event| state.apply(event));
+        let mut state = Self { stage: Stage::Planned, commitment: None, locked: None, events: 0 };
+        for event in events {
+            state.apply(event);
+        }
         state
     }
 
@@ -95,10 +92,7 @@ impl StudyState {
                 self.locked = Some(event.wall);
             }
             StudyEventKind::Unblinded => self.stage = Stage::Unblinded,
-            StudyEventKind::SessionWithdrawn { session } => {
-                self.withdrawn.insert(*session);
-            }
-            StudyEventKind::SessionUnblinded { .. } => {}
+            StudyEventKind::SessionWithdrawn { .. } | StudyEventKind::SessionUnblinded { .. } => {}
         }
     }
 
@@ -119,7 +113,7 @@ impl StudyState {
             Change::Close => self.check_close(),
             Change::Lock { despite_outstanding } => self.check_lock(circumstances, despite_outstanding),
             Change::Unblind => self.check_unblind(signature, circumstances.definition),
-            Change::Withdraw { session } => self.check_withdrawal(session, circumstances.sessions),
+            Change::Withdraw { session } => self.check_withdrawal(session, circumstances),
         }
     }
 
@@ -186,7 +180,8 @@ impl StudyState {
         check_unblinding_reason(&signature.reason, policies)
     }
 
-    fn check_withdrawal(&self, session: SessionId, sessions: &[Enrolled]) -> Result<(), StudyRefusal> {
+    fn check_withdrawal(&self, session: SessionId, circumstances: StudyCircumstances<'_>) -> Result<(), StudyRefusal> {
+        let StudyCircumstances { sessions, on_screens, .. } = circumstances;
         let enrolled = sessions.iter().find(|enrolled| enrolled.session == session);
         let enrolled = enrolled.ok_or(StudyRefusal::UnknownSession)?;
         let participant = enrolled.participant.clone();
@@ -194,10 +189,10 @@ impl StudyState {
         if matches!(self.stage, Stage::Locked | Stage::Unblinded) {
             return Err(StudyRefusal::Locked);
         }
-        if enrolled.status == SessionStatus::UnderWay {
+        if enrolled.status == SessionStatus::UnderWay || on_screens == Some(session) {
             return Err(StudyRefusal::SessionUnderWay { participant });
         }
-        if self.withdrawn.contains(&session) {
+        if enrolled.withdrawn {
             return Err(StudyRefusal::AlreadyWithdrawn { participant });
         }
         Ok(())

@@ -156,10 +156,11 @@ async fn the_researcher_plays_a_recording_with_its_timeline_and_comments() {
     page.to_top().await;
     shoot(page, "researcher-6-playback").await;
 
-    // A place on the drawing, and finer pictures.
+    // A place on the drawing, near its left end, and finer pictures.
     let there = page.area("#timeline").await;
-    tap(page, there.left + 44.0, there.top + 230.0).await;
-    until("the playhead to be at the start", || async { playhead(page).await < 0.5 }).await;
+    tap(page, there.left + 200.0, there.top + 230.0).await;
+    until("the playhead to be there", || async { playhead(page).await < expected }).await;
+    page.sees("#player-values", "1, ").await;
     page.select("#player-size", "half").await;
     until("a fine picture", || async { picture(page).await.0 == 1024 }).await;
 

@@ -248,7 +248,10 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
     assert!(server.end(Signal::TERM));
 
     let (done, said) = study(&new, data.path());
-    assert!(done && said.starts_with("scope-2026: planned, 0 of 2 planned surgeons' sessions made"), "{said}");
+    assert!(
+        done && said.starts_with("scope-2026: planned; sessions: 0; surgeons planned here: 2; Two settings"),
+        "{said}"
+    );
     let (done, said) = study(&new, data.path());
     assert!(!done && said.contains("there is a study 'scope-2026' already"), "{said}");
 
@@ -286,5 +289,8 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
 
     let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(data.path()).output().unwrap();
     let said = String::from_utf8(verified.stdout).unwrap();
-    assert!(verified.status.success() && said.contains("1 studies are as planned; 1 of their sessions"), "{said}");
+    assert!(
+        verified.status.success() && said.contains("studies as planned: 1; sessions with the order of their place: 1"),
+        "{said}"
+    );
 }

@@ -1,6 +1,6 @@
 //! A study's definition: every field wrong in turn is named with its line and key.
 
-use parfocal::trial::study::definition::Definition;
+use parfocal::trial::study::definition::{Definition, Site};
 use sha2::{Digest, Sha256};
 
 use super::{PROTOCOL, definition, protocol};
@@ -20,7 +20,7 @@ fn a_definition_is_read_and_has_the_hash_of_its_file() {
     let text = definition();
     let read = Definition::parse(&text, "study.toml", &[protocol()]).unwrap();
     assert_eq!(read.name.as_str(), "scope-2026");
-    assert_eq!(read.sites.iter().map(|site| site.places()).collect::<Vec<_>>(), [4, 3]);
+    assert_eq!(read.sites.iter().map(Site::places).collect::<Vec<_>>(), [4, 3]);
     assert_eq!(read.sha256(), hex::encode(Sha256::digest(text.as_bytes())));
     assert_eq!(&*read.source, text);
 }

@@ -117,7 +117,9 @@ async fn whatever_is_changed_of_a_study_in_a_database_is_found() {
 
     let checks = verify_database(folder.path(), None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
-    assert!(said(&checks, "studies").unwrap().contains("1 studies are as planned; 3 of their sessions"));
+    assert!(
+        said(&checks, "studies").unwrap().contains("studies as planned: 1; sessions with the order of their place: 3")
+    );
 
     let database = folder.path().join("parfocal.db");
     for (sql, check, expected) in TAMPERED {

@@ -216,9 +216,9 @@ function draw() {
   const drawn = drawTimeline(figure, timeline, { scale, withPath, policies, recorded, choose, jump });
   pointOut = drawn.pointOut;
 
-  const hasMetric = timeline.points.some(({ metric }) => metric != null);
-  byId("metric").hidden = !hasMetric;
-  const moveOnMetric = hasMetric ? drawMetric(byId("metric"), timeline, scale) : () => {};
+  const showsMetric = hasMetric(timeline);
+  byId("metric").hidden = !showsMetric;
+  const moveOnMetric = showsMetric ? drawMetric(byId("metric"), timeline, scale) : () => {};
   movePlayhead = (seconds) => {
     drawn.movePlayhead(seconds);
     moveOnMetric(seconds);
@@ -228,12 +228,22 @@ function draw() {
   if (chosen !== null) pointOut(chosen);
 }
 
+/**
+ * Whether to draw the metric: beside a recording that is played, if a policy had any.
+ *
+ * @param {Api.Timeline} shown
+ */
+function hasMetric({ points }) {
+  return player !== null && points.some(({ metric }) => metric != null);
+}
+
 /** @param {Api.Timeline} shown */
-function showKey({ points, pauses }) {
+function showKey(shown) {
+  const { points, pauses } = shown;
   byId("key-path").hidden = !withPath;
   byId("key-optimum").hidden = !(withPath && points.some(({ optimal }) => optimal != null));
   byId("key-pause").hidden = pauses.length === 0;
-  byId("key-metric").hidden = !points.some(({ metric }) => metric != null);
+  byId("key-metric").hidden = !hasMetric(shown);
   byId("key-recorded").hidden = player === null;
 }
 

@@ -64,7 +64,7 @@ async function lock() {
     {
       heading: "Lock the study",
       consequence:
-        "No session can be made any more, and no withdrawal recorded. What still arrives is kept and marked late, " +
+        "No session can be made any more. What still arrives is kept and marked late, " +
         `but does not count. This cannot be undone.${still}`,
       confirm: outstanding === 0 ? undefined : "Lock anyway",
       go: "Lock",
@@ -97,7 +97,7 @@ function withdraw(button) {
     {
       heading: `${participant} withdrew`,
       consequence:
-        "What becomes of the place is stated in the plan. The surgeon’s words stay in the database.",
+        "What becomes of the place is stated in the plan. From now on the session’s data stay out of exports.",
       go: "Record the withdrawal",
       danger: true,
     },

@@ -37,8 +37,11 @@ export function drawWorkload(answer, heading, changed) {
     const item = scales.length + index;
     const names = [first, second].map((place) => answer.scales[place]?.title ?? "");
     const choices = drawWords(`${answer.question.id}-${item}`, names, (point) => choose(item, point), "pair");
-    const legend = make("legend", { className: "visually-hidden" }, `${names[0]} or ${names[1]}`);
-    return { element: make("fieldset", {}, legend, choices.element, gap()), show: choices.check };
+    const label = `${names[0]} or ${names[1]}`;
+    return {
+      element: make("fieldset", { "aria-label": label }, choices.element, gap()),
+      show: choices.check,
+    };
   });
 
   const items = [...scales, ...pairs];

@@ -8,7 +8,7 @@ use std::path::Path;
 use ::csv::StringRecord;
 use serde_json::Value;
 
-use super::files::{cells, csv, format, json, session_cell};
+use super::files::{cells, csv, json, session_cell};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, Found, FoundRow, Walk};
 use crate::store::chain::{
@@ -132,12 +132,11 @@ fn records(folder: &Path, format: u64) -> Result<BTreeMap<(&'static str, String)
             let cell = |row: &Cells, column: &str| row.get(column).cloned().unwrap_or_default();
             let key = match kind.name {
                 "run" => cell(&row, "run"),
-                "session" => cell(&row, "session"),
+                "session" | "study-session" => cell(&row, "session"),
                 "event" => format!("{}/{}", cell(&row, "session"), cell(&row, "number")),
                 "device" | "access" | "correction" | "consent" | "erasure" => cell(&row, "number"),
                 "study" => cell(&row, "study"),
                 "study-event" => format!("{}/{}", cell(&row, "study"), cell(&row, "number")),
-                "study-session" => cell(&row, "session"),
                 _ => cell(&row, "key"),
             };
 
