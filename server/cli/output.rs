@@ -22,3 +22,8 @@ pub fn bar(total: usize, done: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} poses, {eta} left {msg}");
     style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
 }
+
+/// `count` poses, in words.
+pub fn poses(count: usize) -> String {
+    format!("{count} {}", if count == 1 { "pose" } else { "poses" })
+}

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use sha2::{Digest, Sha256};
 
-use super::{info, poses};
+use super::info;
 use crate::camera::recorded::{LEAST_SIDE, MOST_POSES};
-use crate::cli::output::{Failure, bar, print};
+use crate::cli::output::{Failure, bar, poses, print};
 use crate::notices::tell;
 use crate::scans::benchmark::SEED;
 use crate::scans::recording::{Cut, from_stack};

@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::poses;
-use crate::cli::output::{Failure, bar, print};
+use crate::cli::output::{Failure, bar, poses, print};
 use crate::scans::recording::{Imported, import};
 
 /// Arguments of `parfocal scan import`.

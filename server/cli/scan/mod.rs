@@ -38,8 +38,3 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Action::FromStack(arguments) => from_stack::run(arguments),
     }
 }
-
-/// `count` poses, in words.
-fn poses(count: usize) -> String {
-    format!("{count} {}", if count == 1 { "pose" } else { "poses" })
-}

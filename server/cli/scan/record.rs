@@ -8,11 +8,10 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
-use super::poses;
 use crate::camera::recorded::{FORMAT, Header, MOST_POSES, Order, Recording, VERSION};
 use crate::camera::{self, CameraSettings, calibration};
 use crate::cli::interrupt::{Interrupt, let_lenses_go_first_beside_an_interrupt};
-use crate::cli::output::{Failure, bar, print};
+use crate::cli::output::{Failure, bar, poses, print};
 use crate::clock::SystemClock;
 use crate::imaging::{Calibration, Reconstructor};
 use crate::lens;

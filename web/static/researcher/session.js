@@ -119,7 +119,11 @@ function listComments(comments) {
     const where = comment.setting ? `Setting ${comment.setting}` : "";
     return make(
       "button",
-      { type: "button", onclick: () => jump(index), onfocus: () => choose(index) },
+      {
+        type: "button",
+        onclick: () => jump(index),
+        onfocus: (/** @type {FocusEvent} */ event) => reach(event, index),
+      },
       make("span", { className: "when" }, clockText(comment.seconds)),
       make("span", { className: "muted" }, where),
       make("span", { className: "said" }, said, late && " ", late),
@@ -180,6 +184,17 @@ function choose(index) {
   // While the recording plays, the page stays where its picture is.
   if (player) scrollWithin(byId("comment-list"), line);
   else line.scrollIntoView({ block: "nearest" });
+}
+
+/**
+ * Points out a comment that the keyboard has come to. A tap does so when it ends: to scroll while
+ * it lasts would move the comment from below the finger.
+ *
+ * @param {FocusEvent} event
+ * @param {number} index
+ */
+function reach({ currentTarget }, index) {
+  if (currentTarget instanceof Element && currentTarget.matches(":focus-visible")) choose(index);
 }
 
 /**
