@@ -320,7 +320,7 @@ impl Browser {
             match text {
                 Ok(text) => return text,
                 // The page has drawn it anew meanwhile.
-                Err(error) if error.is_stale_element_reference() => {}
+                Err(error) if has_left(&error) => {}
                 Err(error) => panic!("{css}: {error}"),
             }
         }
@@ -396,4 +396,10 @@ impl Browser {
 async fn area(element: &Element) -> Area {
     let (left, top, width, height) = element.rectangle().await.unwrap();
     Area { left, top, width, height }
+}
+
+/// Whether an element has left the page since it was found. While a page is loaded anew, the driver says so in words
+/// of the browser's own.
+fn has_left(error: &CmdError) -> bool {
+    error.is_stale_element_reference() || error.to_string().contains("does not belong to the document")
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use parfocal::conductor::{ConductError, Studies, StudySite};
 use parfocal::ids::SessionId;
+use parfocal::store::export::{ExportError, export};
 use parfocal::store::{Reader, StoreError};
 use parfocal::trial::action::Action;
 use parfocal::trial::remark::{NewComment, Origin, Said};
@@ -140,6 +141,8 @@ async fn sessions_take_the_places_of_their_site_in_turn_and_a_used_up_list_refus
     let study = detail(&trial).await;
     let first = study.study_sessions[0].session;
     change(&trial, Change::Withdraw { session: first }).await.unwrap();
+    let refused = export(&trial.recorder(), first, &folder.path().join("withdrawn"), false).await.unwrap_err();
+    assert!(matches!(refused, ExportError::Withdrawn { .. }), "{refused}");
     assert!(refusal(change(&trial, Change::Withdraw { session: first }).await).contains("is recorded already"));
     assert!(refusal(prepare(&trial, PARTICIPANT, "london").await).contains("withdrew from the study"));
     whole(&mut trial, "S-04", "leeds").await;
