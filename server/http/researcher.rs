@@ -270,6 +270,7 @@ struct Unblind {
     despite_outstanding: bool,
     /// Who does it: needed for a session of a study that is still blinded.
     #[serde(default)]
+    #[schema(pattern = r"\S")]
     person: Option<String>,
 }
 
