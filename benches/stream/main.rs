@@ -2,7 +2,7 @@
 //! of pictures of each size, over a slow link, and beside four processes that keep every processor busy, with real-time
 //! priority and without.
 //!
-//! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` for the rows of that name.
+//! `cargo bench --bench stream`, or `cargo bench --bench stream -- busy` (or `recorded`) for the rows of that name.
 //! One table; what is worth comparing is compared within one run. Ages are exact: the server's
 //! record of each frame's exposure and the viewers' clock are the same monotonic clock.
 
@@ -14,6 +14,7 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use parfocal::clock::{Clock, SystemClock};
+use parfocal::recording::Recording;
 use process::{Busy, Server, Usage};
 use sqlx::{Connection, SqliteConnection};
 use viewer::Seen;
@@ -41,6 +42,8 @@ struct Scenario {
 enum Beside {
     /// Nothing of ours.
     Nothing,
+    /// A recording of every mosaic, for `RECORDED`, of a camera at 25 frames a second.
+    Recording,
     /// Processes that keep every processor busy, while a policy drives the lens; and whether the server may have
     /// real-time priority where this user may.
     Busy { real_time: bool },
@@ -56,15 +59,21 @@ enum Camera {
 const WITHOUT: Beside = Beside::Busy { real_time: false };
 const WITH: Beside = Beside::Busy { real_time: true };
 
+/// The row with a recording is measured for so long.
+const RECORDED: Duration = Duration::from_mins(1);
+
 /// Processes that keep the processors busy.
 const BUSY: usize = 4;
+
+/// Bytes of a mosaic whose samples are packed, four of 10 bit into five bytes.
+const PACKED: f64 = 2048.0 * 1088.0 * 1.25;
 
 /// Screens on which a picture of each size is as wide as it has pixels.
 const CELL: u32 = 512;
 const HALF: u32 = 1024;
 const FULL: u32 = 2048;
 
-const SCENARIOS: [Scenario; 15] = [
+const SCENARIOS: [Scenario; 16] = [
     Scenario {
         name: "phantom",
         camera: Camera::Phantom,
@@ -122,6 +131,14 @@ const SCENARIOS: [Scenario; 15] = [
         beside: Beside::Nothing,
     },
     Scenario {
+        name: "the same, recorded",
+        camera: Camera::Phantom,
+        viewers: 4,
+        screen: FULL,
+        link: None,
+        beside: Beside::Recording,
+    },
+    Scenario {
         name: "full, 4 Mbit/s",
         camera: Camera::Phantom,
         viewers: 1,
@@ -163,10 +180,19 @@ const SCENARIOS: [Scenario; 15] = [
 struct Row {
     first_answer: Duration,
     usage: Usage,
-    frames: usize,
+    frames_a_second: f64,
     bytes: usize,
     ages: Vec<f64>,
     latencies: Vec<f64>,
+    recorded: Option<Recorded>,
+}
+
+/// What became of a recording.
+struct Recorded {
+    frames: usize,
+    missing: u64,
+    seconds: f64,
+    bytes: u64,
 }
 
 #[tokio::main(flavor = "multi_thread", worker_threads = 2)]
@@ -185,8 +211,13 @@ async fn main() {
         "", "", "", "", "p50 / p99", "p50 / p99", "loop / imaging / serving", "MB", "ms"
     );
 
-    let busy_only = std::env::args().any(|argument| argument == "busy");
-    for scenario in SCENARIOS.iter().filter(|scenario| !busy_only || scenario.beside != Beside::Nothing) {
+    let asks_for = |word: &str| std::env::args().any(|argument| argument == word);
+    let wanted = |beside: Beside| match beside {
+        Beside::Nothing => !asks_for("busy") && !asks_for("recorded"),
+        Beside::Recording => !asks_for("busy"),
+        Beside::Busy { .. } => !asks_for("recorded"),
+    };
+    for scenario in SCENARIOS.iter().filter(|scenario| wanted(scenario.beside)) {
         report(scenario, &measure(scenario).await);
     }
 }
@@ -198,10 +229,19 @@ async fn measure(scenario: &Scenario) -> Row {
         Camera::Picture => process::picture(&folder),
     };
 
-    let mut server = Server::start(&camera, scenario.beside != WITHOUT);
+    let recording = scenario.beside == Beside::Recording;
+    let frames_a_second = if recording { 25 } else { 50 };
+    let measured = if recording { RECORDED } else { MEASURED };
+
+    let mut server = Server::start(&camera, frames_a_second, scenario.beside != WITHOUT);
     let first_answer = server.first_answer().await;
     let busy = match scenario.beside {
         Beside::Nothing => None,
+        Beside::Recording => {
+            server.put_in_charge("parfocal").await;
+            server.record(true).await;
+            None
+        }
         Beside::Busy { .. } => {
             server.put_in_charge("mgm-hill-climber").await;
             Some(Busy::start(BUSY))
@@ -215,7 +255,7 @@ async fn measure(scenario: &Scenario) -> Row {
 
     let watch = |number| {
         let screen = if number == 0 { scenario.screen } else { CELL };
-        tokio::spawn(viewer::watch(address, server.key.clone(), screen, WARM_UP + MEASURED))
+        tokio::spawn(viewer::watch(address, server.key.clone(), screen, WARM_UP + measured))
     };
     let viewers: Vec<_> = (0..scenario.viewers).map(watch).collect();
 
@@ -223,7 +263,7 @@ async fn measure(scenario: &Scenario) -> Row {
     tokio::time::sleep(WARM_UP).await;
     let from = SystemClock.now().as_nanos();
     let before = server.usage();
-    tokio::time::sleep(MEASURED).await;
+    tokio::time::sleep(measured).await;
     let to = SystemClock.now().as_nanos();
     let after = server.usage();
 
@@ -234,20 +274,38 @@ async fn measure(scenario: &Scenario) -> Row {
     }
     seen.retain(|seen| (from..to).contains(&seen.at));
 
-    let steps = steps(server.end()).await;
+    if recording {
+        server.record(false).await;
+    }
+    let data = server.end();
+    let steps = steps(&data).await;
     let during = |exposed: u64| (from..to).contains(&exposed);
     Row {
         first_answer,
-        usage: after.since(&before, MEASURED),
-        frames: seen.len() / scenario.viewers.max(1),
+        usage: after.since(&before, measured),
+        frames_a_second: (seen.len() / scenario.viewers.max(1)) as f64 / measured.as_secs_f64(),
         bytes: seen.iter().map(|seen| seen.bytes).sum::<usize>() / seen.len().max(1),
         ages: sorted(seen.iter().filter_map(|seen| Some((seen.at - steps.get(&seen.frame)?.0) as f64 / 1e6))),
         latencies: sorted(steps.values().filter(|step| during(step.0)).map(|step| step.1 / 1e3)),
+        recorded: recording.then(|| recorded(&data)),
+    }
+}
+
+/// The one recording in a data folder.
+fn recorded(data: &tempfile::TempDir) -> Recorded {
+    let mut folders = std::fs::read_dir(data.path().join("recordings")).expect("recordings");
+    let folder = folders.next().expect("a recording").expect("its name").path();
+    let recording = Recording::open(&folder).expect("a whole recording");
+    Recorded {
+        frames: recording.rows().len(),
+        missing: recording.missing(),
+        seconds: recording.seconds(),
+        bytes: recording.bytes(),
     }
 }
 
 /// End of exposure (nanoseconds) and latency (microseconds) of each frame, from the server's own records.
-async fn steps(data: tempfile::TempDir) -> HashMap<u64, (u64, f64)> {
+async fn steps(data: &tempfile::TempDir) -> HashMap<u64, (u64, f64)> {
     let address = format!("sqlite://{}", data.path().join("parfocal.db").display());
     let mut database = SqliteConnection::connect(&address).await.expect("the database");
     let rows: Vec<(i64, i64, i64)> = sqlx::query_as("SELECT frame, exposed_ns, latency_micros FROM telemetry")
@@ -267,7 +325,7 @@ fn report(scenario: &Scenario, row: &Row) {
         "{:<18} {:>7} {:>6.1} {:>6.1} {:>13} {:>13} {:>26} {:>6} {:>7}",
         scenario.name,
         scenario.viewers,
-        row.frames as f64 / MEASURED.as_secs_f64(),
+        row.frames_a_second,
         row.bytes as f64 / 1e3,
         pair(&row.ages),
         pair(&row.latencies),
@@ -275,6 +333,13 @@ fn report(scenario: &Scenario, row: &Row) {
         cores.resident_mb,
         row.first_answer.as_millis(),
     );
+    if let Some(Recorded { frames, missing, seconds, bytes }) = row.recorded {
+        let share = bytes as f64 / (PACKED * frames as f64);
+        println!(
+            "  recorded {frames} frames in {seconds:.1} s, {missing} missing, {:.1} MB/s, {share:.2} of packed 10 bit",
+            bytes as f64 / seconds / 1e6
+        );
+    }
 }
 
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {

@@ -53,12 +53,14 @@ fn program(preferred: bool) -> Command {
 }
 
 impl Server {
-    /// A server with `camera` at 50 frames a second, with real-time priority if it is to be `preferred`.
-    pub fn start(camera: &str, preferred: bool) -> Self {
+    /// A server with `camera` at so many frames a second, with real-time priority if it is to be `preferred`.
+    pub fn start(camera: &str, frames_a_second: u32, preferred: bool) -> Self {
         let data = tempfile::tempdir().expect("a folder");
         let started = SystemClock.now();
         let mut process = program(preferred)
-            .args(["serve", "--bind", "127.0.0.1:0", "--fps", "50", "--seed", "1", "--camera", camera, "--data-dir"])
+            .args(["serve", "--bind", "127.0.0.1:0", "--seed", "1", "--camera", camera])
+            .args(["--fps", &frames_a_second.to_string()])
+            .arg("--data-dir")
             .arg(data.path())
             .env("RUST_LOG", "error")
             .stdout(Stdio::piped())
@@ -75,10 +77,19 @@ impl Server {
 
     /// Has `policy` drive the lens.
     pub async fn put_in_charge(&self, policy: &str) {
+        self.order("focus", &serde_json::json!({ "policy": policy })).await;
+    }
+
+    /// Starts or ends a recording of the mosaics.
+    pub async fn record(&self, record: bool) {
+        self.order("recording", &serde_json::json!({ "record": record })).await;
+    }
+
+    async fn order(&self, path: &str, order: &serde_json::Value) {
         let client = reqwest::Client::builder().no_proxy().build().expect("a client");
-        let request = client.post(format!("http://{}/api/operator/focus", self.address));
-        let request = request.bearer_auth(&self.key).json(&serde_json::json!({ "policy": policy }));
-        request.send().await.and_then(reqwest::Response::error_for_status).expect("done");
+        let request = client.post(format!("http://{}/api/operator/{path}", self.address));
+        let answer = request.bearer_auth(&self.key).json(order).send().await;
+        answer.and_then(reqwest::Response::error_for_status).expect("done");
     }
 
     /// From the start of the process to its first answer.
