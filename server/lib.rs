@@ -32,6 +32,7 @@ pub mod live;
 pub mod store;
 
 pub mod conductor;
+pub mod package;
 
 pub mod playback;
 pub mod recorder;

@@ -17,9 +17,15 @@ pub fn print(text: &str) -> Result<(), Failure> {
 
 /// A bar over `total` poses, `done` of which are done.
 pub fn bar(total: usize, done: usize) -> ProgressBar {
-    let bar = ProgressBar::new(total as u64).with_position(done as u64);
+    let bar = steps(total, "poses").with_position(done as u64);
     bar.reset_eta();
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} poses, {eta} left {msg}");
+    bar
+}
+
+/// A bar over `total` of what `name` calls them.
+pub fn steps(total: usize, name: &str) -> ProgressBar {
+    let bar = ProgressBar::new(total as u64);
+    let style = ProgressStyle::with_template(&format!("{{bar:30}} {{pos}}/{{len}} {name}, {{eta}} left {{msg}}"));
     style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style))
 }
 

@@ -1,4 +1,5 @@
-//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, and shows where it stands.
+//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, shows where it stands, and joins
+//! what its sites exported.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -9,11 +10,13 @@ use getrandom::SysRng;
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
+use super::export::join;
 use super::library::protocols;
 use super::output::{Failure, print};
 use crate::autofocus::Registry;
 use crate::clock::SystemClock;
 use crate::conductor::{Studies, StudyDetail};
+use crate::package::{self, Source};
 use crate::store::{Reader, StoreError, StoredStudy};
 use crate::trial::study::signature::{Signature, Way};
 use crate::trial::study::state::Change;
@@ -37,6 +40,8 @@ enum Action {
     Lock(Lock),
     /// Print where a study stands, also while a server runs; without a name, all studies.
     Show(Show),
+    /// Join the exports of several sites into one package, after verifying each.
+    Merge(Merge),
 }
 
 #[derive(Debug, Args)]
@@ -97,6 +102,19 @@ struct Show {
     json: bool,
 }
 
+#[derive(Debug, Args)]
+struct Merge {
+    /// What each site exported: folders written by `parfocal export --study`, or exports of single sessions.
+    #[arg(required = true, value_name = "DIR")]
+    sites: Vec<PathBuf>,
+    /// Folder to write: new or empty.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
 /// Does what the arguments say.
 ///
 /// # Errors
@@ -113,6 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 change(&lock.study, Change::Lock { despite_outstanding }, &lock.signed).await
             }
             Action::Show(show) => self::show(show).await,
+            Action::Merge(sites) => merge(sites),
         }
     })
 }
@@ -187,6 +206,20 @@ async fn show(show: &Show) -> Result<(), Failure> {
         None if details.is_empty() => print("no studies yet\n"),
         None => print(&details.iter().map(in_short).collect::<String>()),
     }
+}
+
+/// Joins what the sites exported.
+fn merge(merge: &Merge) -> Result<(), Failure> {
+    let mut sources = Vec::new();
+    let mut left_out = Vec::new();
+    for site in &merge.sites {
+        left_out.extend(package::left_out(site)?);
+        for export in package::exports_of(site)? {
+            sources.push(Source::open(&export)?);
+        }
+    }
+    left_out.sort();
+    join(&sources, &left_out, &merge.out, merge.json)
 }
 
 /// A few lines on a study.

@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::output::{Failure, print};
+use crate::package::{check, is_package};
 use crate::store::export::verify::{Check, Verdict, is_export, verify};
 use crate::store::{Head, verify_database};
 
 /// Arguments of `parfocal verify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Folder that `parfocal export` wrote, a server's data folder, or a database file such as a backup.
+    /// Folder that `parfocal export` or `parfocal study merge` wrote, a server's data folder, or a database file such as
+    /// a backup.
     path: PathBuf,
     /// A head of the chain that was printed, mailed or published: checks that the history up to it is the same.
     #[arg(long, value_name = "NUMBER:HASH")]
@@ -32,7 +34,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(format!("{} does not exist; give an export, a data folder or a database", path.display()).into());
     }
 
-    let (what, checks) = if is_export(path) {
+    let (what, checks) = if is_package(path) {
+        ("package", check(path))
+    } else if is_export(path) {
         ("export", verify(path, arguments.head.as_ref()))
     } else {
         ("database", of_database(path, arguments.head.clone())?)

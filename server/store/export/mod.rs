@@ -23,13 +23,14 @@ pub(super) use self::description::{
 };
 pub use self::destination::ZipStream;
 pub use self::error::ExportError;
-pub use self::table::{Column, TEXTS_IN_CSV, Table, Type};
+pub use self::table::{Column, FORMAT, TEXTS_IN_CSV, Table, Type};
 
 use self::blinded::Blinded;
 use self::description::RecordingRow;
 use self::folder::Folder;
-pub use self::folder::folder_name;
+pub use self::folder::{SUMS, folder_name};
 use self::unblinded::Unblinded;
+pub use self::verify::{read_cells, read_json};
 use super::{Access, Head, Reader, Recorder, StoreError};
 use crate::ids::SessionId;
 

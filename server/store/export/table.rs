@@ -235,7 +235,9 @@ impl Table {
 }
 
 impl Column {
-    fn field(&self) -> Value {
+    /// Its Frictionless description.
+    #[must_use]
+    pub fn field(&self) -> Value {
         let mut field = json!({ "name": self.name, "type": self.kind.name(), "description": self.description });
         if !self.unit.is_empty() {
             field["unit"] = self.unit.into();

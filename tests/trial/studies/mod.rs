@@ -4,6 +4,7 @@ mod blinding;
 mod course;
 mod definition;
 mod evidence;
+mod package;
 mod places;
 
 use std::path::Path;

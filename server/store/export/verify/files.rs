@@ -10,6 +10,10 @@ pub fn text(folder: &Path, file: &str) -> Result<String, String> {
     std::fs::read_to_string(folder.join(file)).map_err(|error| format!("{file}: {error}"))
 }
 
+/// A JSON file of an export.
+///
+/// # Errors
+/// A sentence that names the file, when it cannot be read.
 pub fn json(folder: &Path, file: &str) -> Result<Value, String> {
     serde_json::from_str(&text(folder, file)?).map_err(|error| format!("{file}: {error}"))
 }
@@ -19,7 +23,10 @@ pub fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, Stri
     csv::Reader::from_path(folder.join(file)).map_err(|error| format!("{file}: {error}"))
 }
 
-/// The cells of a column.
+/// The cells of a column of a CSV file of an export.
+///
+/// # Errors
+/// A sentence that names the file, when it cannot be read or has no such column.
 pub fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
     let mut reader = csv(folder, file)?;
     let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?;

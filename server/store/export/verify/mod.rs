@@ -14,6 +14,7 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+pub use files::{cells as read_cells, json as read_json};
 pub use verdict::Verdict;
 
 use crate::store::Head;

@@ -1,0 +1,90 @@
+//! Verification of a package: its checksums, each export in it, and whether its tables are those of the exports.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::error::PackageError;
+use super::source::{SESSIONS, Source, exports_of, left_out};
+use super::writing::{sums, write};
+use crate::store::export::verify::{Check, Verdict};
+use crate::store::export::{SUMS, read_json};
+
+/// Whether `path` is meant to be a package.
+#[must_use]
+pub fn is_package(path: &Path) -> bool {
+    path.join(SESSIONS).is_dir()
+}
+
+/// Checks the package in `folder`: every check, in order.
+#[must_use]
+pub fn check(folder: &Path) -> Vec<Check> {
+    let verdict = |outcome: Result<Verdict, String>| outcome.unwrap_or_else(Verdict::Failed);
+    let checksums = Check { name: "checksums", verdict: verdict(checksums(folder)) };
+    let (sources, sessions) = match sources(folder) {
+        Ok(sources) => {
+            let passed = Verdict::Passed(format!("{} exports are as they were exported", sources.len()));
+            (sources, passed)
+        }
+        Err(error) => (Vec::new(), Verdict::Failed(error.to_string())),
+    };
+    let sessions = Check { name: "sessions", verdict: sessions };
+
+    let tables = match sessions.verdict {
+        Verdict::Failed(_) => Verdict::NotChecked("the exports do not verify".to_owned()),
+        _ => verdict(tables(folder, &sources)),
+    };
+    vec![checksums, sessions, Check { name: "tables", verdict: tables }]
+}
+
+/// The exports of a package, verified.
+fn sources(folder: &Path) -> Result<Vec<Source>, PackageError> {
+    exports_of(folder)?.iter().map(|export| Source::open(export)).collect()
+}
+
+fn checksums(folder: &Path) -> Result<Verdict, String> {
+    let listed = std::fs::read_to_string(folder.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;
+    let found = sums(folder).map_err(|error| error.to_string())?;
+    compare(&listed, &found)?;
+    Ok(Verdict::Passed(format!("{} files are as they were written", listed.lines().count())))
+}
+
+/// Joins the exports again, and compares every file.
+fn tables(folder: &Path, sources: &[Source]) -> Result<Verdict, String> {
+    let package = read_json(folder, "datapackage.json")?;
+    let told = &package["parfocal"];
+    let version = told["version"].as_str().unwrap_or_default();
+    if version != env!("CARGO_PKG_VERSION") {
+        return Ok(Verdict::NotChecked(format!("parfocal {version} joined them; verify with that version")));
+    }
+
+    let left_out = left_out(folder).map_err(|error| error.to_string())?;
+    let again = tempfile::tempdir().map_err(|error| format!("a temporary folder: {error}"))?;
+    let again = again.path().join("package");
+    write(sources, &left_out, &again, &mut |_, _| ()).map_err(|error| error.to_string())?;
+
+    let listed = std::fs::read_to_string(folder.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;
+    let joined = std::fs::read_to_string(again.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;
+    compare(&listed, &joined)?;
+    Ok(Verdict::Passed("joining the exports again makes the same tables".to_owned()))
+}
+
+/// Names the first file in which two lists of checksums differ.
+fn compare(listed: &str, found: &str) -> Result<(), String> {
+    let by_file = |sums: &str| -> BTreeMap<String, String> {
+        sums.lines().filter_map(|line| line.split_once("  ")).map(|(sum, file)| (file.into(), sum.into())).collect()
+    };
+    let listed = by_file(listed);
+    let found = by_file(found);
+
+    for (file, sum) in &listed {
+        match found.get(file) {
+            None => return Err(format!("{file} is missing")),
+            Some(other) if other != sum => return Err(format!("{file} was changed")),
+            Some(_) => (),
+        }
+    }
+    match found.keys().find(|file| !listed.contains_key(*file)) {
+        Some(file) => Err(format!("{file} was added")),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,203 @@
+//! A package being written: beside its place and under another name until it is whole.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::error::PackageError;
+use super::parquet::ParquetFile;
+use super::source::{LeftOut, Source, agree};
+use super::table::{JoinedTable, joined_tables};
+use super::{description, join, r, redcap, spss};
+use crate::files::{sync_folder_of, write_through};
+use crate::store::export::SUMS;
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Summary {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The study.
+    pub study: String,
+    /// Its sites in the package.
+    pub sites: Vec<String>,
+    /// Sessions in the package.
+    pub sessions: usize,
+    /// Sessions of the study that are not.
+    pub left_out: Vec<LeftOut>,
+    /// Whether policies are in it.
+    pub unblinded: bool,
+}
+
+/// Writes the package of `sources` to the folder `out`, which must be new or empty and appears whole or not at all.
+/// `told` hears the number of steps done, and of all, as it goes on.
+///
+/// # Errors
+/// When there is no source, two of them do not belong together, or a file cannot be read or written.
+pub fn write(
+    sources: &[Source],
+    left_out: &[LeftOut],
+    out: &Path,
+    told: &mut dyn FnMut(usize, usize),
+) -> Result<Summary, PackageError> {
+    let first = sources.first().ok_or_else(|| PackageError::Empty(out.to_owned()))?;
+    agree(sources)?;
+    check_new(out)?;
+
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(parent).map_err(PackageError::unwritable(parent))?;
+    let temporary = tempfile::Builder::new().prefix(".parfocal-study-").tempdir_in(parent);
+    let temporary = temporary.map_err(PackageError::unwritable(parent))?;
+
+    fill(sources, left_out, temporary.path(), told)?;
+
+    // A folder that is there and empty gives way.
+    let _ = fs::remove_dir(out);
+    fs::rename(temporary.keep(), out).map_err(PackageError::unwritable(out))?;
+    sync_folder_of(out);
+
+    let sites: BTreeSet<&String> = sources.iter().map(|source| &source.site).collect();
+    Ok(Summary {
+        folder: out.to_owned(),
+        study: first.study.clone(),
+        sites: sites.into_iter().cloned().collect(),
+        sessions: sources.len(),
+        left_out: left_out.to_vec(),
+        unblinded: !first.blinded,
+    })
+}
+
+fn check_new(out: &Path) -> Result<(), PackageError> {
+    let unwritable = PackageError::unwritable(out);
+    if out.is_file() || out.is_dir() && fs::read_dir(out).map_err(unwritable)?.next().is_some() {
+        return Err(PackageError::Exists(out.to_owned()));
+    }
+    Ok(())
+}
+
+fn fill(
+    sources: &[Source],
+    left_out: &[LeftOut],
+    folder: &Path,
+    told: &mut dyn FnMut(usize, usize),
+) -> Result<(), PackageError> {
+    let tables: Vec<JoinedTable> = joined_tables().filter(|table| join::is_there(table, sources)).collect();
+    let steps = sources.len() + tables.len();
+
+    for (done, source) in sources.iter().enumerate() {
+        told(done, steps);
+        copy(source, folder)?;
+    }
+    for (done, table) in (sources.len()..).zip(&tables) {
+        told(done, steps);
+        join_table(table, sources, folder)?;
+    }
+    told(steps, steps);
+
+    beside(&tables, sources, folder)?;
+    let description = description::describe(sources, &tables, left_out);
+    write_file(folder, "datapackage.json", format!("{description:#}\n").as_bytes())?;
+    write_file(folder, SUMS, sums(folder)?.as_bytes())
+}
+
+/// Copies an export, file by file.
+fn copy(source: &Source, folder: &Path) -> Result<(), PackageError> {
+    let place = folder.join(source.place());
+    fs::create_dir_all(&place).map_err(PackageError::unwritable(&place))?;
+    for entry in fs::read_dir(&source.folder).map_err(PackageError::unreadable(&source.folder))? {
+        let from = entry.map_err(PackageError::unreadable(&source.folder))?;
+        let to = place.join(from.file_name());
+        fs::copy(from.path(), &to).map_err(PackageError::unwritable(&to))?;
+    }
+    Ok(())
+}
+
+/// Writes a table as Parquet, and as CSV and for SPSS unless it has a row for each frame.
+fn join_table(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+    let name = table.table.name;
+    let mut parquet = ParquetFile::create(&folder.join(format!("{name}.parquet")), table)?;
+    if table.long {
+        join::rows(table, sources, |cells| parquet.row(cells))?;
+        return parquet.end();
+    }
+
+    let path = folder.join(table.table.file());
+    let file = fs::File::create(&path).map_err(PackageError::unwritable(&path))?;
+    let mut csv = csv::Writer::from_writer(BufWriter::new(file));
+    csv.write_record(table.columns().map(|column| column.name)).map_err(PackageError::unwritable(&path))?;
+    join::rows(table, sources, |cells| {
+        csv.write_record(cells).map_err(PackageError::unwritable(&path))?;
+        parquet.row(cells)
+    })?;
+
+    csv.flush().map_err(PackageError::unwritable(&path))?;
+    parquet.end()?;
+
+    let spss = folder.join("spss");
+    fs::create_dir_all(&spss).map_err(PackageError::unwritable(&spss))?;
+    spss::write(&spss.join(format!("{name}.sav")), table, sources)
+}
+
+/// Writes what R and REDCap read.
+fn beside(tables: &[JoinedTable], sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+    let short: Vec<JoinedTable> = tables.iter().filter(|table| !table.long).cloned().collect();
+    write_file(folder, "load.R", r::script(&short).as_bytes())?;
+
+    let instruments = redcap::instruments(&short);
+    let dictionary = redcap::dictionary(&instruments).map_err(PackageError::unwritable("redcap/dictionary.csv"))?;
+    fs::create_dir_all(folder.join("redcap")).map_err(PackageError::unwritable(folder.join("redcap")))?;
+    write_file(folder, "redcap/dictionary.csv", &dictionary)?;
+    write_file(folder, "redcap/import.csv", &redcap::import(&instruments, sources)?)
+}
+
+fn write_file(folder: &Path, name: &str, content: &[u8]) -> Result<(), PackageError> {
+    let path = folder.join(name);
+    write_through(&path, content).map_err(PackageError::unwritable(path))
+}
+
+/// The checksums of all files below `folder`, in the form of `sha256sum`, but for that of this list itself.
+pub fn sums(folder: &Path) -> Result<String, PackageError> {
+    let mut files = Vec::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(within) = folders.pop() {
+        let path = folder.join(&within);
+        for entry in fs::read_dir(&path).map_err(PackageError::unreadable(&path))? {
+            let entry = entry.map_err(PackageError::unreadable(&path))?;
+            let name = within.join(entry.file_name());
+            if entry.path().is_dir() {
+                folders.push(name);
+            } else if name != Path::new(SUMS) {
+                files.push(name);
+            }
+        }
+    }
+
+    files.sort();
+    let mut lines = String::new();
+    for file in files {
+        let mut digest = Digester(Sha256::new());
+        let path = folder.join(&file);
+        let mut content = fs::File::open(&path).map_err(PackageError::unreadable(&path))?;
+        std::io::copy(&mut content, &mut digest).map_err(PackageError::unreadable(&path))?;
+        lines += &format!("{}  {}\n", hex::encode(digest.0.finalize()), file.display());
+    }
+    Ok(lines)
+}
+
+/// Takes what is written into a digest.
+struct Digester(Sha256);
+
+impl Write for Digester {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}

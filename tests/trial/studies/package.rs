@@ -1,0 +1,275 @@
+//! A study's package: what it holds, read by the programs it is made for, and what is refused.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use super::*;
+use crate::exports::{json, rows};
+
+/// Longer than one segment of an SPSS string, with characters of several bytes where its segments meet.
+fn long_text() -> String {
+    "Gefäß ".repeat(120)
+}
+
+/// What the surgeons say, one text a session: one that a spreadsheet would run, one that is long, one of several lines.
+fn said() -> [String; 3] {
+    ["=1+1 looks sharp".to_owned(), long_text(), "first line\nsecond, with \"quotes\"".to_owned()]
+}
+
+fn parfocal(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap()
+}
+
+fn done(arguments: &[&str]) -> String {
+    let output = parfocal(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refused(arguments: &[&str]) -> String {
+    let output = parfocal(arguments);
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A data folder with the study at its end, whose sessions ran at these `sites`; drawn from `seed`.
+async fn data_of(folder: &Path, seed: u64, sites: &[&str]) {
+    std::fs::create_dir_all(folder).unwrap();
+    let mut trial = a_trial_from(folder, seed).await;
+    plan(&trial, definition()).await.unwrap();
+    change(&trial, Change::Open).await.unwrap();
+    for ((site, participant), said) in sites.iter().zip(["S-02", "S-03", "S-04"]).zip(said()) {
+        let session = prepare(&trial, participant, site).await.unwrap();
+        trial.conductor.act(Role::Operator, session, Action::Start).await.unwrap();
+        let segment = trial.view().segment.unwrap();
+        trial.surgeon(Action::Acknowledge { segment }).await;
+        trial.say(&said).await;
+        trial.conductor.act(Role::Operator, session, Action::Abort { reason: "time is up".to_owned() }).await.unwrap();
+        trial.conductor.dismiss(Role::Operator, session).unwrap();
+    }
+    to_the_end(&trial).await;
+    trial.store.close().await;
+}
+
+/// Exports the study from the data folder `data`.
+fn exported(data: &Path, out: &Path, more: &[&str]) {
+    done(&[&["export", "--study", STUDY, "--data-dir", text(data), "--out", text(out)], more].concat());
+}
+
+/// The package of a study of three sessions at two sites.
+async fn package(folder: &Path) -> PathBuf {
+    let data = folder.join("data");
+    data_of(&data, 5, &["leeds", "leeds", "london"]).await;
+    let out = folder.join("package");
+    exported(&data, &out, &["--unblinded"]);
+    out
+}
+
+/// What Python's DuckDB, Polars and pyreadstat find.
+fn python(package: &Path) -> Value {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folders = ["studies", "recordings"].map(|name| root.join("target").join(name));
+    assert!(folders[0].join("installed").exists(), "Python's readers are missing; run `.ci/setup test` once");
+
+    let mut python = Command::new("python3");
+    python.arg("-s").arg(root.join("tests/trial/studies/read_package.py")).arg(package);
+    let output = python.env("PYTHONPATH", std::env::join_paths(folders).unwrap()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn texts(rows: &Value) -> BTreeSet<String> {
+    rows.as_array().unwrap().iter().map(|row| row["text"].as_str().unwrap().to_owned()).collect()
+}
+
+#[tokio::test]
+async fn other_programs_read_what_was_said_with_its_types_and_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let package = package(folder.path()).await;
+    let found = python(&package);
+
+    let expected: BTreeSet<String> = said().into_iter().collect();
+    assert_eq!(texts(&found["comments"]), expected, "Parquet");
+    // SPSS pads texts with spaces, so that a reader takes those at the end away.
+    let trimmed: BTreeSet<String> = expected.iter().map(|text| text.trim_end().to_owned()).collect();
+    assert_eq!(texts(&found["spss_comments"]), trimmed, "SPSS");
+    let redcap: BTreeSet<String> =
+        found["redcap"]["comments"].as_array().unwrap().iter().map(|text| text.as_str().unwrap().to_owned()).collect();
+    assert_eq!(redcap, expected, "REDCap");
+
+    for reader in ["polars", "spss"] {
+        let counts = &found[reader];
+        assert_eq!((&counts["sessions"], &counts["segments"]), (&3.into(), &6.into()), "{reader}");
+        assert_eq!((&counts["comments"], &counts["allocation"]), (&3.into(), &6.into()), "{reader}");
+        assert_eq!(counts["studies"], 2, "{reader}: one study, at two sites");
+    }
+    assert!(found["polars"]["telemetry"].is_number() && found["spss"]["telemetry"].is_null());
+
+    let types = found["parquet"]["sessions"].as_array().unwrap();
+    let columns: Vec<String> = header(&package, "sessions.csv");
+    let kind = |name: &str| types[columns.iter().position(|column| column == name).unwrap()].as_str().unwrap();
+    assert_eq!(kind("wall"), "TIMESTAMP WITH TIME ZONE");
+    assert_eq!((kind("settings"), kind("practice"), kind("participant")), ("BIGINT", "BOOLEAN", "VARCHAR"));
+
+    let label = found["labels"]["sessions"]["practice"].as_str().unwrap();
+    assert_eq!(label, "Whether it is practice, never to be mixed with real data");
+    assert_eq!(found["values"]["sessions"]["practice"]["1.0"], "yes");
+
+    let sessions = rows(&package, "sessions");
+    let mut records: Vec<String> = sessions.iter().map(|row| row["session"].clone()).collect();
+    records.sort();
+    assert_eq!(found["redcap"]["records"], Value::from(records));
+    let wall: jiff::Timestamp = sessions[0]["wall"].parse().unwrap();
+    assert_eq!(found["redcap"]["times"][0], wall.strftime("%Y-%m-%d %H:%M:%S").to_string());
+}
+
+/// The names of the columns of a CSV file.
+fn header(folder: &Path, file: &str) -> Vec<String> {
+    let mut reader = csv::Reader::from_path(folder.join(file)).unwrap();
+    reader.headers().unwrap().iter().map(str::to_owned).collect()
+}
+
+#[tokio::test]
+async fn the_script_loads_the_tables_into_r() {
+    let folder = tempfile::tempdir().unwrap();
+    let package = package(folder.path()).await;
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/trial/studies/read_package.R");
+    let output = Command::new("Rscript").arg(script).current_dir(&package).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+
+    let printed = String::from_utf8(output.stdout).unwrap();
+    let mut lines = printed.lines();
+    assert_eq!(lines.next().unwrap().trim(), "3 6 3");
+    assert_eq!(lines.next().unwrap().trim(), "POSIXct POSIXt character logical");
+    assert_eq!(lines.next().unwrap().trim(), "What was said, as it was said; empty for a mark");
+    for said in said() {
+        assert!(printed.contains(said.trim_end()), "{printed}");
+    }
+    let wall: jiff::Timestamp = rows(&package, "sessions")[0]["wall"].parse().unwrap();
+    assert_eq!(printed.lines().last().unwrap().trim(), wall.strftime("%Y-%m-%d %H:%M:%S").to_string());
+}
+
+#[tokio::test]
+async fn a_package_proves_itself_and_tells_what_was_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let package = package(folder.path()).await;
+    let verified = done(&["verify", text(&package)]);
+    for check in ["checksums", "sessions", "tables"] {
+        assert!(verified.lines().any(|line| line.starts_with(check) && line.contains(" passed ")), "{verified}");
+    }
+    assert!(verified.contains("3 exports are as they were exported"), "{verified}");
+
+    // Whoever changes a table and its checksum cannot change what the exports prove.
+    let changed = package.join("comments.csv");
+    let before = std::fs::read_to_string(&changed).unwrap();
+    std::fs::write(&changed, before.replace("looks sharp", "looks blurred")).unwrap();
+    let sums = package.join("SHA256SUMS");
+    let listed = Command::new("sh").current_dir(&package).args(["-c", "sha256sum comments.csv"]).output().unwrap();
+    let line = String::from_utf8(listed.stdout).unwrap();
+    let old = std::fs::read_to_string(&sums).unwrap();
+    let new: Vec<&str> = old.lines().map(|l| if l.ends_with("  comments.csv") { line.trim_end() } else { l }).collect();
+    std::fs::write(&sums, new.join("\n") + "\n").unwrap();
+
+    let output = parfocal(&["verify", text(&package)]);
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(told.lines().any(|line| line.contains("checksums") && line.contains("passed")), "{told}");
+    assert!(told.lines().any(|line| line.starts_with("tables") && line.contains("comments.csv was changed")), "{told}");
+}
+
+#[tokio::test]
+async fn two_sites_are_joined_and_what_does_not_belong_together_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    data_of(&path("leeds-data"), 5, &["leeds", "leeds"]).await;
+    data_of(&path("london-data"), 6, &["london"]).await;
+    for site in ["leeds", "london"] {
+        exported(&path(&format!("{site}-data")), &path(site), &["--unblinded"]);
+    }
+
+    let out = path("joined");
+    let merge = |sites: &[&str], out: &Path| -> Vec<String> {
+        let mut arguments = vec!["study".to_owned(), "merge".to_owned()];
+        arguments.extend(sites.iter().map(|site| text(&path(site)).to_owned()));
+        arguments.extend(["--out".to_owned(), text(out).to_owned()]);
+        arguments
+    };
+    let run = |sites: &[&str], out: &Path| {
+        let arguments = merge(sites, out);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        parfocal(&arguments)
+    };
+    let refusal = |sites: &[&str]| {
+        let out = path("refused");
+        let output = run(sites, &out);
+        assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
+        assert!(!out.exists(), "nothing is written");
+        String::from_utf8(output.stderr).unwrap()
+    };
+
+    let output = run(&["leeds", "london"], &out);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let sites: Vec<String> = rows(&out, "sessions").into_iter().map(|mut row| row.remove("site").unwrap()).collect();
+    assert_eq!(sites, ["leeds", "leeds", "london"]);
+    assert_eq!(json(&out, "datapackage.json")["parfocal"]["sites"], serde_json::json!(["leeds", "london"]));
+    done(&["verify", text(&out)]);
+
+    // One site twice.
+    assert!(refusal(&["leeds", "leeds"]).contains("give each site once"), "one site twice");
+    // A blinded export beside one that tells the policies.
+    exported(&path("london-data"), &path("london-blinded"), &[]);
+    assert!(refusal(&["leeds", "london-blinded"]).contains("one tells the policies, the other does not"));
+    // A site that another database claims to be, too.
+    data_of(&path("impostor-data"), 7, &["leeds"]).await;
+    exported(&path("impostor-data"), &path("impostor"), &["--unblinded"]);
+    assert!(refusal(&["leeds", "impostor"]).contains("their chains of records differ"));
+    // What is no export.
+    assert!(
+        refusal(&["leeds", "leeds-data"]).contains("is neither the export of a session nor the package of a study")
+    );
+
+    // An export that was changed, and one of another version.
+    let session = std::fs::read_dir(path("london").join("sessions")).unwrap().next().unwrap().unwrap().path();
+    let said = session.join("comments.csv");
+    let before = std::fs::read_to_string(&said).unwrap();
+    std::fs::write(&said, before.replace("sharp", "blurred")).unwrap();
+    assert!(refusal(&["leeds", "london"]).contains("comments.csv was changed since it was exported"));
+    std::fs::write(&said, before).unwrap();
+    let description = session.join("datapackage.json");
+    let before = std::fs::read_to_string(&description).unwrap();
+    std::fs::write(&description, before.replace("\"format\": 5", "\"format\": 4")).unwrap();
+    assert!(refusal(&["leeds", "london"]).contains("has format 4"), "two versions");
+}
+
+#[tokio::test]
+async fn a_withdrawn_session_is_left_out_and_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    std::fs::create_dir_all(&data).unwrap();
+    let mut trial = opened(&data).await;
+    let kept = whole(&mut trial, "S-02", "leeds").await;
+    let withdrawn = whole(&mut trial, "S-03", "leeds").await;
+    change(&trial, Change::Withdraw { session: withdrawn }).await.unwrap();
+    trial.store.close().await;
+
+    let out = folder.path().join("package");
+    exported(&data, &out, &[]);
+    let package = json(&out, "datapackage.json");
+    assert_eq!(package["parfocal"]["left_out"][0]["session"], withdrawn.to_string());
+    assert_eq!(package["parfocal"]["left_out"][0]["reason"], "the participant withdrew");
+    let sessions: Vec<String> =
+        rows(&out, "sessions").into_iter().map(|mut row| row.remove("session").unwrap()).collect();
+    assert_eq!(sessions, [kept.to_string()]);
+    assert!(!out.join("allocation.csv").exists(), "a blinded package tells no policy");
+    assert!(
+        refused(&["export", "--study", "nothing", "--data-dir", text(&data), "--out", text(&out)])
+            .contains("there is no study 'nothing'")
+    );
+}
