@@ -17,6 +17,7 @@ pub mod lens;
 pub mod recording;
 pub mod simulation;
 
+pub mod accounts;
 pub mod autofocus;
 pub mod camera;
 

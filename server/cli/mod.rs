@@ -1,5 +1,6 @@
 //! The command line: one file a command; wires the rooms together.
 
+mod account;
 mod announce;
 mod backup;
 mod calibrate;
@@ -36,6 +37,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Make and change the personal accounts of the people in studies.
+    Account(account::Arguments),
     /// Copy the database, verified, while the server runs or not.
     Backup(backup::Arguments),
     /// Calibrate a sensor: take its dark and white references, or import its maker's tables.
@@ -85,6 +88,7 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Failure> {
     match command {
+        Command::Account(arguments) => account::run(&arguments),
         Command::Backup(arguments) => backup::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),

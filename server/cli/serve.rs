@@ -20,6 +20,7 @@ use tracing_subscriber::EnvFilter;
 use super::announce::{announcement, reachable};
 use super::library::protocols;
 use super::output::Failure;
+use crate::accounts::{Accounts, Cost};
 use crate::autofocus::{BlurRate, PolicyName, Registry, scripted, shipped};
 use crate::camera::{self, CameraSettings, calibration};
 use crate::clock::{Clock, SystemClock};
@@ -197,8 +198,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
 
+    let accounts = Accounts::of_server(&store, Arc::clone(&clock), Cost::default());
     let app = Arc::new(App {
         clock,
+        accounts,
         live,
         store: store.clone(),
         recordings: recordings.clone(),

@@ -9,12 +9,12 @@ use super::{ConductError, Pen, Shared, StudySite};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
 use crate::store::{Enrolment, NewSession, Stamp};
+use crate::trial::account::Actor;
 use crate::trial::allocation::Seed;
 use crate::trial::commitment::Allocation;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::protocol::Protocol;
-use crate::trial::role::Role;
 use crate::trial::study::lists::List;
 use crate::trial::study::places::next_place;
 use crate::trial::study::refusal::StudyRefusal;
@@ -33,7 +33,7 @@ struct Drawn {
 impl Shared {
     pub(super) async fn create(
         &self,
-        by: Role,
+        by: Actor,
         participant: &str,
         protocol: &str,
         place: Option<StudySite>,
@@ -41,7 +41,7 @@ impl Shared {
         let mut pen = self.pen.lock().await;
         self.record_stops(&mut pen).await?;
         let current = CurrentSession::of(self.live().course.as_ref().map(|course| course.state.phase()));
-        permission::check(by, Request::MakeSession, current)?;
+        permission::check(by.role, Request::MakeSession, current)?;
         self.check_participant(participant).await?;
 
         let pen = &mut *pen;
@@ -54,12 +54,14 @@ impl Shared {
         let random = if protocol.practice { &mut pen.practice_random } else { &mut pen.random };
         let made = self.make(participant, &protocol, seed, index, random);
         let Stamp { at, wall } = made.stamp;
-        let created = Event { number: 1, by, at, wall, kind: EventKind::Created };
+        let Actor { role: by, account } = by;
+        let created = Event { number: 1, by, account, at, wall, kind: EventKind::Created };
         self.store.create_session(&made, &created, enrolment.as_ref()).await?;
 
         let session = made.session;
+        let study = enrolment.map(|enrolment| enrolment.study);
         let mut live = self.live();
-        live.course = Some(Course::new(made, protocol, created, self.run_clock.clone()));
+        live.course = Some(Course::new(made, protocol, created, study, self.run_clock.clone()));
         self.publish(&live);
         self.wake();
         Ok(session)

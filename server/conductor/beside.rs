@@ -71,8 +71,10 @@ impl Conductor {
     pub(super) async fn beside(&self, session: SessionId) -> Result<Vec<(Timestamp, LogLine)>, ConductError> {
         let reader = self.shared.store.reader();
         let clocks = &self.shared.run_clock.clocks;
-        let line = |run: i64, stamp: Stamp, by: Role, text: String| {
-            (clocks.wall(run, stamp.at), LogLine { at: stamp.wall, by, text })
+        let actors = reader.actors(session).await?;
+        let line = |kind: &str, number: i64, run: i64, stamp: Stamp, by: Role, text: String| {
+            let account = actors.get(&(kind.to_owned(), number.to_string())).cloned();
+            (clocks.wall(run, stamp.at), LogLine { at: stamp.wall, by, account, text })
         };
 
         let mut lines = Vec::new();
@@ -83,9 +85,9 @@ impl Conductor {
                 "Consent recorded: version {text_version} of the text, on {medium}, given on {given_on}, \
                  obtained by {obtained_by}"
             );
-            lines.push(line(stored.run, stored.stamp, stored.by, text));
+            lines.push(line("consent", stored.number, stored.run, stored.stamp, stored.by, text));
         }
-        for StoredCorrection { run, correction, .. } in reader.corrections(session).await? {
+        for StoredCorrection { number, run, correction } in reader.corrections(session).await? {
             let subject = correction.subject.name();
             let what = match correction.field {
                 Field::Note => format!("Note on {} {subject}", if subject == "answer" { "an" } else { "a" }),
@@ -94,13 +96,13 @@ impl Conductor {
             };
             let why = Some(&correction.reason).filter(|reason| !reason.is_empty());
             let text = why.map_or_else(|| what.clone(), |reason| format!("{what}: {reason}"));
-            lines.push(line(run, correction.stamp, correction.by, text));
+            lines.push(line("correction", number, run, correction.stamp, correction.by, text));
         }
-        for StoredErasure { run, erasure, .. } in reader.erasures(session).await? {
+        for StoredErasure { number, run, erasure } in reader.erasures(session).await? {
             let what = erasure.subject.name();
             let text =
                 format!("Words of {} {what} erased: {}", if what == "answer" { "an" } else { "a" }, erasure.reason);
-            lines.push(line(run, erasure.stamp, erasure.by, text));
+            lines.push(line("erasure", number, run, erasure.stamp, erasure.by, text));
         }
         Ok(lines)
     }

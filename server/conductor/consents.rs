@@ -3,21 +3,22 @@
 use jiff::tz::TimeZone;
 
 use super::{ConductError, Conductor, Shared};
+use crate::trial::account::Actor;
 use crate::trial::consent::{self, NewConsent};
-use crate::trial::role::Role;
 
 impl Conductor {
     /// Records a participant's consent. When this returns, it is on disk. The same consent again changes nothing.
     ///
     /// # Errors
     /// When `by` is not the operator, there is no such session, the consent makes no sense, or the disk failed.
-    pub async fn record_consent(&self, by: Role, new: NewConsent) -> Result<(), ConductError> {
+    pub async fn record_consent(&self, by: impl Into<Actor>, new: NewConsent) -> Result<(), ConductError> {
+        let by = by.into();
         self.to_the_end(move |shared| async move { shared.record_consent(by, new).await }).await
     }
 }
 
 impl Shared {
-    async fn record_consent(&self, by: Role, new: NewConsent) -> Result<(), ConductError> {
+    async fn record_consent(&self, by: Actor, new: NewConsent) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         self.record_stops(&mut pen).await?;
 
@@ -28,11 +29,11 @@ impl Shared {
         };
         let stamp = self.stamp();
         let today = stamp.wall.to_zoned(TimeZone::system()).date();
-        let consent = consent::check(by, &new.consent, required.as_deref(), today)?;
+        let consent = consent::check(by.role, &new.consent, required.as_deref(), today)?;
 
         let before = self.store.reader().consents(new.session).await?;
         if before.last().is_none_or(|latest| latest.consent != consent) {
-            self.store.keep_consent(new.session, &consent, by, stamp).await?;
+            self.store.keep_consent(new.session, &consent, &by, stamp).await?;
         }
 
         let mut live = self.live();

@@ -4,10 +4,10 @@ use super::course::Course;
 use super::{ConductError, Conductor, Shared};
 use crate::ids::{IdempotencyKey, SessionId};
 use crate::store::{Answer, Correction, Latest, standings};
+use crate::trial::account::Actor;
 use crate::trial::correction::{self, Corrected, Field, FieldChange, NewCorrection, Subject};
 use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
-use crate::trial::role::Role;
 
 /// What is corrected, and how, as it is kept.
 struct Decided {
@@ -24,16 +24,22 @@ impl Conductor {
     /// # Errors
     /// When `by` is not the researcher, the session is under way, the correction makes no sense or was made meanwhile,
     /// or the disk failed.
-    pub async fn correct(&self, by: Role, session: SessionId, new: NewCorrection) -> Result<(), ConductError> {
+    pub async fn correct(
+        &self,
+        by: impl Into<Actor>,
+        session: SessionId,
+        new: NewCorrection,
+    ) -> Result<(), ConductError> {
+        let by = by.into();
         self.to_the_end(move |shared| async move { shared.correct(by, session, new).await }).await
     }
 }
 
 impl Shared {
-    async fn correct(&self, by: Role, session: SessionId, new: NewCorrection) -> Result<(), ConductError> {
+    async fn correct(&self, by: Actor, session: SessionId, new: NewCorrection) -> Result<(), ConductError> {
         let _pen = self.pen.lock().await;
         let course = self.load(session).await?;
-        let reason = correction::check(by, course.state.ended(), &new.reason)?;
+        let reason = correction::check(by.role, course.state.ended(), &new.reason)?;
 
         let latest = Latest::of(&self.store.reader().corrections(session).await?);
         let Decided { subject, record, field, old, new } = match new.change {
@@ -43,8 +49,9 @@ impl Shared {
         };
 
         let stamp = self.stamp();
+        let Actor { role: by, account } = by;
         let correction = Correction { session, subject, record, field, old, new, reason, by, stamp };
-        Ok(self.store.correct(&correction).await?)
+        Ok(self.store.correct(&correction, account.as_ref()).await?)
     }
 
     async fn participant(

@@ -13,6 +13,7 @@ use crate::control::{Command, Drive};
 use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
 use crate::store::{Comment, NewSession, Reader, RunClocks};
+use crate::trial::account::Actor;
 use crate::trial::action::Action;
 use crate::trial::consent::Consent;
 use crate::trial::event::{Event, EventKind};
@@ -36,6 +37,8 @@ pub(super) struct Course {
     pub state: SessionState,
     /// Whether what is said still counts.
     pub grace: Grace,
+    /// The study that it belongs to; none outside any study.
+    pub study: Option<String>,
     /// When its study was locked, if it belongs to one that was.
     study_locked: Option<Timestamp>,
     /// All its events, those that are not on the disk yet last.
@@ -81,7 +84,7 @@ impl RunClock {
 /// recorded as soon as the disk takes it.
 #[derive(Debug, Clone)]
 struct Stop {
-    by: Role,
+    by: Actor,
     /// None: the time limit.
     action: Option<Action>,
     at: Moment,
@@ -89,9 +92,10 @@ struct Stop {
 }
 
 impl Course {
-    /// A session just made; `clock` is this run's.
-    pub fn new(made: NewSession, protocol: Protocol, created: Event, clock: RunClock) -> Self {
+    /// A session just made in `study`, or outside any; `clock` is this run's.
+    pub fn new(made: NewSession, protocol: Protocol, created: Event, study: Option<String>, clock: RunClock) -> Self {
         let mut course = Self::without_events(made, protocol, clock);
+        course.study = study;
         let at = course.clock.time(created.at);
         course.replay(vec![(at, created)]);
         course
@@ -106,6 +110,7 @@ impl Course {
             protocol,
             state,
             grace,
+            study: None,
             study_locked: None,
             events: Vec::new(),
             times: Vec::new(),
@@ -130,6 +135,7 @@ impl Course {
             stored.protocol().map_err(|error| ConductError::Unreadable { session, reason: error.to_string() })?;
 
         let mut course = Self::without_events(stored.made, protocol, clock.clone());
+        course.study = stored.study;
         course.study_locked = stored.study_locked;
         let at = |(run, event): (i64, Event)| (clock.clocks.wall(run, event.at), event);
         course.replay(stored.events.into_iter().map(at).collect());
@@ -154,9 +160,10 @@ impl Course {
     }
 
     /// The next events, numbered and stamped.
-    pub fn number(&self, by: Role, kinds: Vec<EventKind>, at: Moment, wall: Timestamp) -> Vec<Event> {
+    pub fn number(&self, by: &Actor, kinds: Vec<EventKind>, at: Moment, wall: Timestamp) -> Vec<Event> {
         let next = self.events.last().map_or(1, |event| event.number + 1);
-        kinds.into_iter().zip(next..).map(|(kind, number)| Event { number, by, at, wall, kind }).collect()
+        let event = |(kind, number)| Event { number, by: by.role, account: by.account.clone(), at, wall, kind };
+        kinds.into_iter().zip(next..).map(event).collect()
     }
 
     /// Tells where the lens was when the server ended: the session goes on from there.
@@ -171,13 +178,13 @@ impl Course {
     /// When `by` may not, or the action does not fit where the session stands or the circumstances.
     pub fn begin_writing(
         &mut self,
-        by: Role,
+        by: &Actor,
         action: &Action,
         circumstances: &Circumstances,
         at: Moment,
         wall: Timestamp,
     ) -> Result<Vec<Event>, Refusal> {
-        let kinds = circumstances.decide(self.session(), &self.state, by, action, at)?;
+        let kinds = circumstances.decide(self.session(), &self.state, by.role, action, at)?;
         self.writing = !kinds.is_empty();
         Ok(self.number(by, kinds, at, wall))
     }
@@ -203,7 +210,7 @@ impl Course {
     ///
     /// # Errors
     /// When `by` may not, or the action does not fit where the session stands.
-    pub fn stop(&mut self, by: Role, action: Action, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
+    pub fn stop(&mut self, by: Actor, action: Action, at: Moment, wall: Timestamp) -> Result<(), Refusal> {
         self.take(Stop { by, action: Some(action), at, wall })
     }
 
@@ -211,13 +218,13 @@ impl Course {
     pub fn keep_time(&mut self, at: Moment, wall: Timestamp) -> bool {
         let before = self.events.len();
         // The time limit is never refused.
-        let _ = self.take(Stop { by: Role::System, action: None, at, wall });
+        let _ = self.take(Stop { by: Role::System.into(), action: None, at, wall });
         self.events.len() > before
     }
 
     fn take(&mut self, stop: Stop) -> Result<(), Refusal> {
         let kinds = match &stop.action {
-            Some(action) => decide(&self.state, stop.by, action, stop.at)?,
+            Some(action) => decide(&self.state, stop.by.role, action, stop.at)?,
             None => decide_time(&self.state, stop.at),
         };
 
@@ -226,7 +233,7 @@ impl Course {
         if kinds.is_empty() && !(self.writing && stop.action.is_some()) {
             return Ok(());
         }
-        for event in self.number(stop.by, kinds, stop.at, stop.wall) {
+        for event in self.number(&stop.by, kinds, stop.at, stop.wall) {
             self.apply(self.clock.time(event.at), event);
         }
         self.stops.push(stop);

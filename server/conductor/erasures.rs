@@ -4,11 +4,11 @@ use super::corrections::no_such_record;
 use super::{ConductError, Conductor, Shared};
 use crate::ids::SessionId;
 use crate::store::{Answer, Comment, Erasure, StoredCorrection};
+use crate::trial::account::Actor;
 use crate::trial::correction::Field;
 use crate::trial::erasure::{self, Erasable, NewErasure};
 use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
-use crate::trial::role::Role;
 
 impl Conductor {
     /// Erases words that were said in session `session`, and the notes on them. When this returns, they are nowhere in
@@ -16,17 +16,18 @@ impl Conductor {
     ///
     /// # Errors
     /// When `by` is not the researcher, a session is under way, the record has no words, or the disk failed.
-    pub async fn erase(&self, by: Role, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
+    pub async fn erase(&self, by: impl Into<Actor>, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
+        let by = by.into();
         self.to_the_end(move |shared| async move { shared.erase(by, session, new).await }).await
     }
 }
 
 impl Shared {
-    async fn erase(&self, by: Role, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
+    async fn erase(&self, by: Actor, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
         self.record_stops(&mut pen).await?;
         let under_way = self.live().shown_phase().is_some_and(|phase| !phase.has_ended());
-        let reason = erasure::check(by, under_way, &new.reason)?;
+        let reason = erasure::check(by.role, under_way, &new.reason)?;
 
         let reader = self.store.reader();
         if reader.session(session).await?.is_none() {
@@ -40,6 +41,7 @@ impl Shared {
         }
 
         let stamp = self.stamp();
+        let Actor { role: by, account } = by;
         let erasure =
             |subject: Erasable, record: String| Erasure { session, subject, record, reason: reason.clone(), by, stamp };
 
@@ -48,7 +50,7 @@ impl Shared {
         let notes = notes.map(|stored| erasure(Erasable::Correction, stored.number.to_string()));
         let mut erasures = vec![erasure(new.subject, new.record.clone())];
         erasures.extend(notes);
-        self.store.erase(&erasures).await?;
+        self.store.erase(&erasures, account.as_ref()).await?;
 
         let comments = reader.comments(session).await?;
         let mut live = self.live();

@@ -13,6 +13,7 @@ use super::course::Course;
 use super::{ConductError, Live, Pen, Shared, views};
 use crate::control::{Command, Drive};
 use crate::ids::SessionId;
+use crate::trial::account::Actor;
 use crate::trial::action::Action;
 use crate::trial::event::{Event, EventKind};
 use crate::trial::phase::Phase;
@@ -35,7 +36,7 @@ impl Shared {
 
     pub(super) async fn act(
         self: &Arc<Self>,
-        by: Role,
+        by: &Actor,
         session: SessionId,
         action: &Action,
         signature: Option<&Signature>,
@@ -50,14 +51,14 @@ impl Shared {
 
     /// Does what waits for no disk: the lens is held when this returns, whatever becomes of the
     /// record.
-    async fn stop(self: &Arc<Self>, by: Role, session: SessionId, action: &Action) -> Result<(), ConductError> {
+    async fn stop(self: &Arc<Self>, by: &Actor, session: SessionId, action: &Action) -> Result<(), ConductError> {
         let stopped = {
             let mut live = self.live();
             let at = self.clock.now();
             let wall = self.clock.wall();
             let course = live.course_of(session).ok_or_else(ConductError::no_session)?;
             course.keep_time(at, wall);
-            let stopped = course.stop(by, action.clone(), at, wall);
+            let stopped = course.stop(by.clone(), action.clone(), at, wall);
             self.hold(&mut live);
             stopped
         };
@@ -72,7 +73,7 @@ impl Shared {
     /// Does what takes effect only once it is on disk.
     async fn move_on(
         &self,
-        by: Role,
+        by: &Actor,
         session: SessionId,
         action: &Action,
         signature: Option<&Signature>,
@@ -115,7 +116,7 @@ impl Shared {
     /// Acts on a session that is not the one in memory.
     async fn act_on_earlier(
         &self,
-        by: Role,
+        by: &Actor,
         session: SessionId,
         action: &Action,
         signature: Option<&Signature>,
@@ -167,7 +168,7 @@ impl Shared {
         }
 
         let kinds = decide_restart(&course.state, inspected);
-        let events = course.number(Role::System, kinds, self.clock.now(), self.clock.wall());
+        let events = course.number(&Role::System.into(), kinds, self.clock.now(), self.clock.wall());
         self.store.append_events(course.session(), &events).await?;
         course.written(events);
 
@@ -247,8 +248,9 @@ impl Shared {
         let shown = live.shown();
         let because = live.unrecorded_because.as_deref();
         let (surgeon, operator) = shown.map(|course| views::both(course, because, now)).unzip();
-        replace_if_changed(&self.surgeon, surgeon);
+        // First to the operator: from that view it is known which tablets may see the surgeon's.
         replace_if_changed(&self.operator, operator);
+        replace_if_changed(&self.surgeon, surgeon);
     }
 
     /// Shows where the session stands, and only then moves the lens: a notice that covers the view

@@ -44,6 +44,7 @@ use crate::clock::Clock;
 use crate::control::{Command, ControlHandle};
 use crate::ids::SessionId;
 use crate::store::Store;
+use crate::trial::account::Actor;
 use crate::trial::action::Action;
 use crate::trial::permission::{self, CurrentSession, Request};
 use crate::trial::phase::Phase;
@@ -225,8 +226,13 @@ impl Conductor {
     ///
     /// # Errors
     /// When one is under way already, or participant or protocol is unknown.
-    pub async fn create(&self, by: Role, participant: &str, protocol: &str) -> Result<SessionId, ConductError> {
-        self.create_where(by, participant, protocol, None).await
+    pub async fn create(
+        &self,
+        by: impl Into<Actor>,
+        participant: &str,
+        protocol: &str,
+    ) -> Result<SessionId, ConductError> {
+        self.create_where(by.into(), participant, protocol, None).await
     }
 
     /// Makes a session for `participant` by `protocol` of the study `place.study`: it gets the next place in the list
@@ -236,17 +242,17 @@ impl Conductor {
     /// When one is under way already, the participant is unknown, or the study allows no such session.
     pub async fn create_in_study(
         &self,
-        by: Role,
+        by: impl Into<Actor>,
         participant: &str,
         protocol: &str,
         place: StudySite,
     ) -> Result<SessionId, ConductError> {
-        self.create_where(by, participant, protocol, Some(place)).await
+        self.create_where(by.into(), participant, protocol, Some(place)).await
     }
 
     async fn create_where(
         &self,
-        by: Role,
+        by: Actor,
         participant: &str,
         protocol: &str,
         place: Option<StudySite>,
@@ -260,8 +266,9 @@ impl Conductor {
     ///
     /// # Errors
     /// When `by` may not, or the session is not where the action fits.
-    pub async fn act(&self, by: Role, session: SessionId, action: Action) -> Result<(), ConductError> {
-        self.to_the_end(move |shared| async move { shared.act(by, session, &action, None).await }).await
+    pub async fn act(&self, by: impl Into<Actor>, session: SessionId, action: Action) -> Result<(), ConductError> {
+        let by = by.into();
+        self.to_the_end(move |shared| async move { shared.act(&by, session, &action, None).await }).await
     }
 
     /// Unblinds one session of a study that is still blinded, signed by a person.
@@ -270,13 +277,14 @@ impl Conductor {
     /// When `by` is not the researcher, the reason names a policy, or the session's order would tell another's.
     pub async fn unblind_in_emergency(
         &self,
-        by: Role,
+        by: impl Into<Actor>,
         session: SessionId,
         signature: Signature,
         despite_outstanding: bool,
     ) -> Result<(), ConductError> {
+        let by = by.into();
         let action = Action::Unblind { reason: signature.reason.clone(), despite_outstanding };
-        self.to_the_end(move |shared| async move { shared.act(by, session, &action, Some(&signature)).await }).await
+        self.to_the_end(move |shared| async move { shared.act(&by, session, &action, Some(&signature)).await }).await
     }
 
     /// Takes an ended session off the screens.

@@ -13,6 +13,7 @@ use super::{ConductError, Conductor, ProtocolSummary};
 use crate::autofocus::PolicyName;
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::store::{DeviceEvent, Latest, Participant, Reader, Recorder, SessionLine, standings};
+use crate::trial::account::Actor;
 use crate::trial::correction::Subject;
 use crate::trial::erasure::Erasable;
 use crate::trial::event::EventKind;
@@ -132,10 +133,10 @@ impl Conductor {
         self.shared.store.reader()
     }
 
-    /// For recording what `role` looks at.
+    /// For recording what `by` looks at.
     #[must_use]
-    pub fn recorder(&self, role: Role) -> Recorder {
-        Recorder::of_server(&self.shared.store, role, Arc::clone(&self.shared.clock))
+    pub fn recorder(&self, by: impl Into<Actor>) -> Recorder {
+        Recorder::of_server(&self.shared.store, by.into(), Arc::clone(&self.shared.clock))
     }
 
     /// The participants, by code.
@@ -207,7 +208,8 @@ impl Conductor {
         let mut lines: Vec<(Timestamp, LogLine)> = Vec::new();
         for (run, event) in events {
             let text = event.kind.in_words(|segment| course.setting(segment));
-            lines.push((clocks.wall(run, event.at), LogLine { at: event.wall, by: event.by, text }));
+            let account = event.account.as_ref().map(ToString::to_string);
+            lines.push((clocks.wall(run, event.at), LogLine { at: event.wall, by: event.by, account, text }));
         }
 
         let made = lines.first().map(|(at, _)| *at);
@@ -215,7 +217,7 @@ impl Conductor {
             let at = clocks.wall(run, at);
             if Some(at) >= made {
                 let text = format!("The {device}: {message}");
-                lines.push((at, LogLine { at: wall, by: Role::System, text }));
+                lines.push((at, LogLine { at: wall, by: Role::System, account: None, text }));
             }
         }
 

@@ -108,8 +108,13 @@ impl Studies {
             Change::Lock { .. } => self.outstanding(&study).await?,
             _ => 0,
         };
-        let circumstances =
-            StudyCircumstances { definition: &study.definition, sessions: &study.sessions, on_screens, outstanding };
+        let circumstances = StudyCircumstances {
+            definition: &study.definition,
+            sessions: &study.sessions,
+            on_screens,
+            outstanding,
+            has_accounts: self.reader().has_accounts().await?,
+        };
         state.check(change, way, &signature, circumstances)?;
 
         let mut seed = None;
@@ -128,12 +133,12 @@ impl Studies {
             Change::Close => StudyEventKind::Closed,
             Change::Lock { .. } => StudyEventKind::Locked,
             Change::Unblind => {
-                sessions = self.unblindings(&study, &signature.reason).await?;
+                sessions = self.unblindings(&study, &signature).await?;
                 StudyEventKind::Unblinded
             }
             Change::Withdraw { session } => {
                 let withdrawn = EventKind::Withdrawn { reason: signature.reason.clone() };
-                sessions.push((session, vec![self.next_event(session, withdrawn).await?]));
+                sessions.push((session, vec![self.next_event(session, withdrawn, &signature).await?]));
                 StudyEventKind::SessionWithdrawn { session }
             }
         };
@@ -225,21 +230,27 @@ impl Studies {
     async fn unblindings(
         &self,
         study: &StoredStudy,
-        reason: &str,
+        signature: &Signature,
     ) -> Result<Vec<(SessionId, Vec<Event>)>, ConductError> {
         let mut unblindings = Vec::new();
         for enrolled in study.sessions.iter().filter(|enrolled| !enrolled.unblinded) {
-            let kind = EventKind::Unblinded { reason: reason.to_owned(), emergency: false };
-            unblindings.push((enrolled.session, vec![self.next_event(enrolled.session, kind).await?]));
+            let kind = EventKind::Unblinded { reason: signature.reason.clone(), emergency: false };
+            unblindings.push((enrolled.session, vec![self.next_event(enrolled.session, kind, signature).await?]));
         }
         Ok(unblindings)
     }
 
-    /// The next event of a session that nobody is at.
-    async fn next_event(&self, session: SessionId, kind: EventKind) -> Result<Event, ConductError> {
+    /// The next event of a session that nobody is at, by whoever signed.
+    async fn next_event(
+        &self,
+        session: SessionId,
+        kind: EventKind,
+        signature: &Signature,
+    ) -> Result<Event, ConductError> {
         let events = self.reader().events(session).await?;
         let number = events.last().map_or(0, |(_, event)| event.number) + 1;
-        Ok(Event { number, by: Role::Researcher, at: self.clock.now(), wall: self.clock.wall(), kind })
+        let account = signature.account.clone();
+        Ok(Event { number, by: Role::Researcher, account, at: self.clock.now(), wall: self.clock.wall(), kind })
     }
 }
 

@@ -3,6 +3,7 @@
 use super::course::Course;
 use super::studies::Studies;
 use super::{ConductError, Conductor};
+use crate::ids::SessionId;
 use crate::trial::role::Role;
 use crate::trial::study::definition::StudyName;
 use crate::trial::study::signature::{Signature, Way};
@@ -13,6 +14,19 @@ impl Conductor {
     #[must_use]
     pub fn studies(&self) -> &Studies {
         &self.shared.studies
+    }
+
+    /// The study that `session` belongs to; none outside any study. Does not wait for the disk for the session under
+    /// way, whose lens somebody may want to stop.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn study_of(&self, session: SessionId) -> Result<Option<String>, ConductError> {
+        let under_way = self.shared.live().course_of(session).map(|course| course.study.clone());
+        if let Some(study) = under_way {
+            return Ok(study);
+        }
+        Ok(self.shared.store.reader().enrolment(session).await?.map(|enrolment| enrolment.study))
     }
 
     /// Plans a study; see [`Studies::plan`].

@@ -16,6 +16,7 @@ pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (Surg
     let surgeon = surgeon(course, now);
     let operator = OperatorView {
         surgeon: surgeon.clone(),
+        study: course.study.clone(),
         participant: course.made.participant.clone(),
         protocol: course.made.protocol.clone(),
         consent_required: course.protocol.consent.clone(),
@@ -75,7 +76,8 @@ fn log(course: &Course) -> Vec<LogLine> {
     let line = |event: &Event| {
         let text = event.kind.for_the_blinded().in_words(|segment| course.setting(segment));
         let unrecorded = if course.is_recorded(event.number) { "" } else { " (not recorded yet)" };
-        LogLine { at: event.wall, by: event.by, text: format!("{text}{unrecorded}") }
+        let account = event.account.as_ref().map(ToString::to_string);
+        LogLine { at: event.wall, by: event.by, account, text: format!("{text}{unrecorded}") }
     };
     course.events.iter().rev().take(LATEST).map(line).collect()
 }

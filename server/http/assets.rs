@@ -26,6 +26,7 @@ macro_rules! assets {
 
 /// Every file of `web/static/`, by folder and name. A test compares this table with the folder.
 static ASSETS: &[Asset] = &assets![
+    "accounts/sign_in.js",
     "operator/camera_card.js",
     "operator/camera_settings.js",
     "operator/choices.js",
@@ -72,6 +73,7 @@ static ASSETS: &[Asset] = &assets![
     "shared/pacing.js",
     "shared/peaking.js",
     "shared/reconnection.js",
+    "shared/sign_in.js",
     "shared/storage.js",
     "shared/style.css",
     "shared/text.js",
@@ -94,6 +96,7 @@ static ASSETS: &[Asset] = &assets![
     "surgeon/notice_dialog.js",
     "surgeon/origin.js",
     "surgeon/outbox.js",
+    "surgeon/over.js",
     "surgeon/page.css",
     "surgeon/page.js",
     "surgeon/panel.js",

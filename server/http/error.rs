@@ -11,6 +11,8 @@ use axum::response::{Html, IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::credentials::{ACCOUNT_COOKIE, cookie};
+use crate::accounts::AccountError;
 use crate::conductor::ConductError;
 use crate::trial::role::Role;
 
@@ -41,6 +43,25 @@ pub enum Error {
          the server printed all of them when it last started."
     )]
     WrongKey,
+    /// A surgeon's link to a session that is over.
+    #[error(
+        "This link was for one session, which has ended. What this tablet still holds of it is taken all the same. \
+         For the next session the operator shows a new code."
+    )]
+    SessionOver,
+    /// The surgeon's shared link, in a session of a study.
+    #[error("The session under way has a link of its own. Scan the code on the operator's page.")]
+    NeedsSessionLink,
+    /// Nobody is signed in whose role may do this in a study.
+    #[error(
+        "This belongs to a study, where everybody but the surgeon acts under a personal account. The link of the \
+         {role} is not enough: sign in at /sign-in with an account that may act as {role}.",
+        role = role_name(*.0)
+    )]
+    NeedsAccount(Role),
+    /// Too many attempts to sign in failed.
+    #[error("{0}")]
+    TooMany(String),
     /// Another role does this.
     #[error("{0}")]
     Forbidden(String),
@@ -72,6 +93,9 @@ pub enum Error {
 pub struct ErrorBody {
     /// What happened and what to do.
     pub error: String,
+    /// Whether signing in under a personal account would help.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub sign_in: bool,
 }
 
 impl Error {
@@ -82,9 +106,15 @@ impl Error {
             Self::NotFound(_) => StatusCode::NOT_FOUND,
             Self::Conflict(_) => StatusCode::CONFLICT,
             Self::Invalid(_) => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::NeedsRole(_) | Self::NoRole | Self::Forbidden(_) | Self::WrongKey | Self::CrossSite => {
-                StatusCode::FORBIDDEN
-            }
+            Self::NeedsRole(_)
+            | Self::NoRole
+            | Self::NeedsAccount(_)
+            | Self::SessionOver
+            | Self::NeedsSessionLink
+            | Self::Forbidden(_)
+            | Self::WrongKey
+            | Self::CrossSite => StatusCode::FORBIDDEN,
+            Self::TooMany(_) => StatusCode::TOO_MANY_REQUESTS,
             Self::WrongHost => StatusCode::MISDIRECTED_REQUEST,
             Self::Busy => StatusCode::SERVICE_UNAVAILABLE,
             Self::Storage(_) => StatusCode::INSUFFICIENT_STORAGE,
@@ -106,6 +136,20 @@ impl From<ConductError> for Error {
     }
 }
 
+impl From<AccountError> for Error {
+    fn from(error: AccountError) -> Self {
+        let text = error.to_string();
+        match error {
+            AccountError::WrongPassphrase | AccountError::WrongConfirmation => Self::Forbidden(text),
+            AccountError::TooMany { .. } => Self::TooMany(text),
+            AccountError::Taken(_) => Self::Conflict(text),
+            AccountError::Unknown(_) => Self::NotFound(text),
+            AccountError::Refused(refusal) => ConductError::from(refusal).into(),
+            AccountError::Storage(_) => Self::Storage(text),
+        }
+    }
+}
+
 impl IntoResponse for Error {
     /// Leaves the error with the response; [`render`] makes the body once it knows who asked.
     fn into_response(self) -> Response {
@@ -123,12 +167,16 @@ struct ErrorPage<'a> {
     /// Whether to load the page once more: a browser that followed another site's link keeps strict cookies back the
     /// first time, and sends them when our own page asks.
     reload: bool,
+    /// Where to sign in, and then come back here; none where that does not help.
+    sign_in: Option<String>,
 }
 
 /// Gives every failed response its body: a page for a browser on its way to a page, JSON for everyone else.
 pub async fn render(request: Request, next: Next) -> Response {
     let page = wants_page(request.headers());
     let from_elsewhere = request.headers().get("sec-fetch-site").is_some_and(|site| site == "cross-site");
+    let path = request.uri().path().to_owned();
+    let was_signed_in = cookie(request.headers(), ACCOUNT_COOKIE).is_some();
     let response = next.run(request).await;
 
     let status = response.status();
@@ -146,15 +194,18 @@ pub async fn render(request: Request, next: Next) -> Response {
         None => message_of(status, &parts.headers, body).await,
     };
 
+    // A sign-in that has ended leaves its cookie: whoever had only that is asked to sign in again.
+    let sign_in = matches!(error, Some(Error::NeedsAccount(_))) || was_signed_in && may_sign_in(error.as_ref());
     parts.headers.remove(CONTENT_LENGTH);
     parts.headers.remove(CONTENT_TYPE);
     if !page {
-        return (parts, Json(ErrorBody { error: message })).into_response();
+        return (parts, Json(ErrorBody { error: message, sign_in })).into_response();
     }
 
     let html = ErrorPage {
         title: title_of(status),
         message: &message,
+        sign_in: may_sign_in(error.as_ref()).then(|| format!("/sign-in?next={path}")),
         reload: from_elsewhere && matches!(error, Some(Error::NeedsRole(_) | Error::NoRole)),
     };
 
@@ -162,6 +213,11 @@ pub async fn render(request: Request, next: Next) -> Response {
         Ok(html) => (parts, Html(html)).into_response(),
         Err(_) => (parts, message).into_response(),
     }
+}
+
+/// Whether a page offers to sign in: also where the role's link was expected, since an account opens it too.
+const fn may_sign_in(error: Option<&Error>) -> bool {
+    matches!(error, Some(Error::NeedsAccount(_) | Error::NeedsRole(Role::Operator | Role::Researcher) | Error::NoRole))
 }
 
 const FOR_PROGRAMS: &str = "A program sends the key that stands in that link, as 'Authorization: Bearer KEY'.";

@@ -12,10 +12,10 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::{Error, ErrorBody};
+use super::people::Acting;
 use super::roles::Researcher;
 use crate::ids::SessionId;
 use crate::store::export::{Export, ExportError, TABLES, TEXTS_IN_CSV, Table, ZipStream, folder_name};
-use crate::trial::role::Role;
 
 impl From<ExportError> for Error {
     fn from(error: ExportError) -> Self {
@@ -45,13 +45,14 @@ struct ExportQuery {
     (status = 404, description = "No such session", body = ErrorBody),
     (status = 409, description = "It has not been unblinded", body = ErrorBody)))]
 async fn zip(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(session): Path<SessionId>,
     Query(query): Query<ExportQuery>,
 ) -> Result<impl IntoResponse, Error> {
     let name = folder_name(session, query.unblinded);
-    let export = Export::prepare(&app.conductor.recorder(Role::Researcher), session, query.unblinded).await?;
+    let by = by.for_session(&app, session).await?;
+    let export = Export::prepare(&app.conductor.recorder(by), session, query.unblinded).await?;
     let (zip, bytes) = ZipStream::new(name.clone());
 
     // On a thread of its own: compressing would hold up the streams.

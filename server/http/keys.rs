@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
+use uuid::Uuid;
 
 use crate::files::make_private;
+use crate::ids::SessionId;
 use crate::trial::role::Role;
 
 /// Name of the key file in the data folder.
@@ -153,6 +155,49 @@ impl Keys {
         hex::encode(digest)
     }
 
+    /// The key of the surgeon's link to `session` alone: the session's id, and a proof that only this server can make.
+    #[must_use]
+    pub fn of_session(&self, session: SessionId) -> String {
+        format!("{}{}", session.0.simple(), self.session_proof("link", session))
+    }
+
+    /// The session whose surgeon's link has the key `key`, whether or not it has ended.
+    #[must_use]
+    pub fn session_of(&self, key: &str) -> Option<SessionId> {
+        self.proven("link", key)
+    }
+
+    /// The value of the surgeon's cookie for `session` alone.
+    #[must_use]
+    pub fn session_token(&self, session: SessionId) -> String {
+        format!("{}{}", session.0.simple(), self.session_proof("cookie", session))
+    }
+
+    /// The session whose surgeon's cookie is `token`.
+    #[must_use]
+    pub fn session_of_token(&self, token: &str) -> Option<SessionId> {
+        self.proven("cookie", token)
+    }
+
+    /// 128 bits that follow one way from the surgeon's key, `purpose` and `session`.
+    fn session_proof(&self, purpose: &str, session: SessionId) -> String {
+        let digest = Sha256::new()
+            .chain_update(b"parfocal session 1:")
+            .chain_update(purpose)
+            .chain_update(b":")
+            .chain_update(&self.surgeon)
+            .chain_update(b":")
+            .chain_update(session.0.as_bytes())
+            .finalize();
+        hex::encode(&digest[..KEY_BYTES])
+    }
+
+    fn proven(&self, purpose: &str, text: &str) -> Option<SessionId> {
+        let (session, proof) = text.split_at_checked(KEY_BYTES * 2)?;
+        let session = SessionId(Uuid::try_parse(session).ok()?);
+        bool::from(self.session_proof(purpose, session).as_bytes().ct_eq(proof.as_bytes())).then_some(session)
+    }
+
     /// Whether `token` is the cookie of `role`.
     #[must_use]
     pub fn opens(&self, role: Role, token: &str) -> bool {
@@ -191,6 +236,22 @@ mod tests {
         }
         assert!(!keys.opens(Role::Operator, &keys.token(Role::Surgeon)));
         assert!(!keys.opens(Role::System, &keys.token(Role::System)));
+    }
+
+    #[test]
+    fn a_sessions_link_and_cookie_name_it_and_no_other() {
+        let keys = Keys::random().unwrap();
+        let session = SessionId(Uuid::from_u128(7));
+        let link = keys.of_session(session);
+        let cookie = keys.session_token(session);
+        assert_eq!((keys.session_of(&link), keys.session_of_token(&cookie)), (Some(session), Some(session)));
+        assert_eq!((keys.session_of(&cookie), keys.session_of_token(&link)), (None, None));
+
+        let other = SessionId(Uuid::from_u128(8)).0.simple().to_string();
+        for wrong in ["", "é", &link[..63], &format!("{other}{}", &link[32..]), keys.of(Role::Surgeon)] {
+            assert_eq!(keys.session_of(wrong), None, "{wrong}");
+        }
+        assert_eq!(Keys::random().unwrap().session_of(&link), None, "another server's keys");
     }
 
     #[test]

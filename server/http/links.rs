@@ -12,10 +12,16 @@ use crate::trial::role::Role;
 
 /// The link that lets a browser in as the surgeon: by the name that the operator's browser came by, unless that leads
 /// nowhere from a tablet.
-pub fn surgeon_link(app: &App, headers: &HeaderMap) -> String {
+///
+/// In a session of a study the link is to that session alone, and only somebody who is `signed_in` is told it.
+pub fn surgeon_link(app: &App, headers: &HeaderMap, signed_in: bool) -> String {
     let asked = headers.get(HOST).and_then(|host| host.to_str().ok()).filter(|host| !is_loopback_name(host));
     let host = asked.map_or_else(|| app.address.to_string(), str::to_owned);
-    format!("http://{host}/enter?key={}", app.keys.of(Role::Surgeon))
+    let key = match app.linked_session() {
+        Some(session) if signed_in => app.keys.of_session(session),
+        _ => app.keys.of(Role::Surgeon).to_owned(),
+    };
+    format!("http://{host}/enter?key={key}")
 }
 
 /// `link` as the inside of a page: an `<svg>` element.

@@ -12,8 +12,10 @@ use futures_util::{Stream, StreamExt, stream};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
+use super::credentials::Pass;
 use super::roles::Roles;
 use super::shutdown::ended;
+use super::tablets;
 use crate::imaging::Size;
 
 const KIND: &str = "multipart/x-mixed-replace; boundary=parfocal-frame";
@@ -24,12 +26,21 @@ const NEXT_PART: &[u8] = b"\r\n--parfocal-frame\r\nContent-Type: image/jpeg\r\n\
 #[utoipa::path(get, path = "/stream.mjpeg", tag = "stream", responses(
     (status = 200, description = "Motion JPEG", content_type = "multipart/x-mixed-replace"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
-async fn mjpeg(State(app): State<AppState>, _: Roles) -> impl IntoResponse {
-    ([(CONTENT_TYPE, KIND)], Body::from_stream(parts(app).map(Ok::<_, std::convert::Infallible>)))
+async fn mjpeg(State(app): State<AppState>, roles: Roles) -> impl IntoResponse {
+    // Where nothing but a surgeon's link shows a role, the stream ends with what the link is for.
+    let pass = roles.pass().filter(|_| roles.is_surgeon_alone());
+    ([(CONTENT_TYPE, KIND)], Body::from_stream(parts(app, pass).map(Ok::<_, std::convert::Infallible>)))
 }
 
-fn parts(app: AppState) -> impl Stream<Item = Bytes> {
+fn parts(app: AppState, pass: Option<Pass>) -> impl Stream<Item = Bytes> {
     let mut shutdown = app.shutdown.clone();
+    let guard = AppState::clone(&app);
+    let over = async move {
+        match pass {
+            Some(pass) => drop(tablets::no_longer_admitted(&guard, pass).await),
+            None => std::future::pending().await,
+        }
+    };
     let watcher = app.live.watch(Size::Cell);
 
     let frames = stream::unfold((app, watcher), async |(app, mut watcher)| {
@@ -40,7 +51,10 @@ fn parts(app: AppState) -> impl Stream<Item = Bytes> {
     });
 
     let frames = frames.flat_map(|jpeg| stream::iter([jpeg, Bytes::from_static(NEXT_PART)]));
-    stream::iter([Bytes::from_static(FIRST_PART)]).chain(frames).take_until(async move { ended(&mut shutdown).await })
+    stream::iter([Bytes::from_static(FIRST_PART)])
+        .chain(frames)
+        .take_until(async move { ended(&mut shutdown).await })
+        .take_until(over)
 }
 
 /// The routes of this file.

@@ -3,6 +3,7 @@
 pub mod assets;
 mod camera;
 mod connections;
+mod credentials;
 pub mod error;
 mod export;
 mod health;
@@ -14,6 +15,7 @@ mod metrics;
 mod mjpeg;
 mod openapi;
 mod operator;
+mod people;
 mod places;
 mod playback;
 mod recording;
@@ -22,9 +24,11 @@ mod researcher;
 pub mod roles;
 pub mod security;
 mod shutdown;
+mod sign_in;
 mod state;
 mod studies;
 mod surgeon;
+mod tablets;
 
 pub use state::{App, AppState, Metrics};
 
@@ -55,6 +59,7 @@ pub fn router(app: AppState) -> Router {
     let document = openapi::Finished::default();
     let (router, api) = OpenApiRouter::with_openapi(openapi::Document::openapi())
         .merge(roles::routes())
+        .merge(sign_in::routes())
         .merge(surgeon::routes())
         .merge(operator::routes())
         .merge(camera::routes())

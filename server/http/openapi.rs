@@ -12,9 +12,10 @@ use utoipa::openapi::{Components, Content, Ref, RefOr, Response, ResponseBuilder
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
+use super::credentials::cookie_name;
 use super::error::{Error, ErrorBody, role_name};
 use super::keys::ROLES;
-use super::roles::{Roles, cookie_name};
+use super::roles::Roles;
 
 /// What the document says of the server as a whole.
 #[derive(OpenApi)]
@@ -22,7 +23,9 @@ use super::roles::{Roles, cookie_name};
     info(
         title = "parfocal",
         description = "Live view, autofocus control and blinded usability trials of a hyperspectral video exoscope. \
-                       A role is shown by the cookie that /enter gives, or by its key as a bearer token."
+                       A role is shown by the cookie that /enter gives, or by its key as a bearer token. In a study everybody \
+                       but the surgeon signs in under a personal account: by the cookie that /api/sign-in gives, or by \
+                       the token that it answers with as a bearer token."
     ),
     components(schemas(ErrorBody))
 )]
@@ -32,7 +35,8 @@ pub struct Document;
 pub type Finished = Arc<OnceLock<String>>;
 
 /// What answers without a key.
-const OPEN: [&str; 3] = ["/enter", "/healthz", "/static/{version}/{folder}/{name}"];
+const OPEN: [&str; 6] =
+    ["/api/sign-in", "/api/sign-out", "/enter", "/healthz", "/sign-in", "/static/{version}/{folder}/{name}"];
 
 /// Answers that any request may get.
 const ALWAYS: [(&str, &str); 5] = [

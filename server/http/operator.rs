@@ -13,6 +13,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
+use super::people::{Acting, SignedIn};
 use super::roles::{Operator, Roles};
 use super::security::Nonce;
 use super::surgeon::Act;
@@ -20,6 +21,7 @@ use super::{App, AppState};
 use crate::autofocus::PolicyEntry;
 use crate::conductor::{OpenStudy, ProtocolSummary, StudySite};
 use crate::ids::SessionId;
+use crate::trial::account::Account;
 use crate::trial::action::Focus;
 use crate::trial::consent::NewConsent;
 use crate::trial::role::Role;
@@ -34,6 +36,8 @@ const CODE_HINT: &str = "2 to 16 capital letters, digits and dashes, such as S-0
 struct Page {
     nonce: String,
     chain: String,
+    /// Who is signed in.
+    person: Option<Account>,
     /// Whether this browser is let in as the researcher too.
     researcher: bool,
     surgeon_link: String,
@@ -50,17 +54,19 @@ struct Page {
     (status = 200, description = "The page", content_type = "text/html"),
 ))]
 async fn page(
-    _: Operator,
+    by: Operator,
+    SignedIn(person): SignedIn,
     roles: Roles,
     State(app): State<AppState>,
     Nonce(nonce): Nonce,
     headers: HeaderMap,
 ) -> Result<Html<String>, Error> {
-    let surgeon_link = super::links::surgeon_link(&app, &headers);
+    let surgeon_link = super::links::surgeon_link(&app, &headers, by.account().is_some());
     let qr = super::links::qr_svg(&surgeon_link)?;
     let researcher = roles.choose(Some(Role::Researcher)).is_ok();
     let page = Page {
         nonce,
+        person: person.map(|person| person.account),
         chain: super::researcher::chain_words(&app).await,
         researcher,
         surgeon_link,
@@ -71,6 +77,30 @@ async fn page(
     };
 
     page.render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// The surgeon's link, as text and as a code.
+#[derive(Debug, Serialize, ToSchema)]
+struct SurgeonLink {
+    /// The link.
+    link: String,
+    /// The same as an SVG picture.
+    qr: String,
+    /// The session that it is for, in a study; none for the link that opens every session outside studies.
+    session: Option<SessionId>,
+}
+
+/// The surgeon's link: in a session of a study, to that session alone, which it ends with.
+#[utoipa::path(get, path = "/api/operator/surgeon-link", tag = "operator", responses(
+    (status = 200, body = SurgeonLink)))]
+async fn link(by: Operator, State(app): State<AppState>, headers: HeaderMap) -> Result<Json<SurgeonLink>, Error> {
+    let session = app.linked_session();
+    if session.is_some() {
+        by.personally()?;
+    }
+    let link = super::links::surgeon_link(&app, &headers, session.is_some());
+    let qr = super::links::qr_svg(&link)?;
+    Ok(Json(SurgeonLink { link, qr, session }))
 }
 
 /// What the operator can choose from.
@@ -174,15 +204,15 @@ async fn session(_: Operator, State(app): State<AppState>) -> View {
     (status = 404, description = "No such participant, protocol or study", body = ErrorBody),
     (status = 409, description = "A session is under way, or the study allows no such session", body = ErrorBody),
     (status = 422, description = "The study has no such site or protocol", body = ErrorBody)))]
-async fn create(_: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewSession>) -> Result<View, Error> {
-    let by = Role::Operator;
+async fn create(by: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewSession>) -> Result<View, Error> {
     match new.study {
         Some(StudyPlace { study, site }) => {
+            by.personally()?;
             let place = StudySite { study, site };
-            app.conductor.create_in_study(by, &new.participant, &new.protocol, place).await?;
+            app.conductor.create_in_study(by.actor(), &new.participant, &new.protocol, place).await?;
         }
         None => {
-            app.conductor.create(by, &new.participant, &new.protocol).await?;
+            app.conductor.create(by.actor(), &new.participant, &new.protocol).await?;
         }
     }
     Ok(Json(app.operator_view.borrow().clone()))
@@ -195,8 +225,9 @@ async fn create(_: Operator, State(app): State<AppState>, JsonBody(new): JsonBod
     (status = 404, description = "No such session or segment", body = ErrorBody),
     (status = 422, description = "No reason was given", body = ErrorBody),
     (status = 409, description = "It does not fit where the session stands", body = ErrorBody)))]
-async fn act(_: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
-    app.conductor.act(Role::Operator, act.session, act.action).await?;
+async fn act(by: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<Act>) -> Result<View, Error> {
+    let by = by.for_session(&app, act.session).await?;
+    app.conductor.act(by, act.session, act.action).await?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
 
@@ -206,8 +237,13 @@ async fn act(_: Operator, State(app): State<AppState>, JsonBody(act): JsonBody<A
     (status = 404, description = "No such session", body = ErrorBody),
     (status = 422, description = "Something is missing, the day is yet to come, or the protocol requires another \
                                   version of the text", body = ErrorBody)))]
-async fn consent(_: Operator, State(app): State<AppState>, JsonBody(new): JsonBody<NewConsent>) -> Result<View, Error> {
-    app.conductor.record_consent(Role::Operator, new).await?;
+async fn consent(
+    by: Operator,
+    State(app): State<AppState>,
+    JsonBody(new): JsonBody<NewConsent>,
+) -> Result<View, Error> {
+    let by = by.for_session(&app, new.session).await?;
+    app.conductor.record_consent(by, new).await?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
 
@@ -221,7 +257,12 @@ struct Dismissal {
 /// Takes an ended session off the screens, so that the next can be prepared.
 #[utoipa::path(post, path = "/api/operator/dismissals", tag = "operator", request_body = Dismissal, responses(
     (status = 200, body = Option<OperatorView>), (status = 409, description = "It is under way", body = ErrorBody)))]
-async fn dismiss(_: Operator, State(app): State<AppState>, JsonBody(gone): JsonBody<Dismissal>) -> Result<View, Error> {
+async fn dismiss(
+    by: Operator,
+    State(app): State<AppState>,
+    JsonBody(gone): JsonBody<Dismissal>,
+) -> Result<View, Error> {
+    by.for_session(&app, gone.session).await?;
     app.conductor.dismiss(Role::Operator, gone.session)?;
     Ok(Json(app.operator_view.borrow().clone()))
 }
@@ -230,6 +271,7 @@ async fn dismiss(_: Operator, State(app): State<AppState>, JsonBody(gone): JsonB
 pub fn routes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(page))
+        .routes(routes!(link))
         .routes(routes!(choices))
         .routes(routes!(focus))
         .routes(routes!(add_participant))

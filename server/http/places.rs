@@ -6,14 +6,14 @@
 //! with a key shows it at once, one that only wants to fill the places waits.
 
 use std::collections::BTreeMap;
-use std::net::{IpAddr, Ipv6Addr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::http::HeaderMap;
 use tokio::sync::oneshot;
 
+use super::credentials::holds;
 use super::keys::{Keys, ROLES};
-use super::roles::holds;
 
 /// How many connections there may be of a kind.
 #[derive(Debug, Clone, Copy)]
@@ -99,12 +99,18 @@ impl Taken {
 }
 
 impl Place {
-    /// Makes it a member's, if a request with `headers` shows one of `keys`.
+    /// The host that the connection came from.
+    pub fn host(&self) -> IpAddr {
+        let taken = self.places.taken();
+        taken.connections.get(&self.number).map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |there| there.host)
+    }
+
+    /// Makes it a member's, if a request with `headers` shows one of `keys`, or somebody is `signed_in`.
     ///
     /// # Errors
     /// When members have no place left.
-    pub fn admit(&self, headers: &HeaderMap, keys: &Keys) -> Result<(), Full> {
-        if self.is_members() || !ROLES.into_iter().any(|role| holds(headers, keys, role)) {
+    pub fn admit(&self, headers: &HeaderMap, keys: &Keys, signed_in: bool) -> Result<(), Full> {
+        if self.is_members() || !signed_in && !ROLES.into_iter().any(|role| holds(headers, keys, role)) {
             return Ok(());
         }
         self.make_members()

@@ -10,6 +10,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
 use super::error::{Error, ErrorBody};
+use super::people::Acting;
 use super::roles::Researcher;
 use crate::conductor::ConductError;
 use crate::ids::SessionId;
@@ -36,13 +37,14 @@ impl From<PlaybackError> for Error {
     (status = 404, description = "No such session", body = ErrorBody),
     (status = 409, description = "It has not been unblinded", body = ErrorBody)))]
 async fn recordings(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(session): Path<SessionId>,
 ) -> Result<Json<SessionRecordings>, Error> {
+    let by = by.for_session(&app, session).await?;
     let found = app.player.recordings(Role::Researcher, session).await?;
     if !found.recordings.is_empty() {
-        let recorder = app.conductor.recorder(Role::Researcher);
+        let recorder = app.conductor.recorder(by);
         recorder.record(&Access::RecordingViewed(session)).await.map_err(ConductError::from)?;
     }
     Ok(Json(found))
@@ -92,11 +94,12 @@ struct PictureQuery {
     (status = 409, description = "It has not been unblinded", body = ErrorBody),
     (status = 500, description = "The frame is damaged", body = ErrorBody)))]
 async fn frame(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path((session, recording, frame)): Path<(SessionId, String, usize)>,
     Query(query): Query<PictureQuery>,
 ) -> Result<impl IntoResponse, Error> {
+    by.for_session(&app, session).await?;
     let size = query.size.into();
     let jpeg = app.player.picture(Role::Researcher, session, &recording, frame, size).await?;
     Ok(([(CONTENT_TYPE, "image/jpeg")], jpeg))

@@ -9,12 +9,12 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
+use super::people::Acting;
 use super::roles::Researcher;
 use crate::ids::SessionId;
 use crate::trial::action::Action;
 use crate::trial::correction::NewCorrection;
 use crate::trial::erasure::NewErasure;
-use crate::trial::role::Role;
 
 /// Corrects something of a session that has ended. The original stays; the correction stands beside it.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/corrections", tag = "researcher",
@@ -26,12 +26,13 @@ use crate::trial::role::Role;
                                   has corrected the same meanwhile", body = ErrorBody),
     (status = 422, description = "It makes no sense, or no reason was given", body = ErrorBody)))]
 async fn correct(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
     JsonBody(correction): JsonBody<NewCorrection>,
 ) -> Result<StatusCode, Error> {
-    app.conductor.correct(Role::Researcher, id, correction).await?;
+    let by = by.for_session(&app, id).await?;
+    app.conductor.correct(by, id, correction).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -44,12 +45,13 @@ async fn correct(
     (status = 409, description = "A session is under way, or the record has no words", body = ErrorBody),
     (status = 422, description = "No reason was given", body = ErrorBody)))]
 async fn erase(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
     JsonBody(erasure): JsonBody<NewErasure>,
 ) -> Result<StatusCode, Error> {
-    app.conductor.erase(Role::Researcher, id, erasure).await?;
+    let by = by.for_session(&app, id).await?;
+    app.conductor.erase(by, id, erasure).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -70,12 +72,13 @@ struct Withdraw {
     (status = 409, description = "The session is under way", body = ErrorBody),
     (status = 422, description = "No reason was given", body = ErrorBody)))]
 async fn withdraw(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
     JsonBody(Withdraw { reason }): JsonBody<Withdraw>,
 ) -> Result<StatusCode, Error> {
-    app.conductor.act(Role::Researcher, id, Action::Withdraw { reason }).await?;
+    let by = by.for_session(&app, id).await?;
+    app.conductor.act(by, id, Action::Withdraw { reason }).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

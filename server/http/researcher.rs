@@ -16,12 +16,14 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
+use super::people::{Acting, From, SignedIn, confirmed_lead};
 use super::roles::{Researcher, Roles};
 use super::security::Nonce;
 use crate::autofocus::PolicyName;
 use crate::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
 use crate::ids::SessionId;
 use crate::store::{Access, SessionLine};
+use crate::trial::account::Account;
 use crate::trial::action::Action;
 use crate::trial::instruments::Measure;
 use crate::trial::phase::SessionStatus;
@@ -58,6 +60,9 @@ pub(super) fn local(at: &Timestamp, format: &str) -> String {
 #[derive(Template)]
 #[template(path = "researcher.html")]
 struct ListPage {
+    nonce: String,
+    /// Who is signed in.
+    person: Option<Account>,
     chain: String,
     sessions: Vec<SessionLine>,
     practice: Vec<SessionLine>,
@@ -66,17 +71,25 @@ struct ListPage {
 /// The list of sessions, practice apart.
 #[utoipa::path(get, path = "/researcher", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn list_page(_: Researcher, State(app): State<AppState>) -> Result<Html<String>, Error> {
+async fn list_page(
+    _: Researcher,
+    SignedIn(person): SignedIn,
+    Nonce(nonce): Nonce,
+    State(app): State<AppState>,
+) -> Result<Html<String>, Error> {
     let lines = app.conductor.sessions(true).await?;
     let (practice, sessions) = lines.into_iter().partition(|line| line.practice);
     let chain = chain_words(&app).await;
-    ListPage { chain, sessions, practice }.render().map(Html).map_err(|_| Error::Internal)
+    let person = person.map(|person| person.account);
+    ListPage { nonce, person, chain, sessions, practice }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 #[derive(Template)]
 #[template(path = "session.html")]
 struct SessionPage {
     nonce: String,
+    /// Who is signed in.
+    person: Option<Account>,
     chain: String,
     detail: SessionDetail,
     /// Questions after a setting, each with its answer in every setting: those answered by a number.
@@ -104,11 +117,17 @@ impl QuestionRow {
 }
 
 impl SessionPage {
-    fn new(nonce: String, chain: String, detail: SessionDetail, participants: Vec<String>) -> Self {
+    fn new(
+        nonce: String,
+        person: Option<Account>,
+        chain: String,
+        detail: SessionDetail,
+        participants: Vec<String>,
+    ) -> Self {
         let (asked, closing): (Vec<_>, _) = detail.answers.iter().cloned().partition(|answer| answer.setting.is_some());
         let all = questions(&asked, detail.settings_detail.len());
         let (written, questions) = all.into_iter().partition(|question| question.written);
-        Self { nonce, chain, detail, questions, written, closing, participants }
+        Self { nonce, person, chain, detail, questions, written, closing, participants }
     }
 
     /// The policy of `setting`, once the session was unblinded.
@@ -171,11 +190,13 @@ pub(super) fn day_and_time(at: &Timestamp) -> String {
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "No such session", body = ErrorBody)))]
 async fn session_page(
-    _: Researcher,
+    by: Researcher,
+    SignedIn(person): SignedIn,
     State(app): State<AppState>,
     Nonce(nonce): Nonce,
     Path(id): Path<SessionId>,
 ) -> Result<Html<String>, Error> {
+    by.for_session(&app, id).await?;
     let detail = app.conductor.session_detail(id).await.map_err(|error| match error {
         ConductError::NotFound(_) => Error::NotFound("There is no such session here.".to_owned()),
         error => error.into(),
@@ -184,7 +205,8 @@ async fn session_page(
     let participants = app.conductor.participants().await?;
     let participants = participants.into_iter().map(|participant| participant.code).collect();
     let chain = chain_words(&app).await;
-    SessionPage::new(nonce, chain, detail, participants).render().map(Html).map_err(|_| Error::Internal)
+    let person = person.map(|person| person.account);
+    SessionPage::new(nonce, person, chain, detail, participants).render().map(Html).map_err(|_| Error::Internal)
 }
 
 /// The sessions, newest first, practice included and marked.
@@ -199,10 +221,11 @@ async fn list(_: Researcher, State(app): State<AppState>) -> Result<Json<Vec<Ses
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = SessionDetail), (status = 404, description = "No such session", body = ErrorBody)))]
 async fn session(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
 ) -> Result<Json<SessionDetail>, Error> {
+    by.for_session(&app, id).await?;
     Ok(Json(app.conductor.session_detail(id).await?))
 }
 
@@ -211,11 +234,12 @@ async fn session(
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
 async fn course(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
 ) -> Result<Json<Timeline>, Error> {
-    let timeline = app.conductor.timeline(Role::Researcher, id, POINTS).await?;
+    let by = by.for_session(&app, id).await?;
+    let timeline = app.conductor.timeline(by.role, id, POINTS).await?;
     Ok(Json(Timeline { points: Vec::new(), ..timeline }))
 }
 
@@ -224,12 +248,13 @@ async fn course(
     params(("session" = SessionId, Path)), responses(
     (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
 async fn timeline(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
 ) -> Result<Json<Timeline>, Error> {
+    let by = by.for_session(&app, id).await?;
     let timeline = app.conductor.timeline(Role::Researcher, id, POINTS).await?;
-    app.conductor.recorder(Role::Researcher).record(&Access::PathViewed(id)).await.map_err(ConductError::from)?;
+    app.conductor.recorder(by).record(&Access::PathViewed(id)).await.map_err(ConductError::from)?;
     Ok(Json(timeline))
 }
 
@@ -268,10 +293,10 @@ struct Unblind {
     /// Whether to do it though something may be outstanding, which would then not count any more.
     #[serde(default)]
     despite_outstanding: bool,
-    /// Who does it: needed for a session of a study that is still blinded.
+    /// The passphrase of the lead who is signed in, once more: needed for a session of a study.
     #[serde(default)]
-    #[schema(pattern = r"\S")]
-    person: Option<String>,
+    #[schema(min_length = 1)]
+    passphrase: Option<String>,
 }
 
 /// Tells which policies ran; on a session still under way, or of a study that is still blinded, this is emergency
@@ -283,20 +308,21 @@ struct Unblind {
     (status = 404, description = "No such session", body = ErrorBody),
     (status = 409, description = "Its order would tell that of another session of its balanced set, \
                                   or something may be outstanding", body = ErrorBody),
-    (status = 422, description = "No reason was given, or nobody signed for a session of a study", body = ErrorBody)))]
+    (status = 422, description = "No reason was given, or no passphrase for a session of a study", body = ErrorBody),
+    (status = 429, description = "Too many attempts failed", body = ErrorBody)))]
 async fn unblind(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(id): Path<SessionId>,
-    JsonBody(Unblind { reason, despite_outstanding, person }): JsonBody<Unblind>,
+    From(peer): From,
+    JsonBody(Unblind { reason, despite_outstanding, passphrase }): JsonBody<Unblind>,
 ) -> Result<StatusCode, Error> {
-    let by = Role::Researcher;
-    match person {
-        Some(person) => {
-            let signature = Signature::new(&person, &reason).map_err(ConductError::from)?;
-            app.conductor.unblind_in_emergency(by, id, signature, despite_outstanding).await?;
-        }
-        None => app.conductor.act(by, id, Action::Unblind { reason, despite_outstanding }).await?,
+    if app.conductor.study_of(id).await?.is_some() {
+        let lead = confirmed_lead(&app, &by, passphrase.as_deref(), peer).await?;
+        let signature = Signature::of_account(lead, &reason).map_err(ConductError::from)?;
+        app.conductor.unblind_in_emergency(by.actor(), id, signature, despite_outstanding).await?;
+    } else {
+        app.conductor.act(by.actor(), id, Action::Unblind { reason, despite_outstanding }).await?;
     }
     Ok(StatusCode::NO_CONTENT)
 }

@@ -1,44 +1,58 @@
 //! Roles: who a request speaks for, and the links that let a browser in.
 //!
 //! A role is shown by its cookie, or by its key as a bearer token (programs). One cookie a role, so that one laptop can
-//! be operator and researcher at a time. Nothing else shows a role: where a request comes from tells only which proxy
+//! be operator and researcher at a time. Whoever is signed in has the roles of the account, too. Nothing else shows a role: where a request comes from tells only which proxy
 //! handed it on.
 
 use std::sync::Arc;
 
 use axum::extract::{FromRequestParts, Query, State};
-use axum::http::HeaderMap;
-use axum::http::header::{AUTHORIZATION, COOKIE, SET_COOKIE};
+use axum::http::header::SET_COOKIE;
 use axum::http::request::Parts;
 use axum::response::{AppendHeaders, IntoResponse, Redirect};
 use serde::Deserialize;
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::credentials::{Pass, cookie_name, holds, pass};
 use super::error::{Error, role_name};
-use super::keys::{Keys, ROLES};
+use super::keys::ROLES;
+use super::people::{Acting, Person};
+use super::tablets::admit;
 use super::{App, AppState};
 use crate::store::Access;
+use crate::trial::account::Account;
 use crate::trial::role::Role;
 
 /// A cookie outlives a study day, not a study.
 const COOKIE_SECONDS: u32 = 30 * 24 * 3600;
 
-/// Proof that the request speaks for the surgeon.
+/// Proof that the request speaks for the surgeon of the session on the screens.
 #[derive(Debug, Clone, Copy)]
 pub struct Surgeon;
 
-/// Proof that the request speaks for the operator.
+/// Proof that the request comes from a surgeon's tablet, whatever session it was let in to: what was said is taken
+/// after its session, too.
 #[derive(Debug, Clone, Copy)]
-pub struct Operator;
+pub struct SurgeonsTablet;
 
-/// Proof that the request speaks for the researcher.
-#[derive(Debug, Clone, Copy)]
-pub struct Researcher;
+/// Proof that the request speaks for the operator, with the account of whoever is signed in.
+#[derive(Debug, Clone)]
+pub struct Operator(Option<Account>);
+
+/// Proof that the request speaks for the researcher, with the account of whoever is signed in.
+#[derive(Debug, Clone)]
+pub struct Researcher(Option<Account>);
 
 /// The roles that the request speaks for, at least one.
 #[derive(Debug, Clone)]
-pub struct Roles(Vec<Role>);
+pub struct Roles {
+    held: Vec<Role>,
+    /// What shows the surgeon, if anything does.
+    pass: Option<Pass>,
+    /// Those of them that a link shows.
+    by_link: Vec<Role>,
+}
 
 impl Roles {
     /// `wanted` if it is held; without a wish, the one that may see least.
@@ -47,11 +61,50 @@ impl Roles {
     /// When `wanted` is not held.
     pub fn choose(&self, wanted: Option<Role>) -> Result<Role, Error> {
         match wanted {
-            Some(role) if self.0.contains(&role) => Ok(role),
+            Some(role) if self.held.contains(&role) => Ok(role),
             Some(role) => Err(Error::NeedsRole(role)),
-            None => self.0.first().copied().ok_or(Error::NoRole),
+            None => self.held.first().copied().ok_or(Error::NoRole),
         }
     }
+
+    /// Whether nothing but an account shows `role`.
+    pub(super) fn by_account_alone(&self, role: Role) -> bool {
+        !self.by_link.contains(&role)
+    }
+
+    /// Whether the surgeon is the only role.
+    pub(super) fn is_surgeon_alone(&self) -> bool {
+        self.held == [Role::Surgeon]
+    }
+
+    /// What shows the surgeon, if anything does.
+    pub(super) const fn pass(&self) -> Option<Pass> {
+        self.pass
+    }
+}
+
+impl FromRequestParts<AppState> for Surgeon {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+        let pass = pass(&parts.headers, &app.keys).ok_or(Error::NeedsRole(Role::Surgeon))?;
+        admit(app, pass).map(|()| Self)
+    }
+}
+
+impl FromRequestParts<AppState> for SurgeonsTablet {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+        pass(&parts.headers, &app.keys).map(|_| Self).ok_or(Error::NeedsRole(Role::Surgeon))
+    }
+}
+
+/// The account of a request, if somebody is signed in who may act as `role` in it.
+fn account_as(parts: &Parts, role: Role) -> Option<Account> {
+    let changes = !parts.method.is_safe();
+    let person = parts.extensions.get::<Person>()?;
+    person.account.role.may_act_as(role, changes).then(|| person.account.clone())
 }
 
 macro_rules! proof {
@@ -60,17 +113,25 @@ macro_rules! proof {
             type Rejection = Error;
 
             async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
-                if holds(&parts.headers, &app.keys, Role::$proof) {
-                    Ok(Self)
+                let account = account_as(parts, Role::$proof);
+                if account.is_some() || holds(&parts.headers, &app.keys, Role::$proof) {
+                    Ok(Self(account))
                 } else {
                     Err(Error::NeedsRole(Role::$proof))
                 }
             }
         }
+
+        impl Acting for $proof {
+            const ROLE: Role = Role::$proof;
+
+            fn account(&self) -> Option<&Account> {
+                self.0.as_ref()
+            }
+        }
     };
 }
 
-proof!(Surgeon);
 proof!(Operator);
 proof!(Researcher);
 
@@ -78,34 +139,21 @@ impl FromRequestParts<AppState> for Roles {
     type Rejection = Error;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
-        let held: Vec<_> = ROLES.into_iter().filter(|role| holds(&parts.headers, &app.keys, *role)).collect();
-        if held.is_empty() { Err(Error::NoRole) } else { Ok(Self(held)) }
+        let pass = pass(&parts.headers, &app.keys);
+        let admitted = pass.map_or(Err(Error::NoRole), |pass| admit(app, pass));
+        let shown = |role: &Role| match role {
+            Role::Surgeon => admitted.is_ok(),
+            role => holds(&parts.headers, &app.keys, *role) || account_as(parts, *role).is_some(),
+        };
+        let held: Vec<_> = ROLES.into_iter().filter(shown).collect();
+        match admitted {
+            Err(error) if held.is_empty() => Err(error),
+            _ => {
+                let by_link = held.iter().copied().filter(|role| holds(&parts.headers, &app.keys, *role)).collect();
+                Ok(Self { held, pass, by_link })
+            }
+        }
     }
-}
-
-/// Whether a request with these headers speaks for `role`: by its cookie or its bearer token.
-pub(super) fn holds(headers: &HeaderMap, keys: &Keys, role: Role) -> bool {
-    cookie(headers, cookie_name(role)).is_some_and(|token| keys.opens(role, token))
-        || bearer(headers).is_some_and(|key| keys.role_of(key) == Some(role))
-}
-
-/// The cookie that shows `role`.
-pub(super) const fn cookie_name(role: Role) -> &'static str {
-    match role {
-        Role::Surgeon => "parfocal-surgeon",
-        Role::Operator => "parfocal-operator",
-        Role::Researcher => "parfocal-researcher",
-        Role::System => "parfocal-none",
-    }
-}
-
-fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
-    let cookies = headers.get_all(COOKIE).iter().filter_map(|header| header.to_str().ok());
-    cookies.flat_map(|header| header.split(';')).find_map(|pair| pair.trim().strip_prefix(name)?.strip_prefix('='))
-}
-
-fn bearer(headers: &HeaderMap) -> Option<&str> {
-    headers.get(AUTHORIZATION)?.to_str().ok()?.strip_prefix("Bearer ")
 }
 
 /// The page of `role`.
@@ -129,14 +177,16 @@ struct EnterQuery {
 /// Lets a browser in: takes the key of a role's link, sets the role's cookie and goes to the role's page.
 #[utoipa::path(get, path = "/enter", params(EnterQuery), tag = "roles", responses(
     (status = 303, description = "Let in: the role's cookie, and on to its page"),
-    (status = 403, description = "Not a key of this server", body = super::error::ErrorBody)))]
+    (status = 403, description = "Not a key of this server, or of a session that has ended", body = super::error::ErrorBody)))]
 async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> Result<impl IntoResponse, Error> {
-    let role = app.keys.role_of(query.key.trim()).ok_or(Error::WrongKey)?;
-    let cookie = format!(
-        "{}={}; Path=/; Max-Age={COOKIE_SECONDS}; HttpOnly; SameSite=Strict",
-        cookie_name(role),
-        app.keys.token(role)
-    );
+    let key = query.key.trim();
+    let (role, token) = match (app.keys.role_of(key), app.keys.session_of(key)) {
+        (Some(role), _) => (role, app.keys.token(role)),
+        (None, Some(session)) if app.session_goes_on(session) => (Role::Surgeon, app.keys.session_token(session)),
+        (None, Some(_)) => return Err(Error::SessionOver),
+        (None, None) => return Err(Error::WrongKey),
+    };
+    let cookie = format!("{}={token}; Path=/; Max-Age={COOKIE_SECONDS}; HttpOnly; SameSite=Strict", cookie_name(role));
 
     // The door opens on a full disk, too: the log then tells of it alone.
     match app.conductor.recorder(role).record(&Access::Entered).await {
@@ -152,7 +202,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
 #[utoipa::path(get, path = "/", tag = "roles", responses(
     (status = 303, description = "On to the role's page"),
     (status = 403, description = "No role is held", body = super::error::ErrorBody)))]
-async fn start(Roles(held): Roles) -> Redirect {
+async fn start(Roles { held, .. }: Roles) -> Redirect {
     // Whoever holds more than one role works here rather than being a subject of the trial.
     Redirect::to(home(held.into_iter().find(|role| *role != Role::Surgeon).unwrap_or(Role::Surgeon)))
 }

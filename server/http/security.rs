@@ -16,6 +16,7 @@ use axum::response::{IntoResponse, Response};
 
 use super::AppState;
 use super::error::Error;
+use super::people;
 use super::places::Place;
 
 /// The nonce that inline scripts and styles of this response must carry.
@@ -65,7 +66,8 @@ fn content_security_policy(nonce: &str) -> String {
 /// Gives the connection of a request that shows a key a member's place. Rejects requests from other
 /// sites and, on a loopback server, host names that are not this machine's own: a site whose name
 /// is made to point here (DNS rebinding) has no role's cookie, and does not even get the page that says so.
-pub async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
+pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
+    let person = people::find(&app, request.headers()).await;
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
     if app.loopback_only && !is_loopback_name(host) {
@@ -73,13 +75,16 @@ pub async fn guard(State(app): State<AppState>, request: Request, next: Next) ->
     }
 
     let place = request.extensions().get::<Arc<Place>>();
-    if place.is_some_and(|place| place.admit(headers, &app.keys).is_err()) {
+    if place.is_some_and(|place| place.admit(headers, &app.keys, person.is_some()).is_err()) {
         return Error::Busy.into_response();
     }
 
     let changes = !matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
     if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host) {
         return Error::CrossSite.into_response();
+    }
+    if let Some(person) = person {
+        request.extensions_mut().insert(person);
     }
 
     next.run(request).await

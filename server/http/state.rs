@@ -8,10 +8,12 @@ use prometheus_client::metrics::counter::Counter;
 use tokio::sync::watch;
 
 use super::keys::Keys;
+use crate::accounts::Accounts;
 use crate::autofocus::Registry;
 use crate::clock::Clock;
 use crate::conductor::Conductor;
 use crate::control::ControlObserver;
+use crate::ids::SessionId;
 use crate::live::LiveHandle;
 use crate::playback::Player;
 use crate::recorder::Recordings;
@@ -42,6 +44,8 @@ pub struct App {
     pub operator_view: watch::Receiver<Option<Arc<OperatorView>>>,
     /// All policies.
     pub registry: Registry,
+    /// Personal accounts.
+    pub accounts: Accounts,
     /// Keys of the three roles.
     pub keys: Keys,
     /// Where other machines reach the server.
@@ -67,6 +71,25 @@ pub struct Metrics {
 pub type AppState = Arc<App>;
 
 impl App {
+    /// The session on the screens, if it belongs to a study.
+    pub(super) fn study_session(&self) -> Option<SessionId> {
+        let view = self.operator_view.borrow();
+        view.as_ref().filter(|view| view.study.is_some()).map(|view| view.surgeon.session)
+    }
+
+    /// The session of a study on the screens that has not ended: the surgeon gets a link to it alone.
+    #[must_use]
+    pub fn linked_session(&self) -> Option<SessionId> {
+        self.study_session().filter(|session| self.session_goes_on(*session))
+    }
+
+    /// Whether `session` is on the screens and has not ended.
+    #[must_use]
+    pub fn session_goes_on(&self, session: SessionId) -> bool {
+        let view = self.operator_view.borrow();
+        view.as_ref().is_some_and(|view| view.surgeon.session == session && !view.surgeon.phase.has_ended())
+    }
+
     /// Whether what tells policies apart is now kept from operator and researcher too.
     #[must_use]
     pub fn blinded(&self) -> bool {

@@ -11,9 +11,11 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
+use super::people::{Acting, From, SignedIn, confirmed_lead};
 use super::roles::Researcher;
 use super::security::Nonce;
 use crate::conductor::{ConductError, StudyDetail, StudyLine, StudySession};
+use crate::trial::account::Account;
 use crate::trial::allocation::Order;
 use crate::trial::phase::SessionStatus;
 use crate::trial::role::Role;
@@ -26,26 +28,48 @@ use crate::trial::study::state::Change;
 #[template(path = "studies.html")]
 struct ListPage {
     nonce: String,
+    /// Who is signed in.
+    person: Option<Account>,
+    has_accounts: bool,
     studies: Vec<StudyLine>,
 }
 
 /// The list of studies, and a form to plan one.
 #[utoipa::path(get, path = "/researcher/studies", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn studies_page(_: Researcher, State(app): State<AppState>, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
+async fn studies_page(
+    _: Researcher,
+    SignedIn(person): SignedIn,
+    State(app): State<AppState>,
+    Nonce(nonce): Nonce,
+) -> Result<Html<String>, Error> {
     let studies = app.conductor.studies().lines().await?;
-    ListPage { nonce, studies }.render().map(Html).map_err(|_| Error::Internal)
+    let person = person.map(|person| person.account);
+    let has_accounts = !app.accounts.all().await?.is_empty();
+    ListPage { nonce, person, has_accounts, studies }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 #[derive(Template)]
 #[template(path = "study.html")]
 struct StudyPage {
     nonce: String,
+    /// Who is signed in.
+    person: Option<Account>,
     chain: String,
     detail: StudyDetail,
 }
 
 impl StudyPage {
+    /// Whether whoever looks may lock and unblind.
+    fn leads(&self) -> bool {
+        self.person.as_ref().is_some_and(|account| account.role.leads())
+    }
+
+    /// Whether whoever looks may change the study.
+    fn may_change(&self) -> bool {
+        self.person.as_ref().is_some_and(|account| account.role.may_act_as(Role::Researcher, true))
+    }
+
     /// The stage's name, for the page's script.
     const fn stage(&self) -> &'static str {
         self.detail.line.stage.name()
@@ -110,14 +134,17 @@ pub(super) const fn session_state(session: &StudySession) -> &'static str {
     (status = 200, description = "The page", content_type = "text/html"),
     (status = 404, description = "No such study", body = ErrorBody)))]
 async fn study_page(
-    _: Researcher,
+    by: Researcher,
+    SignedIn(person): SignedIn,
     State(app): State<AppState>,
     Nonce(nonce): Nonce,
     Path(name): Path<String>,
 ) -> Result<Html<String>, Error> {
+    by.personally()?;
+    let person = person.map(|person| person.account);
     let detail = app.conductor.studies().detail(&name).await?;
     let chain = super::researcher::chain_words(&app).await;
-    StudyPage { nonce, chain, detail }.render().map(Html).map_err(|_| Error::Internal)
+    StudyPage { nonce, person, chain, detail }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 /// The studies, in the order in which they were planned.
@@ -132,10 +159,11 @@ async fn list_studies(_: Researcher, State(app): State<AppState>) -> Result<Json
     params(("study" = String, Path)), responses(
     (status = 200, body = StudyDetail), (status = 404, description = "No such study", body = ErrorBody)))]
 async fn study(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(name): Path<String>,
 ) -> Result<Json<StudyDetail>, Error> {
+    by.personally()?;
     Ok(Json(app.conductor.studies().detail(&name).await?))
 }
 
@@ -147,9 +175,6 @@ struct PlanStudy {
     /// The sites of it that this database runs; all of them where none are named.
     #[serde(default)]
     sites: Vec<String>,
-    /// Who plans it.
-    #[schema(pattern = r"\S")]
-    person: String,
     /// Why.
     #[schema(pattern = r"\S")]
     reason: String,
@@ -159,14 +184,14 @@ struct PlanStudy {
 #[utoipa::path(post, path = "/api/researcher/studies", tag = "researcher", request_body = PlanStudy, responses(
     (status = 200, body = StudyDetail),
     (status = 409, description = "There is a study of this name", body = ErrorBody),
-    (status = 422, description = "The definition is malformed, or a person or reason is missing", body = ErrorBody)))]
+    (status = 422, description = "The definition is malformed, or a reason is missing", body = ErrorBody)))]
 async fn plan_study(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     JsonBody(plan): JsonBody<PlanStudy>,
 ) -> Result<Json<StudyDetail>, Error> {
-    let PlanStudy { definition, sites, person, reason } = plan;
-    let signature = signed(&person, &reason)?;
+    let PlanStudy { definition, sites, reason } = plan;
+    let signature = signed(by.personally()?, &reason)?;
     let name = app.conductor.plan_study(Role::Researcher, definition, sites, signature).await?;
     Ok(Json(app.conductor.studies().detail(name.as_str()).await?))
 }
@@ -177,9 +202,10 @@ struct ChangeStudy {
     /// What is to be done.
     #[serde(flatten)]
     change: Change,
-    /// Who does it.
-    #[schema(pattern = r"\S")]
-    person: String,
+    /// The passphrase of the lead who is signed in, once more: needed to lock and to unblind.
+    #[serde(default)]
+    #[schema(min_length = 1)]
+    passphrase: Option<String>,
     /// Why.
     #[schema(pattern = r"\S")]
     reason: String,
@@ -189,24 +215,31 @@ struct ChangeStudy {
 #[utoipa::path(post, path = "/api/researcher/studies/{study}/changes", tag = "researcher",
     params(("study" = String, Path)), request_body = ChangeStudy, responses(
     (status = 200, body = StudyDetail),
-    (status = 403, description = "The study names others who may", body = ErrorBody),
+    (status = 403, description = "Nobody is signed in who may, the passphrase is wrong, or the study names others \
+                                  who may unblind", body = ErrorBody),
+    (status = 429, description = "Too many attempts failed", body = ErrorBody),
     (status = 404, description = "No such study", body = ErrorBody),
     (status = 409, description = "It does not fit where the study stands", body = ErrorBody),
-    (status = 422, description = "A person or reason is missing, or the reason names a policy", body = ErrorBody)))]
+    (status = 422, description = "A reason or the passphrase is missing, or the reason names a policy", body = ErrorBody)))]
 async fn change_study(
-    _: Researcher,
+    by: Researcher,
     State(app): State<AppState>,
     Path(name): Path<String>,
+    From(peer): From,
     JsonBody(wanted): JsonBody<ChangeStudy>,
 ) -> Result<Json<StudyDetail>, Error> {
-    let signature = signed(&wanted.person, &wanted.reason)?;
+    let account = match wanted.change {
+        Change::Lock { .. } | Change::Unblind => confirmed_lead(&app, &by, wanted.passphrase.as_deref(), peer).await?,
+        Change::Open | Change::Close | Change::Withdraw { .. } => by.personally()?,
+    };
+    let signature = signed(account, &wanted.reason)?;
     app.conductor.change_study(Role::Researcher, name.clone(), wanted.change, signature).await?;
     Ok(Json(app.conductor.studies().detail(&name).await?))
 }
 
-/// The signature of a change.
-fn signed(person: &str, reason: &str) -> Result<Signature, Error> {
-    Signature::new(person, reason).map_err(|refusal| ConductError::from(refusal).into())
+/// The signature of a change by whoever is signed in to `account`.
+fn signed(account: &Account, reason: &str) -> Result<Signature, Error> {
+    Signature::of_account(account, reason).map_err(|refusal| ConductError::from(refusal).into())
 }
 
 /// The routes of this file.

@@ -14,7 +14,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
-use super::roles::Surgeon;
+use super::roles::{Surgeon, SurgeonsTablet};
 use super::security::Nonce;
 use crate::ids::SessionId;
 use crate::trial::action::Action;
@@ -28,10 +28,22 @@ struct Page {
     nonce: String,
 }
 
+#[derive(Template)]
+#[template(path = "surgeon_over.html")]
+struct OverPage {
+    nonce: String,
+    message: String,
+}
+
 /// The surgeon's page.
 #[utoipa::path(get, path = "/surgeon", tag = "surgeon",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn page(_: Surgeon, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
+async fn page(_: SurgeonsTablet, surgeon: Result<Surgeon, Error>, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
+    // A tablet that is not let in any more still hands over what it holds.
+    if let Err(error) = surgeon {
+        let message = error.to_string();
+        return OverPage { nonce, message }.render().map(Html).map_err(|_| Error::Internal);
+    }
     Page { nonce }.render().map(Html).map_err(|_| Error::Internal)
 }
 
@@ -73,7 +85,7 @@ async fn act(_: Surgeon, State(app): State<AppState>, JsonBody(act): JsonBody<Ac
     (status = 422, description = "Empty or too long", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn comment(
-    _: Surgeon,
+    _: SurgeonsTablet,
     State(app): State<AppState>,
     JsonBody(comment): JsonBody<NewComment>,
 ) -> Result<StatusCode, Error> {
@@ -90,7 +102,7 @@ async fn comment(
     (status = 422, description = "The value does not fit the question", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn answer(
-    _: Surgeon,
+    _: SurgeonsTablet,
     State(app): State<AppState>,
     JsonBody(answer): JsonBody<NewAnswer>,
 ) -> Result<StatusCode, Error> {
@@ -104,7 +116,7 @@ async fn answer(
     (status = 404, description = "No such session", body = ErrorBody),
     (status = 507, description = "The disk failed; send it again", body = ErrorBody)))]
 async fn holding(
-    _: Surgeon,
+    _: SurgeonsTablet,
     State(app): State<AppState>,
     JsonBody(holding): JsonBody<Holding>,
 ) -> Result<StatusCode, Error> {

@@ -6,12 +6,14 @@ use std::time::Duration;
 
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 
+use super::actors::name_actor;
 use super::chain::{self, Head};
 use super::schema::DATABASE;
 use super::values::{drop_if_failed, nanoseconds};
 use super::{Reader, Store, StoreError};
 use crate::clock::Clock;
 use crate::ids::SessionId;
+use crate::trial::account::{AccountName, Actor};
 use crate::trial::role::Role;
 
 /// What somebody did that shows them evidence, or copies it.
@@ -78,6 +80,8 @@ pub struct Recorder {
     reader: Reader,
     /// Whose it is; none on the command line.
     role: Option<Role>,
+    /// The account of whoever it is; none for whoever is not signed in.
+    account: Option<AccountName>,
     clock: Arc<dyn Clock>,
 }
 
@@ -90,11 +94,19 @@ enum Way {
 }
 
 impl Recorder {
-    /// What `role` does within the server.
+    /// What `by` does within the server.
     #[must_use]
-    pub fn of_server(store: &Store, role: Role, clock: Arc<dyn Clock>) -> Self {
+    pub fn of_server(store: &Store, by: Actor, clock: Arc<dyn Clock>) -> Self {
         let folder = store.inner.folder.clone();
-        Self { way: Way::Server(store.clone()), folder, reader: store.reader().clone(), role: Some(role), clock }
+        let Actor { role, account } = by;
+        Self {
+            way: Way::Server(store.clone()),
+            folder,
+            reader: store.reader().clone(),
+            role: Some(role),
+            account,
+            clock,
+        }
     }
 
     /// What is done from the command line with the database of data folder `folder`, whether or not a server has
@@ -116,7 +128,7 @@ impl Recorder {
             .synchronous(SqliteSynchronous::Full);
         let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
         let folder = file.parent().map(Path::to_owned).unwrap_or_default();
-        Ok(Self { way: Way::CommandLine(pool), folder, reader, role: None, clock })
+        Ok(Self { way: Way::CommandLine(pool), folder, reader, role: None, account: None, clock })
     }
 
     /// The data folder.
@@ -165,6 +177,11 @@ impl Recorder {
         let wall = self.clock.wall().to_string();
         let session = access.session().map(|session| session.to_string());
 
+        // Nobody stays signed in by a backup: a sign-in may have been ended since.
+        if matches!(access, Access::Restored { .. }) {
+            sqlx::query("DELETE FROM sign_ins").execute(&mut *transaction).await?;
+        }
+
         // What an export is to prove is chained before it is read.
         if let Access::Exported { session, .. } = access {
             chain::seal(&mut transaction, &session.to_string(), &wall, false).await?;
@@ -184,6 +201,8 @@ impl Recorder {
         .await?;
 
         let number = done.last_insert_rowid().to_string();
+        name_actor(&mut transaction, self.account.as_ref(), "access", &number, access.session(), &wall).await?;
+        // Last: the chain of an export ends with the record of the export.
         let head = chain::append(&mut transaction, "access", &number, &wall).await?;
         transaction.commit().await?;
         Ok(head)

@@ -3,9 +3,11 @@
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
+use super::actors::name_actor;
 use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use crate::ids::SessionId;
+use crate::trial::account::Actor;
 use crate::trial::consent::{Consent, Medium};
 use crate::trial::role::Role;
 
@@ -33,7 +35,7 @@ impl Store {
         &self,
         session: SessionId,
         consent: &Consent,
-        by: Role,
+        by: &Actor,
         stamp: Stamp,
     ) -> Result<(), StoreError> {
         let _turn = self.turn().await;
@@ -49,7 +51,7 @@ async fn insert_consent(
     run: i64,
     session: SessionId,
     consent: &Consent,
-    by: Role,
+    by: &Actor,
     stamp: Stamp,
 ) -> Result<(), StoreError> {
     let wall = stamp.wall.to_string();
@@ -63,7 +65,7 @@ async fn insert_consent(
     .bind(consent.given_on.to_string())
     .bind(&consent.obtained_by)
     .bind(consent.medium.name())
-    .bind(by.name())
+    .bind(by.role.name())
     .bind(run)
     .bind(&wall)
     .bind(nanoseconds(stamp.at))
@@ -72,6 +74,7 @@ async fn insert_consent(
 
     let number = done.last_insert_rowid().to_string();
     chain::append(&mut transaction, "consent", &number, &wall).await?;
+    name_actor(&mut transaction, by.account.as_ref(), "consent", &number, Some(session), &wall).await?;
     Ok(transaction.commit().await?)
 }
 

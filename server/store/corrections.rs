@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
+use super::actors::name_actor;
 use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use crate::ids::{IdempotencyKey, SessionId};
+use crate::trial::account::AccountName;
 use crate::trial::correction::{Field, Subject};
 use crate::trial::question::AnswerValue;
 use crate::trial::role::Role;
@@ -84,14 +86,14 @@ impl Latest {
 }
 
 impl Store {
-    /// Records a correction. On disk when this returns.
+    /// Records a correction by `account`, if somebody was signed in. On disk when this returns.
     ///
     /// # Errors
     /// When the disk or database failed.
-    pub async fn correct(&self, correction: &Correction) -> Result<(), StoreError> {
+    pub async fn correct(&self, correction: &Correction, account: Option<&AccountName>) -> Result<(), StoreError> {
         let _turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
-        let corrected = insert_correction(&mut connection, self.inner.run, correction).await;
+        let corrected = insert_correction(&mut connection, self.inner.run, correction, account).await;
         drop_if_failed(connection, &corrected);
         corrected
     }
@@ -101,6 +103,7 @@ async fn insert_correction(
     connection: &mut SqliteConnection,
     run: i64,
     correction: &Correction,
+    account: Option<&AccountName>,
 ) -> Result<(), StoreError> {
     let wall = correction.stamp.wall.to_string();
     let mut transaction = begin(connection).await?;
@@ -125,6 +128,8 @@ async fn insert_correction(
 
     let number = done.last_insert_rowid().to_string();
     chain::append(&mut transaction, "correction", &number, &wall).await?;
+    let session = Some(correction.session);
+    name_actor(&mut transaction, account, "correction", &number, session, &wall).await?;
     Ok(transaction.commit().await?)
 }
 

@@ -4,10 +4,12 @@
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
+use super::actors::name_actor;
 use super::scrub::scrub;
 use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use crate::ids::SessionId;
+use crate::trial::account::AccountName;
 use crate::trial::erasure::Erasable;
 use crate::trial::role::Role;
 
@@ -46,27 +48,37 @@ impl Store {
     /// # Errors
     /// When the disk or database failed, or another program has the database open; then the words may still stand in
     /// free pages of the file or in its log, until the same is asked again or the server starts again.
-    pub async fn erase(&self, erasures: &[Erasure]) -> Result<(), StoreError> {
+    pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
         let _turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
-        let erased = insert_erasures(&mut connection, self.inner.run, erasures).await;
+        let erased = insert_erasures(&mut connection, self.inner.run, erasures, account).await;
         drop_if_failed(connection, &erased);
         erased?;
         scrub(&self.inner.trial).await
     }
 }
 
-async fn insert_erasures(connection: &mut SqliteConnection, run: i64, erasures: &[Erasure]) -> Result<(), StoreError> {
+async fn insert_erasures(
+    connection: &mut SqliteConnection,
+    run: i64,
+    erasures: &[Erasure],
+    account: Option<&AccountName>,
+) -> Result<(), StoreError> {
     // What is overwritten is zeroed. The driver's connection keeps this; others do not need it.
     sqlx::query("PRAGMA secure_delete = ON").execute(&mut *connection).await?;
     let mut transaction = begin(connection).await?;
     for erasure in erasures {
-        insert_erasure(&mut transaction, run, erasure).await?;
+        insert_erasure(&mut transaction, run, erasure, account).await?;
     }
     Ok(transaction.commit().await?)
 }
 
-async fn insert_erasure(connection: &mut SqliteConnection, run: i64, erasure: &Erasure) -> Result<(), StoreError> {
+async fn insert_erasure(
+    connection: &mut SqliteConnection,
+    run: i64,
+    erasure: &Erasure,
+    account: Option<&AccountName>,
+) -> Result<(), StoreError> {
     let wall = erasure.stamp.wall.to_string();
     let known = "SELECT number FROM erasures WHERE subject = ? AND record = ?";
     let known: Option<i64> = sqlx::query_scalar(known)
@@ -110,7 +122,9 @@ async fn insert_erasure(connection: &mut SqliteConnection, run: i64, erasure: &E
         .execute(&mut *connection)
         .await?;
     note_unfinished(connection, number).await?;
-    chain::append(connection, "erasure", &number.to_string(), &wall).await?;
+    let key = number.to_string();
+    chain::append(connection, "erasure", &key, &wall).await?;
+    name_actor(connection, account, "erasure", &key, Some(erasure.session), &wall).await?;
     Ok(())
 }
 

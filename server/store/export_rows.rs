@@ -8,7 +8,7 @@ use sqlx::{FromRow, Row as _};
 
 use super::chain::Entry;
 use super::export::{
-    AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
+    AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
 };
 use super::values::parsed;
 use super::{Reader, StoreError};
@@ -72,6 +72,12 @@ impl Reader {
         .await?;
 
         rows.iter().map(study_event_row).collect()
+    }
+
+    /// The accounts behind the records of `session`.
+    pub(super) async fn export_actors(&self, session: SessionId) -> Result<Vec<ActorRow>, StoreError> {
+        let rows = sqlx::query_as("SELECT * FROM actors WHERE session = ? ORDER BY number");
+        Ok(rows.bind(session.to_string()).fetch_all(self.pool()).await?)
     }
 
     /// Hands the blinded telemetry of `session` to `take`, row by row.

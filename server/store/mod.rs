@@ -6,6 +6,8 @@
 //! and go.
 
 mod accesses;
+mod accounts;
+mod actors;
 pub mod backup;
 mod chain;
 mod consents;
@@ -32,6 +34,7 @@ mod verify;
 mod withdrawals;
 
 pub use accesses::{Access, Recorder};
+pub use accounts::{AccountBook, AccountEvent, FailedAttempt, PassphraseHash, StoredSignIn};
 pub use chain::Head;
 pub use consents::StoredConsent;
 pub use corrections::{Correction, Latest, StoredCorrection};

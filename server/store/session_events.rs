@@ -2,6 +2,7 @@
 
 use sqlx::sqlite::SqliteConnection;
 
+use super::actors::name_actor;
 use super::values::nanoseconds;
 use super::{StoreError, chain};
 use crate::ids::SessionId;
@@ -37,7 +38,9 @@ pub(super) async fn insert_event(
     .await?;
 
     if done.rows_affected() == 1 {
-        chain::append(connection, "event", &format!("{session}/{}", event.number), &wall).await?;
+        let key = format!("{session}/{}", event.number);
+        chain::append(connection, "event", &key, &wall).await?;
+        name_actor(connection, event.account.as_ref(), "event", &key, Some(session), &wall).await?;
     }
 
     Ok(())

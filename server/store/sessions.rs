@@ -13,6 +13,7 @@ use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
 use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
+use crate::trial::account::AccountName;
 use crate::trial::allocation::{Algorithm, Seed};
 use crate::trial::event::{Event, EventKind};
 use crate::trial::grace::{DEFAULT_GRACE, Grace};
@@ -57,6 +58,8 @@ pub struct StoredSession {
     pub run: i64,
     /// Its events so far, each with the start of the server that recorded it.
     pub events: Vec<(i64, Event)>,
+    /// The study that it belongs to; none outside any study.
+    pub study: Option<String>,
     /// When its study was locked, by the wall clock, if it belongs to one that was.
     pub study_locked: Option<Timestamp>,
 }
@@ -236,6 +239,7 @@ impl Reader {
             made,
             run: row.try_get("run")?,
             events: self.events(session).await?,
+            study: self.enrolment(session).await?.map(|enrolment| enrolment.study),
             study_locked: self.study_locked(session).await?,
         }))
     }
@@ -254,7 +258,9 @@ impl Reader {
     /// When the database failed or holds what this version cannot read.
     pub async fn events(&self, session: SessionId) -> Result<Vec<(i64, Event)>, StoreError> {
         let rows = sqlx::query(
-            "SELECT run, number, wall, monotonic_ns, role, payload FROM events WHERE session = ? ORDER BY number",
+            "SELECT run, number, wall, monotonic_ns, role, payload, (SELECT account FROM actors AS a
+                 WHERE a.kind = 'event' AND a.record = e.session || '/' || e.number) AS account
+             FROM events AS e WHERE session = ? ORDER BY number",
         )
         .bind(session.to_string())
         .fetch_all(self.pool())
@@ -301,7 +307,10 @@ fn event(row: &SqliteRow) -> Result<Event, StoreError> {
     let kind: EventKind =
         serde_json::from_str(&payload).map_err(|error| StoreError::Damaged(format!("event {payload}: {error}")))?;
     let Stamp { wall, at } = stamp(row)?;
-    Ok(Event { number: row.try_get("number")?, by, at, wall, kind })
+    let account: Option<String> = row.try_get("account")?;
+    let account = account.map(|name| AccountName::new(&name)).transpose();
+    let account = account.map_err(|error| StoreError::Damaged(error.to_string()))?;
+    Ok(Event { number: row.try_get("number")?, by, account, at, wall, kind })
 }
 
 pub(super) fn algorithm(row: &SqliteRow) -> Result<Algorithm, StoreError> {

@@ -4,6 +4,7 @@
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
+use super::account::AccountName;
 use super::role::Role;
 use crate::clock::Moment;
 use crate::ids::SegmentId;
@@ -15,6 +16,8 @@ pub struct Event {
     pub number: u32,
     /// Who.
     pub by: Role,
+    /// The personal account under which it was done, where somebody was signed in.
+    pub account: Option<AccountName>,
     /// When, by the monotonic clock of the server's run.
     pub at: Moment,
     /// When, by the server's wall clock.

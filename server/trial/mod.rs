@@ -2,6 +2,7 @@
 //! random source are handed in.
 
 pub mod acceptance;
+pub mod account;
 pub mod action;
 pub mod allocation;
 pub mod answers;

@@ -127,7 +127,14 @@ mod tests {
 
         let mut state = SessionState::new(plan);
         for (kind, number) in kinds.into_iter().zip(1..) {
-            state.apply(&Event { number, by: Role::System, at: now(), wall: Timestamp::UNIX_EPOCH, kind });
+            state.apply(&Event {
+                number,
+                by: Role::System,
+                account: None,
+                at: now(),
+                wall: Timestamp::UNIX_EPOCH,
+                kind,
+            });
         }
         state
     }

@@ -59,6 +59,8 @@ pub struct OperatorView {
     pub surgeon: SurgeonView,
     /// Participant's code.
     pub participant: String,
+    /// The study that it belongs to; none outside any study.
+    pub study: Option<String>,
     /// Protocol's name.
     pub protocol: String,
     /// The version of the consent text without which the session does not start; none where none is required.
@@ -96,6 +98,8 @@ pub struct LogLine {
     pub at: jiff::Timestamp,
     /// Who.
     pub by: Role,
+    /// The account of whoever it was, where the person was signed in.
+    pub account: Option<String>,
     /// What happened.
     pub text: String,
 }

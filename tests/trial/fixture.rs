@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use parfocal::accounts::{Accounts, Cost, Passphrase};
 use parfocal::autofocus::{BlurRate, PolicyName, Registry};
 use parfocal::camera::{CameraHealth, CameraOffer};
 use parfocal::clock::{Clock, ManualClock};
@@ -13,6 +14,7 @@ use parfocal::control::{Command, ControlHandle, ControlStatus, LatestSlot, Tap};
 use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
 use parfocal::lens::{FocalPower, LensHealth};
 use parfocal::store::{Recorder, Run, Store};
+use parfocal::trial::account::{Account, AccountName, AccountRole};
 use parfocal::trial::action::Action;
 use parfocal::trial::phase::Phase;
 use parfocal::trial::question::{AnswerValue, QuestionKind};
@@ -25,6 +27,12 @@ use tokio::sync::{mpsc, watch};
 use uuid::Uuid;
 
 pub const PARTICIPANT: &str = "S-01";
+
+/// The passphrase of every account.
+pub const PASSPHRASE: &str = "four words and a number 7";
+
+/// Cheap to hash: most tests sign in to see something else.
+pub const CHEAP: Cost = Cost { memory_kib: 64, passes: 1 };
 
 /// A server on a folder of its own, without HTTP.
 pub struct Trial {
@@ -88,6 +96,17 @@ impl Trial {
 
     pub fn key(&mut self) -> IdempotencyKey {
         IdempotencyKey(Uuid::from_u64_pair(self.keys.next_u64(), self.keys.next_u64()))
+    }
+
+    /// Its personal accounts.
+    pub fn accounts(&self) -> Accounts {
+        Accounts::of_server(&self.store, self.clock.clone(), CHEAP)
+    }
+
+    /// Makes an account.
+    pub async fn account(&self, name: &str, role: AccountRole, display: &str) -> Account {
+        let passphrase = Passphrase::new(PASSPHRASE).unwrap();
+        self.accounts().add(AccountName::new(name).unwrap(), display, role, passphrase, None).await.unwrap()
     }
 
     /// As the researcher's page exports.

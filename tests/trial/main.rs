@@ -1,5 +1,6 @@
 //! Trials from outside: conductor, store and export together, on a real database file.
 
+mod accounts;
 mod balance;
 mod chain;
 mod consent;

@@ -54,6 +54,7 @@ OPEN = {
         "study number wall run monotonic_ns role person kind about_session commitment",
     ),
     "study-session": ("study_sessions", "session study site protocol place"),
+    "actor": ("actors", "number kind record session account display"),
 }
 SEALED = {
     "event": ["reason"],

@@ -20,6 +20,8 @@ use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::extract::{Query, State};
 use axum::response::Response;
 use bytes::Bytes;
+use futures_util::FutureExt;
+use futures_util::future::BoxFuture;
 use serde::Deserialize;
 use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
@@ -27,9 +29,13 @@ use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
+use super::credentials::Pass;
 use super::error::Error;
+use super::people::SignedIn;
 use super::roles::Roles;
 use super::shutdown::ended;
+use super::tablets;
+use crate::accounts::Token;
 use crate::clock::Moment;
 use crate::control::ControlStatus;
 use crate::imaging::Size;
@@ -46,6 +52,10 @@ const HEARTBEAT: Duration = Duration::from_secs(5);
 
 /// A message that has not left by then never will.
 const SEND_LIMIT: Duration = Duration::from_secs(10);
+
+/// The code of a connection that is closed because the surgeon's link opens this no more. Of the codes for private
+/// use, like HTTP's 403.
+const LINK_OVER: u16 = 4403;
 
 /// Pages send acknowledgements, nothing longer.
 const LARGEST_REQUEST: usize = 1024;
@@ -66,25 +76,36 @@ struct LiveQuery {
 async fn live(
     State(app): State<AppState>,
     roles: Roles,
+    SignedIn(person): SignedIn,
     Query(query): Query<LiveQuery>,
     upgrade: WebSocketUpgrade,
 ) -> Result<Response, Error> {
     let role = roles.choose(query.role)?;
+    let pass = roles.pass().filter(|_| role == Role::Surgeon);
+    let token = person.filter(|_| roles.by_account_alone(role)).map(|person| person.token);
     let upgrade = upgrade.max_message_size(LARGEST_REQUEST).read_buffer_size(LARGEST_REQUEST * 4);
     Ok(upgrade.on_upgrade(async move |socket| match role {
-        Role::Operator | Role::Researcher => attend::<ForOperator>(socket, app).await,
-        Role::Surgeon | Role::System => attend::<ForSurgeon>(socket, app).await,
+        Role::Operator | Role::Researcher => attend::<ForOperator>(socket, Desk::new(app, None, token)).await,
+        Role::Surgeon | Role::System => attend::<ForSurgeon>(socket, Desk::new(app, pass, None)).await,
     }))
 }
 
 /// Serves one page until it leaves or the server ends.
-async fn attend<A: Audience>(mut socket: WebSocket, app: AppState) {
-    let mut desk = Desk::<A>::new(app);
+async fn attend<A: Audience>(mut socket: WebSocket, mut desk: Desk<A>) {
     while let Ok(Some(message)) = desk.next_message(&mut socket).await {
         let last = matches!(message, Message::Close(_));
         if !matches!(timeout(SEND_LIMIT, socket.send(message)).await, Ok(Ok(()))) || last {
             break;
         }
+    }
+}
+
+/// Comes when a page with `pass` may see the screens no more; never for a page without one.
+fn no_longer_admitted(app: &AppState, pass: Option<Pass>) -> BoxFuture<'static, Error> {
+    let app = AppState::clone(app);
+    match pass {
+        Some(pass) => async move { tablets::no_longer_admitted(&app, pass).await }.boxed(),
+        None => std::future::pending().boxed(),
     }
 }
 
@@ -121,6 +142,12 @@ struct Desk<A: Audience> {
     told: Option<A::Status>,
     shutdown: watch::Receiver<bool>,
     heartbeat: tokio::time::Interval,
+    /// Comes when a surgeon's page may see the screens no more.
+    over: BoxFuture<'static, Error>,
+    /// What lets a surgeon's page in.
+    pass: Option<Pass>,
+    /// What lets a page in that shows no link.
+    token: Option<Token>,
     /// Heartbeats since the page was last heard.
     silent: u32,
     /// The message that goes out next, before any other.
@@ -128,7 +155,7 @@ struct Desk<A: Audience> {
 }
 
 impl<A: Audience> Desk<A> {
-    fn new(app: AppState) -> Self {
+    fn new(app: AppState, pass: Option<Pass>, token: Option<Token>) -> Self {
         let mut heartbeat = interval(HEARTBEAT);
         heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut sessions = A::sessions(&app);
@@ -151,6 +178,9 @@ impl<A: Audience> Desk<A> {
             told: None,
             shutdown: app.shutdown.clone(),
             heartbeat,
+            over: no_longer_admitted(&app, pass),
+            pass,
+            token,
             silent: 0,
             next: None,
             app,
@@ -165,6 +195,7 @@ impl<A: Audience> Desk<A> {
 
         loop {
             let message = tokio::select! {
+                _ = &mut self.over => Some(close(LINK_OVER, "the link opens this no more")),
                 () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
                 heard = socket.recv() => match heard {
                     Some(Ok(message)) => self.hear(&message)?,
@@ -175,7 +206,7 @@ impl<A: Audience> Desk<A> {
                 next = Self::next_frame(&mut self.watcher, &mut self.coming, self.due), if self.in_flight.is_none() => {
                     self.take(next)
                 }
-                _ = self.heartbeat.tick() => self.beat()?,
+                _ = self.heartbeat.tick() => self.beat().await?,
             };
 
             if message.is_some() {
@@ -253,6 +284,11 @@ impl<A: Audience> Desk<A> {
     }
 
     fn session(&mut self) -> Option<Message> {
+        // The page of a tablet that may not see this session is about to be closed.
+        if self.pass.is_some_and(|pass| tablets::admit(&self.app, pass).is_err()) {
+            return None;
+        }
+
         // Whether a policy may be named depends on the session.
         self.statuses.mark_changed();
         let view = self.sessions.borrow_and_update().clone();
@@ -328,7 +364,13 @@ impl<A: Audience> Desk<A> {
         Some(Message::Binary(message))
     }
 
-    fn beat(&mut self) -> Result<Option<Message>, Left> {
+    async fn beat(&mut self) -> Result<Option<Message>, Left> {
+        if let Some(token) = &self.token
+            && self.app.accounts.has_ended(token).await.unwrap_or(false)
+        {
+            return Ok(Some(close(close_code::POLICY, "the sign-in has ended")));
+        }
+
         self.silent += 1;
         if self.silent > 2 {
             return Err(Left);

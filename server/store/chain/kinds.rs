@@ -226,8 +226,29 @@ const STUDY_SESSION: Kind = Kind {
     order: "session",
 };
 
+const ACCOUNT_EVENT: Kind = Kind {
+    name: "account-event",
+    table: "account_events",
+    open: &["number", "run", "wall", "monotonic_ns", "account", "kind", "done_by", "detail"],
+    sealed: &[],
+    select: "SELECT CAST(number AS TEXT) AS chain_key, NULL AS chain_session, number AS chain_order, *
+         FROM account_events",
+    one: "number = ?",
+    order: "number",
+};
+
+const ACTOR: Kind = Kind {
+    name: "actor",
+    table: "actors",
+    open: &["number", "kind", "record", "session", "account", "display"],
+    sealed: &[],
+    select: "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, * FROM actors",
+    one: "number = ?",
+    order: "number",
+};
+
 /// Every kind but telemetry, which is sealed in blocks.
-pub const KINDS: [Kind; 14] = [
+pub const KINDS: [Kind; 16] = [
     RUN,
     PARTICIPANT,
     SESSION,
@@ -242,6 +263,8 @@ pub const KINDS: [Kind; 14] = [
     STUDY,
     STUDY_EVENT,
     STUDY_SESSION,
+    ACCOUNT_EVENT,
+    ACTOR,
 ];
 
 /// The kind called `name`.

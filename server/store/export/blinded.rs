@@ -137,6 +137,7 @@ impl Blinded {
         copy(folder, &mut copies, &ExportedStudy::study_rows(study)).await?;
         copy(folder, &mut copies, &ExportedStudy::session_rows(study)).await?;
         copy(folder, &mut copies, ExportedStudy::event_rows(study)).await?;
+        copy(folder, &mut copies, &reader.export_actors(self.session()).await?).await?;
         folder.json("session.json", &Value::Object(copies)).await?;
 
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;

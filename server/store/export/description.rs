@@ -502,6 +502,24 @@ table! {
 }
 
 table! {
+    name: "actors",
+    description: "Under which personal account a record was made; a record without a row was made by whoever held a \
+                  role's link, by the command line, or by the server",
+    key: [number],
+    row:
+    /// The account behind a record.
+    #[derive(Debug, Clone, sqlx::FromRow)]
+    ActorRow {
+        number: i64 = means("Order of the row in the database").since(6),
+        kind: String = means("Kind of the record, as in chain.csv").since(6),
+        record: String = means("Key of the record, as in chain.csv").since(6),
+        session: String = means("Session id").since(6),
+        account: String = means("The account's name").since(6),
+        display: String = means("The person's name then").since(6),
+    }
+}
+
+table! {
     name: "chain",
     description:
         "The chain of all records of the database up to this export, in order: of the rows that are not \
@@ -632,7 +650,7 @@ table! {
 }
 
 /// Every table that an export may have.
-pub const ALL: [Table; 23] = [
+pub const ALL: [Table; 24] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -650,6 +668,7 @@ pub const ALL: [Table; 23] = [
     StudyRow::TABLE,
     StudySessionRow::TABLE,
     StudyEventRow::TABLE,
+    ActorRow::TABLE,
     ChainRow::TABLE,
     TelemetryRow::TABLE,
     AllocationRow::TABLE,

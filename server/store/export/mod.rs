@@ -19,7 +19,7 @@ use serde::Serialize;
 
 pub use self::description::ALL as TABLES;
 pub(super) use self::description::{
-    AccessRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
+    AccessRow, ActorRow, ChainRow, ChainSaltRow, PolicyStepRow, RunRow, StudyEventRow, TelemetryRow, WeightsRow,
 };
 pub use self::destination::ZipStream;
 pub use self::error::ExportError;

@@ -8,6 +8,7 @@ use super::{Enrolment, StoredStudy};
 use crate::ids::SessionId;
 use crate::store::values::parsed;
 use crate::store::{Reader, StoreError};
+use crate::trial::account::AccountName;
 use crate::trial::allocation::Seed;
 use crate::trial::phase::SessionStatus;
 use crate::trial::protocol::Protocol;
@@ -81,10 +82,14 @@ impl Reader {
     /// # Errors
     /// When the database failed or holds what this version cannot read.
     pub async fn study_events(&self, study: &str) -> Result<Vec<StudyEvent>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM study_events WHERE study = ? ORDER BY number")
-            .bind(study)
-            .fetch_all(self.pool())
-            .await?;
+        let rows = sqlx::query(
+            "SELECT *, (SELECT account FROM actors AS a
+                 WHERE a.kind = 'study-event' AND a.record = study || '/' || e.number) AS account
+             FROM study_events AS e WHERE study = ? ORDER BY number",
+        )
+        .bind(study)
+        .fetch_all(self.pool())
+        .await?;
         rows.iter().map(event).collect()
     }
 
@@ -151,10 +156,13 @@ fn event(row: &SqliteRow) -> Result<StudyEvent, StoreError> {
         None => None,
     };
 
+    let account: Option<String> = row.try_get("account")?;
+    let account = account.map(|name| AccountName::new(&name)).transpose();
+    let account = account.map_err(|error| StoreError::Damaged(error.to_string()))?;
     Ok(StudyEvent {
         number: row.try_get("number")?,
         way: Way::named(&way).ok_or_else(|| StoreError::Damaged(format!("unknown role '{way}'")))?,
-        signature: Signature { person: row.try_get("person")?, reason: row.try_get("reason")? },
+        signature: Signature { person: row.try_get("person")?, reason: row.try_get("reason")?, account },
         wall: parsed(row, "wall")?,
         kind: StudyEventKind::of(&kind, session, row.try_get("commitment")?)
             .ok_or_else(|| StoreError::Damaged(format!("unknown event '{kind}' of a study")))?,

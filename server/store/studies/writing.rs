@@ -4,6 +4,7 @@ use sqlx::sqlite::SqliteConnection;
 
 use super::{Enrolment, NewStudy, StudyChange};
 use crate::ids::SessionId;
+use crate::store::actors::name_actor;
 use crate::store::session_events::insert_event;
 use crate::store::values::{begin, nanoseconds};
 use crate::store::{StoreError, chain};
@@ -90,7 +91,9 @@ async fn insert_change(
     .bind(event.kind.commitment())
     .execute(&mut *connection)
     .await?;
-    chain::append(connection, "study-event", &format!("{study}/{}", event.number), &wall).await?;
+    let key = format!("{study}/{}", event.number);
+    chain::append(connection, "study-event", &key, &wall).await?;
+    name_actor(connection, event.signature.account.as_ref(), "study-event", &key, None, &wall).await?;
 
     for (session, events) in &change.sessions {
         let run = run.ok_or_else(|| StoreError::Damaged("only a server records a session's events".to_owned()))?;

@@ -45,7 +45,7 @@ impl Run {
     fn record(&mut self, by: Role, kinds: Vec<EventKind>) {
         for kind in kinds {
             let number = u32::try_from(self.log.len()).unwrap() + 1;
-            let event = Event { number, by, at: self.now, wall: Timestamp::UNIX_EPOCH, kind };
+            let event = Event { number, by, account: None, at: self.now, wall: Timestamp::UNIX_EPOCH, kind };
             self.state.apply(&event);
             self.log.push(event);
         }

@@ -21,6 +21,12 @@ pub enum StudyRefusal {
         /// Most characters.
         longest: usize,
     },
+    /// Nobody could act in it.
+    #[error(
+        "in a study everybody but the surgeon acts under a personal account, and nobody has one: make accounts first, \
+         with `parfocal account add NAME --role lead`"
+    )]
+    NoAccounts,
     /// It is open.
     #[error("the study is open already")]
     AlreadyOpen,

@@ -1,6 +1,7 @@
 //! Who changes a study, by which way, and why.
 
 use super::refusal::StudyRefusal;
+use crate::trial::account::{Account, AccountName};
 use crate::trial::role::Role;
 
 /// Longest reason, characters.
@@ -37,14 +38,16 @@ impl Way {
 /// Who does something to a study, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signature {
-    /// The person, by name or function. Nobody checks it yet.
+    /// The person, by name or function: the display name of the account, or what the command line was told.
     pub person: String,
     /// Why.
     pub reason: String,
+    /// The account under which the person signed in; none for the command line.
+    pub account: Option<AccountName>,
 }
 
 impl Signature {
-    /// A signature of `person` with `reason`.
+    /// A signature of `person` with `reason`, by the command line, where nobody signs in.
     ///
     /// # Errors
     /// When one of them is missing or too long.
@@ -58,6 +61,13 @@ impl Signature {
         if !(1..=LONGEST_REASON).contains(&reason.chars().count()) {
             return Err(StudyRefusal::NoReason { longest: LONGEST_REASON });
         }
-        Ok(Self { person: person.to_owned(), reason: reason.to_owned() })
+        Ok(Self { person: person.to_owned(), reason: reason.to_owned(), account: None })
+    }
+    /// A signature of whoever is signed in to `account`, with `reason`.
+    ///
+    /// # Errors
+    /// When the reason is missing or too long.
+    pub fn of_account(account: &Account, reason: &str) -> Result<Self, StudyRefusal> {
+        Ok(Self { account: Some(account.account.clone()), ..Self::new(&account.display, reason)? })
     }
 }

@@ -63,6 +63,8 @@ pub struct StudyCircumstances<'a> {
     pub on_screens: Option<SessionId>,
     /// Sessions for which a surgeon's device may still hold something that counts.
     pub outstanding: usize,
+    /// Whether somebody can sign in.
+    pub has_accounts: bool,
 }
 
 impl StudyState {
@@ -109,7 +111,7 @@ impl StudyState {
     ) -> Result<(), StudyRefusal> {
         check_way(way)?;
         match change {
-            Change::Open => self.check_open(),
+            Change::Open => self.check_open(circumstances.has_accounts),
             Change::Close => self.check_close(),
             Change::Lock { despite_outstanding } => self.check_lock(circumstances, despite_outstanding),
             Change::Unblind => self.check_unblind(signature, circumstances.definition),
@@ -128,8 +130,9 @@ impl StudyState {
         }
     }
 
-    const fn check_open(&self) -> Result<(), StudyRefusal> {
+    const fn check_open(&self, has_accounts: bool) -> Result<(), StudyRefusal> {
         match self.stage {
+            Stage::Planned | Stage::Closed if !has_accounts => Err(StudyRefusal::NoAccounts),
             Stage::Planned | Stage::Closed => Ok(()),
             Stage::Open => Err(StudyRefusal::AlreadyOpen),
             Stage::Locked | Stage::Unblinded => Err(StudyRefusal::Locked),

@@ -5,7 +5,7 @@ use super::screenshots::shoot;
 use super::theatre::operator;
 use super::wait::until;
 use crate::http::studies::{definition, server};
-use crate::support::Server;
+use crate::support::{PASSPHRASE, Server};
 
 async fn researcher(driver: &Driver, server: &Server) -> Browser {
     let browser = driver.browser().await;
@@ -13,11 +13,24 @@ async fn researcher(driver: &Driver, server: &Server) -> Browser {
     browser
 }
 
-/// Signs in the dialog and goes on.
-async fn sign(page: &Browser, person: &str, reason: &str) {
+/// Gives a reason in the dialog and goes on.
+async fn sign(page: &Browser, reason: &str) {
     page.type_into("#reason", reason).await;
-    page.type_into("#person", person).await;
     page.click("#reason-go").await;
+}
+
+/// The same with the passphrase once more.
+async fn confirm(page: &Browser, reason: &str, passphrase: &str) {
+    page.type_into("#reason", reason).await;
+    page.type_into("#passphrase", passphrase).await;
+    page.click("#reason-go").await;
+}
+
+/// Signs in on the page for that.
+async fn sign_in(page: &Browser, name: &str, passphrase: &str) {
+    page.type_into("#name", name).await;
+    page.type_into("#passphrase", passphrase).await;
+    page.click("#sign-in-go").await;
 }
 
 /// The operator prepares a session in the study and ends it again.
@@ -42,8 +55,23 @@ async fn a_session(operator: &Browser) {
     assert_eq!(operator.count("#protocol option").await, 1, "the study's protocols alone");
     shoot(operator, "operator-11-study").await;
 
+    // The operator's link is not enough: the page asks to sign in over itself, and keeps what was chosen.
+    operator.click("#new-session [type=submit]").await;
+    operator.sees("#sign-in-dialog", "Sign in to go on").await;
+    shoot(operator, "operator-12-sign-in").await;
+    operator.type_into("#sign-in-name", "operator").await;
+    operator.type_into("#sign-in-passphrase", PASSPHRASE).await;
+    operator.click("#sign-in-dialog [type=submit]").await;
+    operator.sees_no("#sign-in-dialog").await;
+    operator.sees(".person", "Nurse Op").await;
+    assert_eq!(operator.value("#study").await, "scope-2026/leeds");
+    let shared = operator.value("#surgeon-link").await;
+
     operator.click("#new-session [type=submit]").await;
     operator.sees("#phase", "Ready to start").await;
+    operator.sees("#link-session", "to this session alone").await;
+    until("the link to this session", || async { operator.value("#surgeon-link").await != shared }).await;
+    shoot(operator, "operator-13-link").await;
     operator.click_labelled("#session-actions", "Abort").await;
     operator.type_into("#reason", "The light failed").await;
     operator.click("#reason-go").await;
@@ -55,6 +83,8 @@ async fn a_session(operator: &Browser) {
 async fn a_study_is_led_from_the_pages() {
     let driver = Driver::start();
     let (_protocols, server) = server();
+    server.add_account("lead", "lead", "Dr Lead");
+    server.add_account("operator", "operator", "Nurse Op");
     let operator = operator(&driver, &server).await;
     operator.sees("#new-session", "Prepare session").await;
     operator.sees_no("#study-choice").await;
@@ -63,8 +93,17 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("nav", "Studies").await;
     page.open(&server.url("/researcher/studies")).await;
     page.sees("main", "No studies yet").await;
+    page.sees("main", "Sign in to plan a study").await;
+    page.click("#sign-in").await;
+    sign_in(&page, "lead", "not the passphrase").await;
+    page.sees("#sign-in-trouble", "do not belong together").await;
+    shoot(&page, "sign-in-1-refused").await;
+    page.clear("#passphrase").await;
+    page.type_into("#passphrase", PASSPHRASE).await;
+    page.click("#sign-in-go").await;
+    page.sees(".person", "Dr Lead").await;
+    page.sees("main", "No studies yet").await;
     page.paste("#definition", &definition().replace("spares = 1", "spares = 1000")).await;
-    page.type_into("#planner", "Dr Lead").await;
     page.type_into("#plan-reason", "Ethics approved it").await;
     page.click("#plan-go").await;
     page.sees("#plan-trouble", "key 'spares': must be from 0 to 500 places, not 1000").await;
@@ -76,7 +115,7 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("main", "Leeds General Infirmary").await;
     page.click("#open").await;
     shoot(&page, "study-2-opening").await;
-    sign(&page, "Dr Lead", "The first surgeon comes").await;
+    sign(&page, "The first surgeon comes").await;
     page.sees("#stage", "open").await;
     page.sees("#commitment", "parfocal study scope-2026 definition").await;
 
@@ -87,26 +126,38 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("main", "aborted").await;
     shoot(&page, "study-3-open").await;
     page.click_labelled("td", "Withdraw").await;
-    sign(&page, "Dr Lead", "The surgeon asked for it").await;
+    sign(&page, "The surgeon asked for it").await;
     page.sees("td .badge.warn", "withdrawn").await;
 
     page.click("#close").await;
-    sign(&page, "Dr Lead", "The last surgeon was here").await;
+    sign(&page, "The last surgeon was here").await;
     page.sees("#stage", "closed").await;
     page.click("#lock").await;
     // The tablet may still hold something: the page wants to be told that it is known.
     page.sees("#reason-confirm", "Lock anyway").await;
     page.click("#reason-confirmed").await;
-    sign(&page, "Dr Lead", "The data are complete").await;
+    confirm(&page, "The data are complete", "not the passphrase").await;
+    page.sees("#reason-trouble", "This is not your passphrase").await;
+    shoot(&page, "study-4-passphrase").await;
+    page.clear("#passphrase").await;
+    page.type_into("#passphrase", PASSPHRASE).await;
+    page.click("#reason-go").await;
     page.sees("#stage", "locked").await;
 
     page.click("#unblind").await;
-    sign(&page, "Dr Lead", "The analysis begins").await;
+    confirm(&page, "The analysis begins", PASSPHRASE).await;
     page.sees("#reason-trouble", "'Dr Lead' is not among those who may unblind this study").await;
     shoot(&page, "study-4-refused").await;
-    page.clear("#person").await;
-    page.type_into("#person", "Trial statistician").await;
-    page.click("#reason-go").await;
+
+    // Somebody else signs in: the definition names them.
+    server.add_account("statistician", "lead", "Trial statistician");
+    page.click("#reason-dialog [data-close]").await;
+    page.click("#sign-out").await;
+    page.sees("main", "Sign in").await;
+    page.open(&server.url("/sign-in?next=/researcher/studies/scope-2026")).await;
+    sign_in(&page, "statistician", PASSPHRASE).await;
+    page.click("#unblind").await;
+    confirm(&page, "The analysis begins", PASSPHRASE).await;
     page.sees("#stage", "unblinded").await;
     page.sees(".study-events", "Study unblinded: The analysis begins").await;
     shoot(&page, "study-5-unblinded").await;

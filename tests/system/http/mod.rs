@@ -1,5 +1,6 @@
 //! The server over HTTP: who may do what, what every response carries, and how it starts and ends.
 
+mod accounts;
 mod blinding;
 mod crowd;
 mod evidence;

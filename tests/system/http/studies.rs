@@ -12,7 +12,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 
 use super::live::{Heard, Page};
-use crate::support::{Server, client};
+use crate::support::{PASSPHRASE, Server, client};
 
 const PROTOCOL: &str = include_str!("pair.toml");
 
@@ -42,38 +42,54 @@ fn on(data: Arc<TempDir>, protocols: &Path) -> Server {
 }
 
 /// All that came back, headers included, and the status.
-async fn ask(server: &Server, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
+pub async fn ask(server: &Server, role: &str, method: Method, path: &str, body: &Value) -> (StatusCode, String) {
     let request = client().request(method, server.url(path)).bearer_auth(server.key(role)).json(body);
     let response = request.send().await.unwrap();
     (response.status(), response.text().await.unwrap())
 }
 
-async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
+pub async fn post(server: &Server, role: &str, path: &str, body: Value) -> Value {
     let (status, said) = ask(server, role, Method::POST, path, &body).await;
     assert!(status.is_success(), "{path} {body}: {status} {said}");
     serde_json::from_str(&said).unwrap_or_default()
 }
 
-async fn refused(server: &Server, role: &str, path: &str, body: Value) -> (u16, String) {
+pub async fn refused(server: &Server, role: &str, path: &str, body: Value) -> (u16, String) {
     let (status, said) = ask(server, role, Method::POST, path, &body).await;
     assert!(!status.is_success(), "{path} {body}: {said}");
     (status.as_u16(), said)
 }
 
+/// Makes the account of a lead, who then acts as operator and researcher.
+pub async fn sign_in_as_lead(server: &mut Server) {
+    server.add_account("lead", "lead", "Dr Lead");
+    let token = server.sign_in("lead").await;
+    server.use_key("operator", &token);
+    server.use_key("researcher", &token);
+}
+
+/// The tablet opens the link to the session of a study under way.
+pub async fn take_session_link(server: &mut Server) {
+    let (_, said) = ask(server, "operator", Method::GET, "/api/operator/surgeon-link", &Value::Null).await;
+    let link: Value = serde_json::from_str(&said).unwrap();
+    let (_, key) = link["link"].as_str().unwrap().split_once("key=").unwrap();
+    server.use_key("surgeon", key);
+}
+
 /// Plans the study and opens it.
 pub async fn open(server: &Server) -> Value {
-    let plan = json!({"definition": definition(), "person": "Dr Lead", "reason": "ethics approved it"});
+    let plan = json!({"definition": definition(), "reason": "ethics approved it"});
     post(server, "researcher", "/api/researcher/studies", plan).await;
-    let opening = json!({"change": "open", "person": "Dr Lead", "reason": "the first surgeon comes"});
+    let opening = json!({"change": "open", "reason": "the first surgeon comes"});
     post(server, "researcher", "/api/researcher/studies/scope-2026/changes", opening).await
 }
 
-fn new_session(participant: &str) -> Value {
+pub fn new_session(participant: &str) -> Value {
     let study = json!({"study": "scope-2026", "site": "leeds"});
     json!({"participant": participant, "protocol": "pair", "study": study})
 }
 
-async fn act(server: &Server, role: &str, action: Value) {
+pub async fn act(server: &Server, role: &str, action: Value) {
     post(server, role, &format!("/api/{role}/actions"), action).await;
 }
 
@@ -98,9 +114,9 @@ async fn secrets(server: &Server) -> Vec<String> {
 
 #[tokio::test]
 async fn during_a_studys_session_nobody_is_sent_anything_of_an_order() {
-    let (_protocols, server) = server();
+    let (_protocols, mut server) = server();
+    sign_in_as_lead(&mut server).await;
     open(&server).await;
-    let mut surgeon_page = Page::open(&server, "surgeon").await;
     let mut operator_page = Page::open(&server, "operator").await;
     let mut surgeon = Vec::new();
     let mut others = Vec::new();
@@ -109,6 +125,8 @@ async fn during_a_studys_session_nobody_is_sent_anything_of_an_order() {
     let (status, made) = ask(&server, "operator", Method::POST, "/api/operator/sessions", &new_session("S-01")).await;
     assert_eq!(status, StatusCode::OK, "{made}");
     others.push(made);
+    take_session_link(&mut server).await;
+    let mut surgeon_page = Page::open(&server, "surgeon").await;
     let session = view(&server, &mut surgeon).await["session"].clone();
     act(&server, "operator", json!({"session": session, "action": "start"})).await;
 
@@ -168,20 +186,21 @@ async fn during_a_studys_session_nobody_is_sent_anything_of_an_order() {
 
 #[tokio::test]
 async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_not_fit() {
-    let (_protocols, server) = server();
+    let (_protocols, mut server) = server();
+    sign_in_as_lead(&mut server).await;
     let studies = "/api/researcher/studies";
     let changes = "/api/researcher/studies/scope-2026/changes";
-    let signed = |change: &str| json!({"change": change, "person": "Dr Lead", "reason": "as planned"});
+    let signed = |change: &str| json!({"change": change, "reason": "as planned", "passphrase": PASSPHRASE});
 
     let malformed = definition().replace("surgeons = 2", "surgeons = 0");
-    let plan = json!({"definition": malformed, "person": "Dr Lead", "reason": "x"});
+    let plan = json!({"definition": malformed, "reason": "x"});
     let (status, said) = refused(&server, "researcher", studies, plan).await;
     assert!(status == 422 && said.contains("key 'surgeons': must be from 1 to 500"), "{said}");
-    let unsigned = json!({"definition": definition(), "person": " ", "reason": "x"});
+    let unsigned = json!({"definition": definition(), "reason": " "});
     assert_eq!(refused(&server, "researcher", studies, unsigned).await.0, 422);
     assert_eq!(refused(&server, "researcher", changes, signed("open")).await.0, 404);
-    let plan = json!({"definition": definition(), "person": "Dr Lead", "reason": "x"});
-    assert_eq!(refused(&server, "operator", studies, plan).await.0, 403);
+    let plan = json!({"definition": definition(), "reason": "x"});
+    assert_eq!(refused(&server, "surgeon", studies, plan).await.0, 403);
 
     let study = open(&server).await;
     let line = study["commitment_line"].as_str().unwrap().to_owned();
@@ -213,7 +232,11 @@ async fn a_study_is_planned_opened_and_locked_over_http_and_refuses_what_does_no
     post(&server, "researcher", changes, lock).await;
     assert_eq!(refused(&server, "researcher", changes, signed("unblind")).await.0, 403);
 
-    let unblind = json!({"change": "unblind", "person": "Trial statistician", "reason": "the data are locked"});
+    // The definition names who may unblind.
+    server.add_account("statistician", "lead", "Trial statistician");
+    let token = server.sign_in("statistician").await;
+    server.use_key("researcher", &token);
+    let unblind = json!({"change": "unblind", "passphrase": PASSPHRASE, "reason": "the data are locked"});
     let study = post(&server, "researcher", changes, unblind).await;
     assert_eq!(study["stage"], "unblinded");
     let path = format!("/api/researcher/sessions/{}", session.as_str().unwrap());
@@ -256,6 +279,9 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
     assert!(!done && said.contains("there is a study 'scope-2026' already"), "{said}");
 
     let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());
+    assert!(!done && said.contains("make accounts first, with `parfocal account add NAME --role lead`"), "{said}");
+    server.add_account("lead", "lead", "Dr Lead");
+    let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());
     assert!(done && said.contains("parfocal study scope-2026 definition") && said.contains("chain "), "{said}");
     let line = said.lines().nth(1).unwrap().to_owned();
     let (done, said) = study(&[&["open", "scope-2026"][..], &signature].concat(), data.path());
@@ -267,7 +293,9 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
 
     // A session of it on a server that no longer has the protocol: the study kept its own.
     let none = tempfile::tempdir().unwrap();
-    let server = on(Arc::clone(&data), none.path());
+    let mut server = on(Arc::clone(&data), none.path());
+    let token = server.sign_in("lead").await;
+    server.use_key("operator", &token);
     post(&server, "operator", "/api/operator/participants", json!({"code": "S-01"})).await;
     let made = post(&server, "operator", "/api/operator/sessions", new_session("S-01")).await;
     assert_eq!(made["title"], "Comparison of two focus settings");

@@ -4,7 +4,7 @@ pub mod disk;
 #[cfg(feature = "aravis")]
 pub mod fake_camera;
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -64,6 +64,27 @@ impl Server {
     /// Key of `role`.
     pub fn key(&self, role: &str) -> &str {
         &self.keys.iter().find(|(name, _)| name == role).expect("a role").1
+    }
+
+    /// From now on a request of `role` shows `key`: the token of somebody who signed in, or the key of another link.
+    pub fn use_key(&mut self, role: &str, key: &str) {
+        let known = self.keys.iter_mut().find(|(name, _)| name == role).expect("a role");
+        key.clone_into(&mut known.1);
+    }
+
+    /// Makes an account on the server's data folder while it runs, as `parfocal account add` does.
+    pub fn add_account(&self, name: &str, role: &str, display: &str) {
+        let arguments = ["add", name, "--role", role, "--display", display];
+        let (done, said) = account(self.data.path(), &arguments);
+        assert!(done, "{said}");
+    }
+
+    /// The token of whoever signs in to account `name`.
+    pub async fn sign_in(&self, name: &str) -> String {
+        let body = serde_json::json!({"name": name, "passphrase": PASSPHRASE, "as_bearer": true});
+        let response = client().post(self.url("/api/sign-in")).json(&body).send().await.unwrap();
+        let signed_in: serde_json::Value = response.json().await.unwrap();
+        signed_in["token"].as_str().unwrap_or_else(|| panic!("{signed_in}")).to_owned()
     }
 
     /// Address of `path`.
@@ -128,6 +149,22 @@ pub fn refusal(mut command: Command) -> (Option<i32>, String) {
     let mut said = String::new();
     process.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     (process.wait().unwrap().code(), said)
+}
+
+/// The passphrase of every account.
+pub const PASSPHRASE: &str = "correct horse battery staple";
+
+/// What `parfocal account` says to `arguments` on `data`, given the passphrase on standard input; whether it succeeded.
+pub fn account(data: &std::path::Path, arguments: &[&str]) -> (bool, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    command.arg("account").args(arguments).arg("--data-dir").arg(data);
+    let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut process = piped.spawn().unwrap();
+    // A command that asks for no passphrase may have ended.
+    let _ = writeln!(process.stdin.take().unwrap(), "{PASSPHRASE}");
+    let output = process.wait_with_output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.success(), String::from_utf8(said).unwrap())
 }
 
 /// A client that follows no redirect and keeps no cookie by itself.

@@ -11,6 +11,7 @@ use std::path::Path;
 
 use parfocal::conductor::{ConductError, StudyDetail, StudySite};
 use parfocal::ids::SessionId;
+use parfocal::trial::account::AccountRole;
 use parfocal::trial::action::Action;
 use parfocal::trial::protocol::Protocol;
 use parfocal::trial::role::Role;
@@ -88,6 +89,9 @@ pub async fn a_trial_from(folder: &Path, seed: u64) -> Trial {
     let trial = Trial::start_with(folder, Some(folder), seed).await;
     for code in ["S-02", "S-03", "S-04", "S-05"] {
         trial.conductor.add_participant(Role::Operator, code).await.unwrap();
+    }
+    if trial.accounts().all().await.unwrap().is_empty() {
+        trial.account("lead", AccountRole::Lead, "Dr Lead").await;
     }
     trial
 }

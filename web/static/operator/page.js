@@ -1,8 +1,10 @@
 // The operator's page: the devices, and the session from preparing it to its end.
 
+import { get } from "../shared/api.js";
 import { byId } from "../shared/dom.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
+import "../shared/sign_in.js";
 import { serverAnswered } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
 import { drawCamera } from "./camera_card.js";
@@ -11,7 +13,7 @@ import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
 import { followRecording } from "./recording_card.js";
 import { SessionCard } from "./session_card.js";
-import { offerLink } from "./surgeon_link.js";
+import { followLink, offerLink } from "./surgeon_link.js";
 import { Traces } from "./traces.js";
 
 const TICK_MS = 250;
@@ -39,6 +41,7 @@ function followSession(next) {
   if (session && !next) refreshChoices();
   session = next;
   sessionCard.follow(session);
+  followLink(session);
   redrawFocus();
 }
 
@@ -68,7 +71,11 @@ viewer.live.listen({
   session: followSession,
   status: followStatus,
   connection: (open) => {
-    if (!open) return;
+    if (!open) {
+      // Where the sign-in has ended, the answer to this asks for it; a connection cannot.
+      get("/api/operator/session").catch(() => {});
+      return;
+    }
     serverAnswered();
     refreshChoices();
   },
@@ -80,6 +87,7 @@ followOverlayBoxes((name, on) => {
 });
 
 offerLink();
+document.addEventListener("signed-in", () => followLink(session));
 followRecording();
 setInterval(() => sessionCard.drawTime(), TICK_MS);
 refreshChoices();

@@ -215,7 +215,7 @@ function drawFeed(session) {
   redraw(byId("comments"), comments.length > 0 ? comments : [none]);
 
   const events = session.log.map((line) => {
-    const by = make("span", { className: "who" }, ` · ${line.by}`);
+    const by = make("span", { className: "who" }, ` · ${line.account ? `${line.account}, ` : ""}${line.by}`);
     return make("li", {}, timeOf(line.at), make("span", {}, line.text, by));
   });
   redraw(byId("log"), events);

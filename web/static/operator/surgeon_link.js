@@ -1,6 +1,8 @@
-// The surgeon's link, to be copied.
+// The surgeon's link, to be copied: in a study it is to the session under way alone.
 
+import { get } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
+import { tellTrouble } from "../shared/trouble.js";
 
 const TOLD_MS = 2000;
 
@@ -19,4 +21,39 @@ export function offerLink() {
     setText(button, "Copied");
     setTimeout(() => setText(button, "Copy link"), TOLD_MS);
   };
+}
+
+/** What the link was last asked for. @type {string | null} */
+let shownFor = null;
+
+/**
+ * Shows the link that opens `session`, and the shared one where it is over or outside any study.
+ *
+ * @param {Api.OperatorView | null} session
+ */
+export function followLink(session) {
+  const linked = session?.study && session.phase !== "completed" && session.phase !== "aborted";
+  const wanted = linked ? session.session : "";
+  if (wanted === shownFor) return;
+  shownFor = wanted;
+  showLink(wanted !== "");
+}
+
+/** @param {boolean} ofSession whether the link is to be to one session */
+async function showLink(ofSession) {
+  const trouble = byId("link-trouble");
+  try {
+    const { link, qr } = await get("/api/operator/surgeon-link");
+    byId("surgeon-link", HTMLInputElement).value = link;
+    // The server's own picture, made from the link alone.
+    byId("qr").innerHTML = qr;
+    setText(trouble, "");
+  } catch (error) {
+    // Asked for again when the session changes, or somebody has signed in.
+    shownFor = null;
+    byId("surgeon-link", HTMLInputElement).value = "";
+    byId("qr").replaceChildren();
+    tellTrouble(trouble, error);
+  }
+  byId("link-session").hidden = !ofSession;
 }

@@ -2,8 +2,9 @@
 // together; unblinding asks for a reason.
 
 import { get, inWords, post } from "../shared/api.js";
-import { askReason, askSigned } from "../shared/dialogs.js";
+import { askConfirmed, askReason } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
+import "../shared/sign_in.js";
 import { clockText } from "../shared/text.js";
 import { askErasure, askNote, askWithdrawal, correctAnswer, correctParticipant } from "./corrections.js";
 import { drawMetric } from "./metric_drawing.js";
@@ -305,15 +306,15 @@ async function unblind() {
 
   /**
    * @param {string} reason
-   * @param {string} [person]
+   * @param {string} [passphrase] asked for once more
    */
-  async function done(reason, person) {
+  async function done(reason, passphrase) {
     const path = "/api/researcher/sessions/{session}/unblind";
-    await post(path, { reason, person, despite_outstanding: open !== null }, { session });
+    await post(path, { reason, passphrase, despite_outstanding: open !== null }, { session });
     location.reload();
   }
 
-  if (study) askSigned({ ...asked, done });
+  if (study) askConfirmed({ ...asked, done });
   else askReason({ ...asked, done: (reason) => done(reason) });
 }
 

@@ -2,6 +2,7 @@
 
 import { inWords, post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
+import "../shared/sign_in.js";
 
 const definition = byId("definition", HTMLTextAreaElement);
 const go = byId("plan-go", HTMLButtonElement);
@@ -24,7 +25,6 @@ byId("plan", HTMLFormElement).addEventListener("submit", async (event) => {
     const { study } = await post("/api/researcher/studies", {
       definition: definition.value,
       sites: sites(),
-      person: byId("planner", HTMLInputElement).value.trim(),
       reason: byId("plan-reason", HTMLInputElement).value.trim(),
     });
     location.assign(`/researcher/studies/${study}`);

@@ -1,8 +1,9 @@
 // One study: every change of it asks who does it, and why.
 
 import { get, post } from "../shared/api.js";
-import { askSigned } from "../shared/dialogs.js";
+import { askConfirmed, askReason } from "../shared/dialogs.js";
 import { byId } from "../shared/dom.js";
+import "../shared/sign_in.js";
 import { tellTrouble } from "../shared/trouble.js";
 
 const study = byId("study").dataset.study ?? "";
@@ -10,22 +11,36 @@ const study = byId("study").dataset.study ?? "";
 /** @typedef {import("../shared/dialogs.js").Ask} Ask */
 
 /**
- * Asks for a signature, makes the change, and shows what became of the study.
+ * Makes the change, signed by whoever is signed in, and shows what became of the study.
+ *
+ * @param {Api.StudyAction} change
+ * @param {string} reason
+ * @param {string} [passphrase] asked for once more
+ */
+async function make(change, reason, passphrase) {
+  const path = "/api/researcher/studies/{study}/changes";
+  await post(path, { ...change, reason, passphrase }, { study });
+  location.reload();
+}
+
+/**
+ * Asks for a reason, and makes the change.
  *
  * @param {Ask} ask
  * @param {Api.StudyAction} change
- * @param {string[]} [people] who may do it
  */
-function askAndChange(ask, change, people) {
-  askSigned({
-    ...ask,
-    people,
-    done: async (reason, person) => {
-      const path = "/api/researcher/studies/{study}/changes";
-      await post(path, { ...change, reason, person }, { study });
-      location.reload();
-    },
-  });
+function askAndChange(ask, change) {
+  askReason({ ...ask, done: (reason) => make(change, reason) });
+}
+
+/**
+ * Asks for a reason and the passphrase, and makes the change.
+ *
+ * @param {Ask} ask
+ * @param {Api.StudyAction} change
+ */
+function confirmAndChange(ask, change) {
+  askConfirmed({ ...ask, done: (reason, passphrase) => make(change, reason, passphrase) });
 }
 
 function open() {
@@ -60,7 +75,7 @@ async function lock() {
     outstanding === 0
       ? ""
       : ` For ${outstanding} of its sessions a surgeon’s tablet may still hold something.`;
-  askAndChange(
+  confirmAndChange(
     {
       heading: "Lock the study",
       consequence:
@@ -74,9 +89,8 @@ async function lock() {
   );
 }
 
-async function unblind() {
-  const { may_unblind: people } = await get("/api/researcher/studies/{study}", { study });
-  askAndChange(
+function unblind() {
+  confirmAndChange(
     {
       heading: "Unblind the whole study",
       consequence:
@@ -86,7 +100,6 @@ async function unblind() {
       danger: true,
     },
     { change: "unblind" },
-    people,
   );
 }
 

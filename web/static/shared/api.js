@@ -23,7 +23,16 @@ export class Refused extends Error {
   }
 }
 
-const PATIENCE_MS = 10000;
+/** What a page does when the server wants somebody to sign in. */
+let signInNeeded = () => {};
+
+/** @param {() => void} ask called when the server refuses because nobody is signed in who may */
+export function onSignInNeeded(ask) {
+  signInNeeded = ask;
+}
+
+/** Longer than the server makes somebody wait after failed attempts to sign in. */
+const PATIENCE_MS = 12000;
 
 /**
  * A text that was cut may end with half an emoji, which JSON cannot carry. It is sent as the
@@ -64,6 +73,7 @@ async function request(method, path, body) {
 function refusal(text, status) {
   try {
     const said = JSON.parse(text);
+    if (said.sign_in === true) signInNeeded();
     if (typeof said.error === "string") return new Refused(status, said.error, true);
   } catch {
     // Not JSON: a proxy's page, or a bare status.

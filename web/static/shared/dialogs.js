@@ -1,7 +1,7 @@
 // Dialogs that ask for something. They stay open, and say why, until it has been done.
 
 import { inWords } from "./api.js";
-import { byId, make, setText } from "./dom.js";
+import { byId, setText } from "./dom.js";
 
 /**
  * @typedef {object} Ask
@@ -65,21 +65,20 @@ export function askReason(ask) {
 }
 
 /**
- * Asks for a reason and for who gives it.
+ * Asks for a reason, and once more for the passphrase of whoever is signed in.
  *
- * @param {Ask & { people?: string[], done: (reason: string, person: string) => Promise<void> }} ask `people`: names to
- *   choose from
+ * @param {Ask & { done: (reason: string, passphrase: string) => Promise<void> }} ask
  */
-export function askSigned(ask) {
-  openReasonDialog(ask, true, ask.people ?? []);
+export function askConfirmed(ask) {
+  openReasonDialog(ask, true, true);
 }
 
 /**
- * @param {Ask & { done: (reason: string, person: string) => Promise<void> }} ask
+ * @param {Ask & { done: (reason: string, passphrase: string) => Promise<void> }} ask
  * @param {boolean} reasoned whether a reason has to be given
- * @param {string[]} [people] names to choose from, where a person has to be named
+ * @param {boolean} [confirmed] whether the passphrase has to be given
  */
-function openReasonDialog(ask, reasoned, people) {
+function openReasonDialog(ask, reasoned, confirmed = false) {
   setText(byId("reason-heading"), ask.heading);
   setText(byId("reason-consequence"), ask.consequence);
 
@@ -92,19 +91,18 @@ function openReasonDialog(ask, reasoned, people) {
   reason.required = reasoned;
   reason.value = "";
 
-  const person = byId("person", HTMLInputElement);
-  byId("person-field").hidden = !people;
-  person.required = Boolean(people);
-  person.value = "";
-  byId("people").replaceChildren(...(people ?? []).map((name) => make("option", { value: name })));
+  const passphrase = byId("passphrase", HTMLInputElement);
+  byId("passphrase-field").hidden = !confirmed;
+  passphrase.required = confirmed;
+  passphrase.value = "";
 
   byId("reason-confirm").hidden = !ask.confirm;
   setText(byId("reason-confirm-text"), ask.confirm ?? "");
-  const confirmed = byId("reason-confirmed", HTMLInputElement);
-  confirmed.required = Boolean(ask.confirm);
-  confirmed.checked = false;
+  const meant = byId("reason-confirmed", HTMLInputElement);
+  meant.required = Boolean(ask.confirm);
+  meant.checked = false;
 
   askIn(byId("reason-dialog", HTMLDialogElement), byId("reason-trouble"), () =>
-    ask.done(reason.value.trim(), person.value.trim()),
+    ask.done(reason.value.trim(), passphrase.value),
   );
 }

@@ -5,6 +5,9 @@ import { Reconnection } from "./reconnection.js";
 
 const LOOK_MS = 1000;
 
+/** The server closes the connection with this code when the page's link opens nothing any more. */
+const LINK_OVER = 4403;
+
 /** How long the server may learn later how large the picture is on the screen: while it is pinched, it changes. */
 const SCREEN_MS = 150;
 
@@ -16,6 +19,7 @@ const SCREEN_MS = 150;
  * @property {(view: any) => void} [session] the session's view, or null
  * @property {(status: any) => void} [status] the devices' state
  * @property {(open: boolean) => void} [connection]
+ * @property {() => void} [over] the page's link opens nothing any more; no connection is tried again
  */
 
 export class Live {
@@ -27,6 +31,8 @@ export class Live {
   #reconnection = new Reconnection();
   /** Screen pixels that the picture covers. @type {number | null} */
   #screen = null;
+  /** Whether the link opens nothing any more. */
+  #over = false;
   /** Whether the server will be told soon. */
   #screenWaits = false;
 
@@ -85,7 +91,7 @@ export class Live {
   }
 
   #connect() {
-    if (isAlive(this.#socket)) return;
+    if (this.#over || isAlive(this.#socket)) return;
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(`${scheme}//${location.host}/live?role=${this.#role}`);
     socket.binaryType = "arraybuffer";
@@ -104,14 +110,22 @@ export class Live {
       if (typeof data === "string") this.#hear(JSON.parse(data));
       else this.#show(socket, data);
     };
-    socket.onclose = () => this.#lost(socket);
+    socket.onclose = ({ code }) => this.#lost(socket, code);
     this.#socket = socket;
   }
 
-  /** @param {WebSocket} socket */
-  #lost(socket) {
+  /**
+   * @param {WebSocket} socket
+   * @param {number} code
+   */
+  #lost(socket, code) {
     if (socket !== this.#socket) return;
     this.#tellConnection(false);
+    if (code === LINK_OVER) {
+      this.#over = true;
+      for (const listener of this.#listeners) listener.over?.();
+      return;
+    }
     setTimeout(() => this.#connect(), this.#reconnection.nextWait(Math.random()));
   }
 

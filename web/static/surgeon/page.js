@@ -250,6 +250,11 @@ byId("comment").addEventListener("input", () => {
 viewer.live.listen({
   session: follow,
   status: followStatus,
+  // The session is over for this tablet. What it holds is still sent, and the server says the rest.
+  over: () => {
+    follow(null);
+    refresh();
+  },
   connection: (open) => {
     if (!open) return;
     outbox.nudge();

@@ -1,0 +1,54 @@
+//! Why something was not done with an account.
+
+use crate::store::StoreError;
+use crate::trial::account::{Account, AccountName};
+use crate::trial::refusal::Refusal;
+
+/// Why something was not done with an account. Nothing was changed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum AccountError {
+    /// Name and passphrase do not belong together, or the account is disabled.
+    #[error("Name and passphrase do not belong together, or the account is disabled. Try again, or ask a lead.")]
+    WrongPassphrase,
+    /// The passphrase that was asked for once more is wrong.
+    #[error("This is not your passphrase. Nothing was changed; try again.")]
+    WrongConfirmation,
+    /// Too many attempts failed.
+    #[error("Too many attempts failed. Wait {seconds} seconds, then try again.")]
+    TooMany {
+        /// How long to wait.
+        seconds: u64,
+    },
+    /// There is one like it.
+    #[error("{0}")]
+    Taken(String),
+    /// There is no such account.
+    #[error("{0}")]
+    Unknown(String),
+    /// The rules refuse.
+    #[error("{0}")]
+    Refused(Refusal),
+    /// The disk or database failed.
+    #[error("{0}")]
+    Storage(String),
+}
+
+impl AccountError {
+    pub(super) fn unknown(name: &AccountName, all: &[Account]) -> Self {
+        let names: Vec<_> = all.iter().map(|account| account.account.as_str()).collect();
+        let names = if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
+        Self::Unknown(format!("there is no account '{name}'; there are: {names}"))
+    }
+}
+
+impl From<Refusal> for AccountError {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
+impl From<StoreError> for AccountError {
+    fn from(error: StoreError) -> Self {
+        Self::Storage(error.to_string())
+    }
+}

@@ -1,0 +1,232 @@
+//! `parfocal account`: makes, lists and changes personal accounts, whether or not a server runs.
+
+use std::fmt::Write;
+use std::io::{BufRead, IsTerminal};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::{Args, Subcommand};
+use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
+
+use super::output::{Failure, print};
+use crate::accounts::{Accounts, Cost, Passphrase};
+use crate::clock::SystemClock;
+use crate::notices::tell;
+use crate::store::StoreError;
+use crate::trial::account::{AccountChange, AccountName, AccountRole};
+
+/// Arguments of `parfocal account`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Make an account. Asks for its passphrase, or reads it from standard input.
+    Add(Add),
+    /// List the accounts.
+    List(List),
+    /// Change what a person may do.
+    Role(ChangeRole),
+    /// Replace a passphrase, and end all sign-ins of the account. Asks for it, or reads it from standard input.
+    Passphrase(Named),
+    /// Let a person sign in no more, and end all sign-ins of the account.
+    Disable(Named),
+    /// Let a person sign in again.
+    Enable(Named),
+    /// End all sign-ins of an account.
+    SignOut(Named),
+}
+
+#[derive(Debug, Args)]
+struct Add {
+    #[command(flatten)]
+    named: Named,
+    /// What the person may do.
+    #[arg(long, value_name = "ROLE", value_parser = role)]
+    role: AccountRole,
+    /// The person's name, as signatures have it; the account's name by default.
+    #[arg(long, value_name = "TEXT")]
+    display: Option<String>,
+}
+
+#[derive(Debug, Args)]
+struct ChangeRole {
+    #[command(flatten)]
+    named: Named,
+    /// lead, operator, researcher or monitor.
+    #[arg(value_parser = role)]
+    role: AccountRole,
+}
+
+#[derive(Debug, Args)]
+struct Named {
+    /// Name of the account: lower-case letters, digits, dots and dashes.
+    #[arg(value_parser = name)]
+    account: AccountName,
+    #[command(flatten)]
+    folder: Folder,
+}
+
+#[derive(Debug, Args)]
+struct List {
+    #[command(flatten)]
+    folder: Folder,
+    /// Print them as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+struct Folder {
+    /// Folder of the server's database.
+    #[arg(long, value_name = "DIR", default_value = "data")]
+    data_dir: PathBuf,
+}
+
+fn name(text: &str) -> Result<AccountName, String> {
+    AccountName::new(text).map_err(|error| error.to_string())
+}
+
+fn role(text: &str) -> Result<AccountRole, String> {
+    AccountRole::named(text).ok_or_else(|| {
+        let all = AccountRole::ALL.map(AccountRole::name).join(", ");
+        format!("there is no role '{text}'; there are: {all}")
+    })
+}
+
+/// Does what the arguments say.
+///
+/// # Errors
+/// When there is no database, the passphrase is too short, or the rules refuse.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(async {
+        match &arguments.action {
+            Action::Add(add) => self::add(add).await,
+            Action::List(list) => self::list(list).await,
+            Action::Role(change) => self::change(&change.named, &AccountChange::Role(change.role)).await,
+            Action::Passphrase(named) => replace_passphrase(named).await,
+            Action::Disable(named) => change(named, &AccountChange::Disable).await,
+            Action::Enable(named) => change(named, &AccountChange::Enable).await,
+            Action::SignOut(named) => change(named, &AccountChange::SignOut).await,
+        }
+    })
+}
+
+async fn add(add: &Add) -> Result<(), Failure> {
+    let accounts = open(&add.named.folder.data_dir).await?;
+    let account = add.named.account.clone();
+    let display = add.display.clone().unwrap_or_else(|| account.to_string());
+
+    let made = accounts.add(account, &display, add.role, ask()?, None).await?;
+    finish(&accounts, &format!("account {} ({}): {}", made.account, made.display, made.role)).await
+}
+
+async fn list(list: &List) -> Result<(), Failure> {
+    let accounts = open(&list.folder.data_dir).await?;
+    let all = accounts.all().await?;
+    if list.json {
+        return print(&(serde_json::to_string(&all)? + "\n"));
+    }
+    if all.is_empty() {
+        return print("no accounts yet\n");
+    }
+
+    let mut text = String::new();
+    for account in all {
+        let disabled = if account.disabled { ", disabled" } else { "" };
+        let _ = writeln!(text, "{} ({}): {}{disabled}", account.account, account.display, account.role);
+    }
+    print(&text)
+}
+
+async fn change(named: &Named, change: &AccountChange) -> Result<(), Failure> {
+    let accounts = open(&named.folder.data_dir).await?;
+    accounts.change(&named.account, change, None).await?;
+
+    let account = &named.account;
+    let done = match change {
+        AccountChange::Role(role) => format!("account {account} has the role {role} now"),
+        AccountChange::Disable => format!("account {account} is disabled; all its sign-ins have ended"),
+        AccountChange::Enable => format!("account {account} may sign in again"),
+        AccountChange::SignOut => format!("all sign-ins of account {account} have ended"),
+    };
+    finish(&accounts, &done).await
+}
+
+async fn replace_passphrase(named: &Named) -> Result<(), Failure> {
+    let accounts = open(&named.folder.data_dir).await?;
+    accounts.replace_passphrase(&named.account, ask()?, None).await?;
+    finish(&accounts, &format!("account {} has another passphrase; all its sign-ins have ended", named.account)).await
+}
+
+async fn open(folder: &Path) -> Result<Accounts, Failure> {
+    let opened = Accounts::open(folder, Arc::new(SystemClock), Cost::default()).await;
+    opened.map_err(|error| match error {
+        StoreError::Missing(file) => format!(
+            "there is no database {}; start `parfocal serve` once, which makes it, or name the server's data folder \
+             with --data-dir",
+            file.display()
+        )
+        .into(),
+        error => error.into(),
+    })
+}
+
+/// Prints what was done, with the chain's head.
+async fn finish(accounts: &Accounts, done: &str) -> Result<(), Failure> {
+    let head = accounts.reader().head().await?;
+    accounts.close().await;
+    print(&format!("{done}\nchain {head}\n"))
+}
+
+/// The passphrase: asked for twice on a terminal, else the first line of standard input.
+fn ask() -> Result<Passphrase, Failure> {
+    let first = line("passphrase (10 characters or more; 15 are recommended): ")?;
+    let passphrase = Passphrase::new(&first)?;
+    if std::io::stdin().is_terminal() && line("the same again: ")? != first {
+        return Err("the two differ; nothing was changed; try again".into());
+    }
+    Ok(passphrase)
+}
+
+/// A line of standard input, not shown on a terminal.
+fn line(prompt: &str) -> Result<String, Failure> {
+    let stdin = std::io::stdin();
+    let mut line = String::new();
+    if stdin.is_terminal() {
+        tell(format_args!("{prompt}"));
+        let hidden = Hidden::begin()?;
+        let read = stdin.lock().read_line(&mut line);
+        drop(hidden);
+        read?;
+    } else {
+        stdin.lock().read_line(&mut line).map_err(|error| format!("cannot read the passphrase: {error}"))?;
+    }
+
+    Ok(line.trim_end_matches(['\r', '\n']).to_owned())
+}
+
+/// While this lives the terminal does not show what is typed.
+struct Hidden {
+    before: Termios,
+}
+
+impl Hidden {
+    fn begin() -> Result<Self, Failure> {
+        let before = tcgetattr(std::io::stdin())?;
+        let mut silent = before.clone();
+        silent.local_modes.remove(LocalModes::ECHO);
+        tcsetattr(std::io::stdin(), OptionalActions::Now, &silent)?;
+        Ok(Self { before })
+    }
+}
+
+impl Drop for Hidden {
+    fn drop(&mut self) {
+        let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, &self.before);
+    }
+}

@@ -1,0 +1,61 @@
+//! What the headers of a request show: a role's cookie or key, the surgeon's link to one session, an account's token.
+
+use axum::http::HeaderMap;
+use axum::http::header::{AUTHORIZATION, COOKIE};
+
+use super::keys::Keys;
+use crate::ids::SessionId;
+use crate::trial::role::Role;
+
+/// The cookie of a browser that is signed in under a personal account.
+pub(super) const ACCOUNT_COOKIE: &str = "parfocal-account";
+
+/// Whether a request with these headers speaks for `role`: by its cookie or its bearer token.
+pub(super) fn holds(headers: &HeaderMap, keys: &Keys, role: Role) -> bool {
+    if role == Role::Surgeon {
+        return pass(headers, keys).is_some();
+    }
+    cookie(headers, cookie_name(role)).is_some_and(|token| keys.opens(role, token))
+        || bearer(headers).is_some_and(|key| keys.role_of(key) == Some(role))
+}
+
+/// What lets a tablet in as the surgeon.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pass {
+    /// The link of the role: for sessions outside studies.
+    Shared,
+    /// The link to one session of a study.
+    Session(SessionId),
+}
+
+/// What a request with these headers shows to speak for the surgeon, whether or not its session has ended.
+pub(super) fn pass(headers: &HeaderMap, keys: &Keys) -> Option<Pass> {
+    let by_cookie = cookie(headers, cookie_name(Role::Surgeon)).and_then(|token| {
+        let shared = keys.opens(Role::Surgeon, token).then_some(Pass::Shared);
+        shared.or_else(|| keys.session_of_token(token).map(Pass::Session))
+    });
+    by_cookie.or_else(|| {
+        let key = bearer(headers)?;
+        let shared = (keys.role_of(key) == Some(Role::Surgeon)).then_some(Pass::Shared);
+        shared.or_else(|| keys.session_of(key).map(Pass::Session))
+    })
+}
+
+/// The cookie that shows `role`.
+pub(super) const fn cookie_name(role: Role) -> &'static str {
+    match role {
+        Role::Surgeon => "parfocal-surgeon",
+        Role::Operator => "parfocal-operator",
+        Role::Researcher => "parfocal-researcher",
+        Role::System => "parfocal-none",
+    }
+}
+
+pub(super) fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    let cookies = headers.get_all(COOKIE).iter().filter_map(|header| header.to_str().ok());
+    cookies.flat_map(|header| header.split(';')).find_map(|pair| pair.trim().strip_prefix(name)?.strip_prefix('='))
+}
+
+pub(super) fn bearer(headers: &HeaderMap) -> Option<&str> {
+    headers.get(AUTHORIZATION)?.to_str().ok()?.strip_prefix("Bearer ")
+}

@@ -1,0 +1,145 @@
+//! Signing in and out under a personal account.
+
+use askama::Template;
+use axum::Json;
+use axum::extract::{Query, State};
+use axum::http::StatusCode;
+use axum::http::header::SET_COOKIE;
+use axum::response::{AppendHeaders, Html, IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::credentials::ACCOUNT_COOKIE;
+use super::error::{Error, ErrorBody};
+use super::json::JsonBody;
+use super::people::{From, SignedIn};
+use super::roles::home;
+use super::security::Nonce;
+use crate::trial::account::{Account, AccountRole, SIGN_IN_LIMIT};
+use crate::trial::role::Role;
+
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct SignInQuery {
+    /// Path of the page to go on to.
+    next: Option<String>,
+}
+
+#[derive(Template)]
+#[template(path = "sign_in.html")]
+struct Page {
+    nonce: String,
+    /// Where to go on to; empty for the page of the account's role.
+    next: String,
+    /// Who is signed in now.
+    person: Option<Account>,
+}
+
+/// The page to sign in.
+#[utoipa::path(get, path = "/sign-in", params(SignInQuery), tag = "accounts", responses(
+    (status = 200, description = "The page", content_type = "text/html")))]
+async fn page(
+    Query(query): Query<SignInQuery>,
+    SignedIn(person): SignedIn,
+    Nonce(nonce): Nonce,
+) -> Result<Html<String>, Error> {
+    let next = query.next.filter(|path| is_own_path(path)).unwrap_or_default();
+    let person = person.map(|person| person.account);
+    Page { nonce, next, person }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// Whether `path` leads to a page of this server: another site's link must not choose where somebody goes on to.
+fn is_own_path(path: &str) -> bool {
+    path.starts_with('/') && !path.starts_with("//") && !path.contains(['\\', '\r', '\n'])
+}
+
+/// Who wants to sign in.
+#[derive(Deserialize, ToSchema)]
+struct SignIn {
+    /// The account's name.
+    name: String,
+    /// Its passphrase.
+    passphrase: String,
+    /// Whether the answer is to hold the token, for a program, instead of setting a cookie.
+    #[serde(default)]
+    as_bearer: bool,
+}
+
+/// Who signed in.
+#[derive(Serialize, ToSchema)]
+struct SignedInAs {
+    /// The account.
+    #[serde(flatten)]
+    account: Account,
+    /// The page of the account's role.
+    home: &'static str,
+    /// The token, to be sent as `Authorization: Bearer`, where it was asked for.
+    token: Option<String>,
+}
+
+/// Signs in. The answer takes longer after failed attempts.
+#[utoipa::path(post, path = "/api/sign-in", tag = "accounts", request_body = SignIn, responses(
+    (status = 200, description = "Signed in: a cookie, or a token where it was asked for", body = SignedInAs),
+    (status = 403, description = "Name and passphrase do not belong together, the account is disabled, or another \
+                                  site made the request", body = ErrorBody),
+    (status = 429, description = "Too many attempts failed", body = ErrorBody),
+    (status = 507, description = "The disk failed", body = ErrorBody)))]
+async fn sign_in(
+    State(app): State<AppState>,
+    From(peer): From,
+    JsonBody(wanted): JsonBody<SignIn>,
+) -> Result<Response, Error> {
+    let (account, token) = app.accounts.sign_in(&wanted.name, &wanted.passphrase, peer).await?;
+    tracing::info!(account = %account.account, "signed in");
+
+    let home = home(page_role(account.role));
+    if wanted.as_bearer {
+        let token = Some(token.as_str().to_owned());
+        return Ok(Json(SignedInAs { account, home, token }).into_response());
+    }
+    let cookie = cookie(token.as_str(), SIGN_IN_LIMIT.as_secs());
+    Ok((AppendHeaders([(SET_COOKIE, cookie)]), Json(SignedInAs { account, home, token: None })).into_response())
+}
+
+/// Signs out: the token opens nothing any more. Signing out again changes nothing.
+#[utoipa::path(post, path = "/api/sign-out", tag = "accounts", responses(
+    (status = 204, description = "Signed out"),
+    (status = 507, description = "The disk failed", body = ErrorBody)))]
+async fn sign_out(State(app): State<AppState>, SignedIn(person): SignedIn) -> Result<impl IntoResponse, Error> {
+    if let Some(person) = person {
+        app.accounts.sign_out(&person.token).await?;
+    }
+    Ok((StatusCode::NO_CONTENT, AppendHeaders([(SET_COOKIE, cookie("", 0))])))
+}
+
+fn cookie(token: &str, seconds: u64) -> String {
+    format!("{ACCOUNT_COOKIE}={token}; Path=/; Max-Age={seconds}; HttpOnly; SameSite=Strict")
+}
+
+/// The role whose page an account's role begins with.
+pub(super) const fn page_role(role: AccountRole) -> Role {
+    match role {
+        AccountRole::Operator => Role::Operator,
+        AccountRole::Lead | AccountRole::Researcher | AccountRole::Monitor => Role::Researcher,
+    }
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(page)).routes(routes!(sign_in)).routes(routes!(sign_out))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_own_path;
+
+    #[test]
+    fn only_a_path_of_this_server_is_gone_on_to() {
+        assert!(is_own_path("/researcher/studies/scope-2026"));
+        for elsewhere in ["", "researcher", "//evil.example", "https://evil.example", "/\\evil.example"] {
+            assert!(!is_own_path(elsewhere), "{elsewhere}");
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Accounts as the database keeps them: written in `book`, read in `reading`.
+
+mod book;
+mod reading;
+
+use jiff::Timestamp;
+
+use crate::trial::account::{Account, AccountChange, AccountName, AccountRole};
+
+pub use book::AccountBook;
+
+/// An argon2id hash of a passphrase, with what it was made with.
+#[derive(Clone, PartialEq, Eq)]
+pub struct PassphraseHash {
+    /// Memory, KiB.
+    pub memory_kib: u32,
+    /// Passes over it.
+    pub passes: u32,
+    /// Random, of its own for each passphrase.
+    pub salt: Vec<u8>,
+    /// The hash.
+    pub hash: Vec<u8>,
+}
+
+/// A browser that is signed in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredSignIn {
+    /// Whose it is.
+    pub account: Account,
+    /// When it began, by the wall clock.
+    pub began: Timestamp,
+    /// When it was last used, to the minute or so.
+    pub used: Timestamp,
+}
+
+/// Something that happened to an account, as the chain keeps it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum AccountEvent {
+    /// It was made.
+    Added(AccountRole),
+    /// Its role, or whether it may sign in, changed; or all its sign-ins were ended.
+    Changed(AccountChange),
+    /// Its passphrase was replaced.
+    PassphraseReplaced,
+    /// A browser signed in.
+    SignedIn,
+    /// A browser signed out.
+    SignedOut,
+    /// A wrong passphrase was given.
+    Failed(FailedAttempt),
+}
+
+/// Where a wrong passphrase was given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FailedAttempt {
+    /// To sign in.
+    SignIn,
+    /// To sign in to an account that is disabled.
+    Disabled,
+    /// To lock or unblind.
+    Confirmation,
+}
+
+impl AccountEvent {
+    /// Name of the kind, as in the database.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Added(_) => "added",
+            Self::Changed(AccountChange::Role(_)) => "role-changed",
+            Self::Changed(AccountChange::Disable) => "disabled",
+            Self::Changed(AccountChange::Enable) => "enabled",
+            Self::Changed(AccountChange::SignOut) => "sign-ins-ended",
+            Self::PassphraseReplaced => "passphrase-replaced",
+            Self::SignedIn => "signed-in",
+            Self::SignedOut => "signed-out",
+            Self::Failed(_) => "attempt-failed",
+        }
+    }
+
+    const fn detail(&self) -> Option<&'static str> {
+        match self {
+            Self::Added(role) | Self::Changed(AccountChange::Role(role)) => Some(role.name()),
+            Self::Failed(FailedAttempt::SignIn) => Some("sign-in"),
+            Self::Failed(FailedAttempt::Disabled) => Some("sign-in to a disabled account"),
+            Self::Failed(FailedAttempt::Confirmation) => Some("confirmation"),
+            _ => None,
+        }
+    }
+}
+
+/// Who changes an account: a lead's account, or none for the command line.
+pub type By<'a> = Option<&'a AccountName>;

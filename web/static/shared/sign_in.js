@@ -1,0 +1,99 @@
+// Who is signed in, on every page that can be used under a personal account: signing out, and signing in again over
+// the page when the server asks for it. What stood in the page's forms and dialogs stays there.
+
+import { inWords, keep, onSignInNeeded, post } from "./api.js";
+import { make, setText } from "./dom.js";
+
+/** @type {HTMLDialogElement | null} */
+let dialog = null;
+
+function askToSignIn() {
+  dialog ??= makeDialog();
+  if (!dialog.open) dialog.showModal();
+}
+
+function makeDialog() {
+  const name = make("input", {
+    id: "sign-in-name",
+    required: true,
+    autocomplete: "username",
+    autocapitalize: "none",
+    spellcheck: false,
+  });
+  const passphrase = make("input", {
+    id: "sign-in-passphrase",
+    type: "password",
+    required: true,
+    autocomplete: "current-password",
+  });
+  const trouble = make("p", { className: "message", role: "alert" });
+  const go = make("button", { className: "primary", type: "submit" }, "Sign in");
+
+  const form = make(
+    "form",
+    {},
+    make("h2", { id: "sign-in-heading" }, "Sign in to go on"),
+    make(
+      "p",
+      { className: "muted" },
+      "This belongs to a study, and you are not signed in, or not any more. Nothing on the page is lost: sign in, " +
+        "then do again what you wanted to do.",
+    ),
+    make("div", {}, make("label", { for: name.id }, "Name of the account"), name),
+    make("div", {}, make("label", { for: passphrase.id }, "Passphrase"), passphrase),
+    trouble,
+    make(
+      "div",
+      { className: "actions" },
+      make("button", { type: "button", onclick: () => dialog?.close() }, "Cancel"),
+      go,
+    ),
+  );
+
+  form.onsubmit = async (event) => {
+    event.preventDefault();
+    go.disabled = true;
+    try {
+      showPerson(await post("/api/sign-in", { name: name.value.trim(), passphrase: passphrase.value }));
+      setText(trouble, "");
+      passphrase.value = "";
+      dialog?.close();
+      document.dispatchEvent(new Event("signed-in"));
+    } catch (error) {
+      setText(trouble, inWords(error));
+    } finally {
+      go.disabled = false;
+    }
+  };
+
+  const made = make("dialog", { id: "sign-in-dialog", "aria-labelledby": "sign-in-heading" }, form);
+  document.body.append(made);
+  return made;
+}
+
+onSignInNeeded(askToSignIn);
+
+const link = document.getElementById("sign-in");
+if (link instanceof HTMLAnchorElement) link.href = `/sign-in?next=${encodeURIComponent(location.pathname)}`;
+
+async function signOut() {
+  await keep("/api/sign-out", undefined);
+  location.reload();
+}
+
+/**
+ * Shows who is signed in, as the page's template does.
+ *
+ * @param {{ display: string, role: string }} person
+ */
+function showPerson({ display, role }) {
+  const name = make("span", {}, `${display} `, make("span", { className: "muted" }, `(${role})`));
+  const out = make(
+    "button",
+    { id: "sign-out", className: "small", type: "button", onclick: signOut },
+    "Sign out",
+  );
+  document.querySelector(".person")?.replaceChildren(name, " ", out);
+}
+
+document.getElementById("sign-out")?.addEventListener("click", signOut);
