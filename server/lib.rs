@@ -32,6 +32,7 @@ pub mod lens_measurement;
 pub mod live;
 pub mod store;
 
+pub mod analysis;
 pub mod conductor;
 pub mod package;
 

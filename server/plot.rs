@@ -56,6 +56,28 @@ pub struct Panel<'a> {
 impl Plot {
     /// Begins a panel below those that are there.
     pub fn panel<'a>(&'a mut self, across: Axis<'a>, up: Axis<'a>) -> Panel<'a> {
+        let panel = self.frame(across, up);
+        let bottom = panel.top + PANEL;
+        panel.plot.text(LEFT, bottom + 14.0, "start", &across.from.to_string());
+        panel.plot.text(RIGHT, bottom + 14.0, "end", &across.to.to_string());
+        panel
+    }
+
+    /// Begins a panel whose places across are things with these names: the first at 1, the second at 2, and so on.
+    pub fn panel_of<'a>(&'a mut self, label: &'a str, names: &[String], up: Axis<'a>) -> Panel<'a> {
+        let across = Axis { label: "", from: 0.5, to: names.len() as f64 + 0.5 };
+        let panel = self.frame(across, up);
+        let bottom = panel.top + PANEL;
+        for (name, place) in names.iter().zip(1..) {
+            let (x, _) = panel.place((f64::from(place), up.from));
+            panel.plot.text(x, bottom + 14.0, "middle", name);
+        }
+        panel.plot.text(f64::midpoint(LEFT, RIGHT), bottom + 29.0, "middle", label);
+        panel
+    }
+
+    /// The frame of a panel, with its labels and the numbers of its upright axis.
+    fn frame<'a>(&'a mut self, across: Axis<'a>, up: Axis<'a>) -> Panel<'a> {
         let top = 20.0 + self.panels as f64 * (PANEL + GAP);
         self.panels += 1;
 
@@ -69,9 +91,7 @@ impl Plot {
         self.text(LEFT, top - 5.0, "start", up.label);
         self.text(LEFT - 5.0, top + 10.0, "end", &up.to.to_string());
         self.text(LEFT - 5.0, bottom, "end", &up.from.to_string());
-        self.text(LEFT, bottom + 14.0, "start", &across.from.to_string());
         self.text(f64::midpoint(LEFT, RIGHT), bottom + 14.0, "middle", across.label);
-        self.text(RIGHT, bottom + 14.0, "end", &across.to.to_string());
         Panel { plot: self, across, up, top }
     }
 
@@ -154,6 +174,29 @@ impl Panel<'_> {
         self.plot.key(name, colour);
     }
 
+    /// A level line at `up` across the panel, with its number on the left.
+    pub fn level(&mut self, up: f64) {
+        let (_, y) = self.place((self.across.from, up));
+        let _ = writeln!(
+            self.plot.body,
+            "<path d=\"M{LEFT} {y:.1}H{RIGHT}\" stroke=\"#dddddd\" stroke-dasharray=\"2 4\"/>"
+        );
+        self.plot.text(LEFT - 5.0, y + 4.0, "end", &up.to_string());
+    }
+
+    /// A thick bar at each of `points` (across, up), with their name in the key: `half` is half its width, across.
+    pub fn bars(&mut self, name: &str, colour: &str, half: f64, points: impl IntoIterator<Item = (f64, f64)>) {
+        for (across, up) in points {
+            let (from, y) = self.place((across - half, up));
+            let (to, _) = self.place((across + half, up));
+            let _ = writeln!(
+                self.plot.body,
+                "<path d=\"M{from:.1} {y:.1}H{to:.1}\" stroke=\"{colour}\" stroke-width=\"4\"/>"
+            );
+        }
+        self.plot.key(name, colour);
+    }
+
     /// Where a point lies on the picture; one outside the panel lies on its edge.
     fn place(&self, (across, up): (f64, f64)) -> (f64, f64) {
         let x = LEFT + self.across.share(across) * (RIGHT - LEFT);
@@ -230,6 +273,23 @@ mod tests {
         let svg = plot.svg();
         assert!(svg.contains("<title>file:xxx") && svg.contains("/a&amp;b&lt;c&gt;.pt</title>"), "{svg}");
         assert!(keys(&svg)[0].2.starts_with("…xxx"), "{svg}");
+    }
+
+    #[test]
+    fn named_places_stand_below_a_panel_and_bars_over_them() {
+        let mut plot = Plot::default();
+        let names = ["fixed".to_owned(), "a<b".to_owned()];
+        let up = Axis { label: "points", from: 1.0, to: 5.0 };
+        let mut panel = plot.panel_of("policy", &names, up);
+        panel.level(3.0);
+        panel.bars("median", "black", 0.25, [(2.0, 3.0)]);
+        let svg = plot.svg();
+
+        // Two places over 830: at a quarter and three quarters; the bar is a quarter of 830 long, half way up.
+        assert!(svg.contains("<text x=\"262.5\" y=\"264\" text-anchor=\"middle\">fixed</text>"), "{svg}");
+        assert!(svg.contains("<text x=\"677.5\" y=\"264\" text-anchor=\"middle\">a&lt;b</text>"), "{svg}");
+        assert!(svg.contains("<path d=\"M573.8 135.0H781.2\" stroke=\"black\""), "{svg}");
+        assert!(svg.contains("<text x=\"50.0\" y=\"139\" text-anchor=\"end\">3</text>"), "{svg}");
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod restore;
 mod scan;
 mod serve;
 mod study;
+mod study_analysis;
 mod train;
 mod verify;
 
@@ -62,7 +63,7 @@ enum Command {
     /// Start the server: the live view, the control loop and the trial.
     #[command(after_help = serve::REAL_TIME)]
     Serve(serve::Arguments),
-    /// Plan a study of many sessions, open, close and lock it, and show where it stands.
+    /// Plan a study of many sessions, open, close and lock it, show where it stands, and analyse it.
     Study(study::Arguments),
     /// Train a learned policy, or compare trainings.
     Train(train::Arguments),

@@ -1,5 +1,5 @@
-//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, shows where it stands, and joins
-//! what its sites exported.
+//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, shows where it stands, analyses it,
+//! and joins what its sites exported.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use rand_chacha::ChaCha12Rng;
 use super::export::join;
 use super::library::protocols;
 use super::output::{Failure, print};
+use super::study_analysis;
 use crate::autofocus::Registry;
 use crate::clock::SystemClock;
 use crate::conductor::{Studies, StudyDetail};
@@ -42,6 +43,8 @@ enum Action {
     Show(Show),
     /// Join the exports of several sites into one package, after verifying each.
     Merge(Merge),
+    /// Analyse an unblinded study, also while a server runs; changes nothing. docs/analysis.md explains the figures.
+    Analyse(study_analysis::Arguments),
 }
 
 #[derive(Debug, Args)]
@@ -132,6 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
             Action::Show(show) => self::show(show).await,
             Action::Merge(sites) => merge(sites),
+            Action::Analyse(analyse) => study_analysis::run(analyse).await,
         }
     })
 }

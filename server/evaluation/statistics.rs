@@ -3,6 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// Mean; 0 of nothing.
 #[must_use]
@@ -17,29 +18,44 @@ pub fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|value| (value - centre).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// The 95 % percentile-bootstrap interval of the mean (Efron 1979) from 2000 resamples drawn from `seed`.
+/// Resamples of a bootstrap.
+pub const RESAMPLES: usize = 2000;
+
+/// The 95 % percentile-bootstrap interval of the mean (Efron 1979) from [`RESAMPLES`] resamples drawn from `seed`; zeros
+/// of nothing.
 #[must_use]
 pub fn bootstrap_interval(values: &[f64], seed: u64) -> (f64, f64) {
-    const RESAMPLES: usize = 2000;
-    if values.is_empty() {
-        return (0.0, 0.0);
+    let mean_of = |drawn: &[usize]| Some(drawn.iter().map(|&place| values[place]).sum::<f64>() / values.len() as f64);
+    bootstrap_statistic(values.len(), seed, mean_of).unwrap_or((0.0, 0.0))
+}
+
+/// The 95 % percentile-bootstrap interval of any statistic of `count` units: `statistic` computes it from the places of
+/// the units that were drawn. Resamples without a statistic are left out; `None` where none has one.
+#[must_use]
+pub fn bootstrap_statistic(count: usize, seed: u64, statistic: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
+    if count == 0 {
+        return None;
     }
 
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut means: Vec<f64> = (0..RESAMPLES)
-        .map(|_| (0..values.len()).map(|_| values[rng.random_range(0..values.len())]).sum::<f64>())
-        .map(|sum| sum / values.len() as f64)
-        .collect();
+    let mut drawn = vec![0; count];
+    let mut found = Vec::with_capacity(RESAMPLES);
+    for _ in 0..RESAMPLES {
+        drawn.fill_with(|| rng.random_range(0..count));
+        found.extend(statistic(&drawn));
+    }
 
-    means.sort_by(f64::total_cmp);
-    (means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40])
+    found.sort_by(f64::total_cmp);
+    let low = found.get(found.len() / 40)?;
+    let high = found.get(found.len() - 1 - found.len() / 40)?;
+    Some((*low, *high))
 }
 
 /// Most pairs for which [`wilcoxon`]'s p is exact; `SciPy` and R have the same bound.
 const MOST_EXACT: usize = 50;
 
 /// How a [`SignedRank`]'s p was computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// From the distribution of the rank sum over all patterns of signs.
@@ -55,6 +71,22 @@ pub struct SignedRank {
     pub p: f64,
     /// How it was computed.
     pub method: Method,
+    /// Pairs that differ.
+    pub differing: usize,
+    /// Sum of the ranks of the differences above zero.
+    pub positive: f64,
+    /// Sum of the ranks of the differences below zero.
+    pub negative: f64,
+}
+
+impl SignedRank {
+    /// The matched-pairs rank-biserial correlation, -1..=1: the share of the rank sum above zero less that below it
+    /// (Kerby 2014, Comprehensive Psychology 3:1); `None` where no pair differs.
+    #[must_use]
+    pub fn rank_biserial(&self) -> Option<f64> {
+        let all = self.positive + self.negative;
+        (all > 0.0).then(|| (self.positive - self.negative) / all)
+    }
 }
 
 /// Tests whether paired values differ. Pairs without a difference are left out; equal differences
@@ -66,10 +98,19 @@ pub fn wilcoxon(a: &[f64], b: &[f64]) -> SignedRank {
     let ranks = doubled_ranks(&differences);
     let positive = ranks.iter().zip(&differences).filter(|(_, d)| **d > 0.0).map(|(rank, _)| rank).sum();
 
-    if ranks.len() <= MOST_EXACT {
-        SignedRank { p: exact(&ranks, positive), method: Method::Exact }
+    let (p, method) = if ranks.len() <= MOST_EXACT {
+        (exact(&ranks, positive), Method::Exact)
     } else {
-        SignedRank { p: approximate(&ranks, positive), method: Method::NormalApproximation }
+        (approximate(&ranks, positive), Method::NormalApproximation)
+    };
+
+    let all: usize = ranks.iter().sum();
+    SignedRank {
+        p,
+        method,
+        differing: ranks.len(),
+        positive: 0.5 * positive as f64,
+        negative: 0.5 * (all - positive) as f64,
     }
 }
 
@@ -109,6 +150,12 @@ fn approximate(ranks: &[usize], positive: usize) -> f64 {
     let variance = 0.25 * ranks.iter().map(|rank| rank * rank).sum::<f64>();
 
     let z = (0.5 * positive as f64 - expected) / variance.sqrt();
+    normal_two_sided(z)
+}
+
+/// Two-sided p of the standard normal deviate `z`.
+#[must_use]
+pub fn normal_two_sided(z: f64) -> f64 {
     complementary_error(z.abs() / std::f64::consts::SQRT_2)
 }
 

@@ -43,6 +43,7 @@ static ASSETS: &[Asset] = &assets![
     "operator/session_words.js",
     "operator/surgeon_link.js",
     "operator/traces.js",
+    "researcher/analysis.css",
     "researcher/correction_words.js",
     "researcher/corrections.js",
     "researcher/metric_drawing.js",

@@ -1,5 +1,6 @@
 //! HTTP: routes, pages, streams, roles. Holds no trial rule.
 
+mod analysis;
 pub mod assets;
 mod camera;
 mod connections;
@@ -68,6 +69,7 @@ pub fn router(app: AppState) -> Router {
         .merge(playback::routes())
         .merge(records::routes())
         .merge(studies::routes())
+        .merge(analysis::routes())
         .merge(export::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())

@@ -32,6 +32,11 @@ pub enum Access {
         /// Whether with the policies.
         unblinded: bool,
     },
+    /// Looked at the analysis of a study, or took it along.
+    AnalysisViewed {
+        /// The study's name.
+        study: String,
+    },
     /// Copied the database, policies included.
     BackedUp,
     /// Put a backup in the place of a database.
@@ -48,6 +53,7 @@ impl Access {
             Self::PathViewed(_) => "path-viewed",
             Self::RecordingViewed(_) => "recording-viewed",
             Self::Exported { .. } => "exported",
+            Self::AnalysisViewed { .. } => "analysis-viewed",
             Self::BackedUp => "backed-up",
             Self::Restored { .. } => "restored",
         }
@@ -65,6 +71,7 @@ impl Access {
     fn detail(&self) -> Option<String> {
         match self {
             Self::Exported { unblinded, .. } => Some(if *unblinded { "unblinded" } else { "blinded" }.to_owned()),
+            Self::AnalysisViewed { study } => Some(study.clone()),
             Self::Restored { replaced: Some(head) } => Some(format!("replaced {head}")),
             _ => None,
         }

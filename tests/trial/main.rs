@@ -11,6 +11,7 @@ mod fixture;
 mod instruments;
 mod late;
 mod lens;
+mod motions;
 mod remarks;
 mod sessions;
 mod storage;

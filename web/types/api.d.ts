@@ -230,23 +230,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/operator/surgeon-link": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** The surgeon's link: in a session of a study, to that session alone, which it ends with. */
-        get: operations["operator_link"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/researcher/sessions": {
         parameters: {
             query?: never;
@@ -472,6 +455,40 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/researcher/studies/{study}/analysis": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The analysis of a study. Each look at it is recorded. */
+        get: operations["researcher_analysis"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/researcher/studies/{study}/analysis.zip": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The same as one ZIP file: tables with their data dictionary, figures, JSON, checksums. */
+        get: operations["researcher_analysis_zip"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/studies/{study}/changes": {
         parameters: {
             query?: never;
@@ -483,40 +500,6 @@ export interface paths {
         put?: never;
         /** Opens, closes, locks or unblinds a study, or records that a surgeon withdrew. */
         post: operations["researcher_change_study"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/sign-in": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Signs in. The answer takes longer after failed attempts. */
-        post: operations["accounts_sign_in"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/sign-out": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Signs out: the token opens nothing any more. Signing out again changes nothing. */
-        post: operations["accounts_sign_out"];
         delete?: never;
         options?: never;
         head?: never;
@@ -781,15 +764,15 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/sign-in": {
+    "/researcher/studies/{study}/analysis": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** The page to sign in. */
-        get: operations["accounts_page"];
+        /** The analysis of a study, with its figures; it prints well. */
+        get: operations["researcher_analysis_page"];
         put?: never;
         post?: never;
         delete?: never;
@@ -853,24 +836,6 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /** @description An account. */
-        Account: {
-            /** @description The name that the person signs in with. */
-            account: components["schemas"]["AccountName"];
-            /** @description Whether the person may not sign in. */
-            disabled: boolean;
-            /** @description The person's name, as signatures have it. */
-            display: string;
-            /** @description What the person may do. */
-            role: components["schemas"]["AccountRole"];
-        };
-        /** @description The name that a person signs in with: 1 to 40 lower-case letters, digits, dots and dashes. */
-        AccountName: string;
-        /**
-         * @description What a person does in a study.
-         * @enum {string}
-         */
-        AccountRole: "lead" | "operator" | "researcher" | "monitor";
         /** @description An action on a session. */
         Act: components["schemas"]["Action"] & {
             /** @description The session that the page was showing. */
@@ -943,6 +908,58 @@ export interface components {
              */
             value: number;
         };
+        /** @description How far repeats agree. */
+        Agreement: {
+            /**
+             * Format: double
+             * @description Upper end.
+             */
+            high?: number | null;
+            /**
+             * Format: double
+             * @description ICC(A,1), at most 1; negative where repeats differ more than subjects.
+             */
+            icc: number;
+            /**
+             * Format: double
+             * @description Lower end of its 95 % interval; none where repeats agree without any difference.
+             */
+            low?: number | null;
+        };
+        /** @description A session of the study, and whether it counts. */
+        AnalysedSession: {
+            /** @description Whether it counts. */
+            counts: boolean;
+            /** @description Why it does not count; or what is to be known of it though it does. */
+            remark?: string | null;
+            /** @description The session. */
+            session: components["schemas"]["SessionId"];
+            /** @description Its site. */
+            site: string;
+            /** @description The surgeon's code, as it was corrected; none of a withdrawn session. */
+            surgeon?: string | null;
+        };
+        /** @description The analysis of a study that was unblinded. */
+        Analysis: {
+            /** @description SHA-256 of its definition. */
+            definition_sha256: string;
+            /** @description What a reader must know of all figures. */
+            notes: string[];
+            /** @description How its definition says that it is analysed. */
+            planned: string;
+            /** @description Each of its protocols by itself. */
+            protocols: components["schemas"]["ProtocolAnalysis"][];
+            /** @description What resamples and permutations are drawn from: the first 16 digits of `definition_sha256`. */
+            seed: string;
+            /** @description The sites of it that this database runs. */
+            sites: string[];
+            /** @description The study. */
+            study: string;
+            /** @description Its title. */
+            title: string;
+            /** @description When it was unblinded, by the server's wall clock. */
+            unblinded: string;
+        };
         /** @description An answer for reading. */
         AnswerLine: {
             /** @description When, by the server's wall clock. */
@@ -1013,8 +1030,8 @@ export interface components {
         };
         /** @description A change of a study, signed. */
         ChangeStudy: components["schemas"]["StudyAction"] & {
-            /** @description The passphrase of the lead who is signed in, once more: needed to lock and to unblind. */
-            passphrase?: string | null;
+            /** @description Who does it. */
+            person: string;
             /** @description Why. */
             reason: string;
         };
@@ -1035,6 +1052,25 @@ export interface components {
             at: string;
             /** @description Setting, from 1. */
             setting?: number | null;
+        };
+        /** @description An outcome compared between policies. */
+        Comparison: components["schemas"]["Outcome"] & {
+            /** @description Surgeons of whom no value is missing: those that the tests use. */
+            complete: number;
+            /** @description Whether the policies differ. */
+            difference: components["schemas"]["Difference"];
+            /** @description Surgeons who are left out of the tests, because a value is missing. */
+            left_out: number;
+            /** @description Each policy with each other. */
+            pairs: components["schemas"]["Pair"][];
+            /** @description Each policy's values over all settings. */
+            policies: components["schemas"]["PolicySummary"][];
+            /** @description Whether values rise or fall with the position in the session. */
+            position: components["schemas"]["Position"];
+            /** @description How far repeats of a policy agree. */
+            repeats: components["schemas"]["Repeats"];
+            /** @description Each surgeon's mean of each policy. */
+            surgeons: components["schemas"]["SurgeonMeans"][];
         };
         /** @description A consent. */
         Consent: {
@@ -1084,6 +1120,13 @@ export interface components {
          * @description A browser that surgeons use, all its tabs together. Random, made by its page and kept there.
          */
         DeviceId: string;
+        /** @description Whether the policies differ. */
+        Difference: {
+            friedman?: components["schemas"]["Friedman"] | null;
+            /** @description The finding in a sentence, or why there is none. */
+            said: string;
+            w_interval?: components["schemas"]["Interval"] | null;
+        };
         /** @description A session to be taken off the screens. */
         Dismissal: {
             /** @description The session. */
@@ -1098,8 +1141,6 @@ export interface components {
         ErrorBody: {
             /** @description What happened and what to do. */
             error: string;
-            /** @description Whether signing in under a personal account would help. */
-            sign_in?: boolean;
         };
         /**
          * @description What of a record is put right.
@@ -1144,6 +1185,35 @@ export interface components {
             /** @description A policy. */
             policy: string;
         };
+        /** @description What Friedman's test found. */
+        Friedman: {
+            /**
+             * Format: double
+             * @description The statistic, corrected for ties.
+             */
+            chi_square: number;
+            /** @description Degrees of freedom: treatments less one. */
+            df: number;
+            /**
+             * Format: double
+             * @description Kendall's W, 0..=1: how far the blocks agree on an order.
+             */
+            kendalls_w: number;
+            /** @description The mean rank of each treatment, 1 for the least value. */
+            mean_ranks: number[];
+            /**
+             * Format: double
+             * @description p from the chi-square distribution, which is rough for few blocks.
+             */
+            p_chi_square: number;
+            /**
+             * Format: double
+             * @description p over the permutations of each block's ranks.
+             */
+            p_permutation: number;
+            /** @description How it was computed. */
+            permutation: components["schemas"]["PermutationMethod"];
+        };
         /** @description How the server is. */
         Health: {
             /** @description Whether the camera delivers frames. */
@@ -1174,6 +1244,19 @@ export interface components {
          * @description Made by a browser for one comment or answer: the same again is the same thing, however often it is sent.
          */
         IdempotencyKey: string;
+        /** @description A 95 % interval. */
+        Interval: {
+            /**
+             * Format: double
+             * @description Its upper end.
+             */
+            high: number;
+            /**
+             * Format: double
+             * @description Its lower end.
+             */
+            low: number;
+        };
         /**
          * @description What a recording is made of.
          * @enum {string}
@@ -1181,8 +1264,6 @@ export interface components {
         Kind: "mosaic" | "view";
         /** @description An event in words. */
         LogLine: {
-            /** @description The account of whoever it was, where the person was signed in. */
-            account?: string | null;
             /** @description When, by the server's wall clock. */
             at: string;
             /** @description Who. */
@@ -1209,6 +1290,11 @@ export interface components {
          * @enum {string}
          */
         Medium: "paper" | "screen";
+        /**
+         * @description How a [`SignedRank`]'s p was computed.
+         * @enum {string}
+         */
+        Method: "exact" | "normal-approximation";
         /**
          * @description An answer as a surgeon's browser sends it. Of several to the same question the one given last counts, as far as it
          *     gives an answer, in whatever order they arrive; the others stay in the log.
@@ -1298,8 +1384,6 @@ export interface components {
             participant: string;
             /** @description Protocol's name. */
             protocol: string;
-            /** @description The study that it belongs to; none outside any study. */
-            study?: string | null;
             /** @description Why the disk has not taken what is `unrecorded`, as far as it has said. */
             unrecorded_because?: string | null;
             /** @description Whether the participant withdrew. */
@@ -1329,6 +1413,17 @@ export interface components {
              * @description Milliseconds that it waited on the device before it was sent this time.
              */
             waited_millis?: number | null;
+        };
+        /** @description Something that each setting has a number of. */
+        Outcome: {
+            /** @description Which end is better, where that is known: `higher` or `lower`. */
+            better?: string | null;
+            /** @description What it is, for reading. */
+            label: string;
+            /** @description Its name: question and measure, or what of the focal power. */
+            outcome: string;
+            /** @description Its unit or scale. */
+            unit: string;
         };
         /** @description What may still come in for a session that has ended. */
         Outstanding: {
@@ -1366,6 +1461,11 @@ export interface components {
             to?: number | null;
         };
         /**
+         * @description How a p over permutations was computed.
+         * @enum {string}
+         */
+        PermutationMethod: "exact" | "monte-carlo";
+        /**
          * @description Where a session stands.
          * @enum {string}
          */
@@ -1383,10 +1483,54 @@ export interface components {
         PlanStudy: {
             /** @description The definition: TOML, as docs/study.md describes it. */
             definition: string;
+            /** @description Who plans it. */
+            person: string;
             /** @description Why. */
             reason: string;
             /** @description The sites of it that this database runs; all of them where none are named. */
             sites?: string[];
+        };
+        /** @description A policy's values in short. */
+        PolicySummary: components["schemas"]["Summary"] & {
+            /** @description Settings without a value. */
+            missing: number;
+            /** @description The policy. */
+            policy: string;
+        };
+        /** @description Whether values rise or fall with the position in the session. */
+        Position: {
+            /** @description The mean over these sessions at each position. */
+            means: number[];
+            /** @description The finding in a sentence, or why there is none. */
+            said: string;
+            /** @description Sessions without a missing value. */
+            sessions: number;
+            trend?: components["schemas"]["Trend"] | null;
+        };
+        /** @description The sessions of a protocol analysed. */
+        ProtocolAnalysis: {
+            /** @description What a reader must know of this protocol's figures. */
+            notes: string[];
+            /** @description What is compared between the policies. */
+            outcomes: components["schemas"]["Comparison"][];
+            /** @description Its policies. */
+            policies: string[];
+            /** @description The protocol. */
+            protocol: string;
+            /** @description Settings of each policy in a session. */
+            repeats: number;
+            /** @description Its title for researchers. */
+            researcher_title: string;
+            /** @description The sessions made by it, and whether each counts. */
+            sessions: components["schemas"]["AnalysedSession"][];
+            /** @description Surgeons whose sessions count. */
+            surgeons: number;
+            /** @description Each value that was compared. */
+            values: unknown[];
+            /** @description Answers about sessions as a whole, which no policy can be given. */
+            whole_sessions: components["schemas"]["WholeSessions"][];
+            /** @description What surgeons said. */
+            words: components["schemas"]["SurgeonWords"][];
         };
         /** @description A protocol for the operator to choose. Says nothing of its policies, for the operator stands beside the surgeon. */
         ProtocolSummary: {
@@ -1541,6 +1685,14 @@ export interface components {
             seconds_left?: number | null;
             /** @description Why the operator cannot record, where it is so. */
             unavailable?: string | null;
+        };
+        /** @description How far repeats of a policy agree within a session. */
+        Repeats: {
+            agreement?: components["schemas"]["Agreement"] | null;
+            /** @description The finding in a sentence, or why there is none. */
+            said: string;
+            /** @description Policies of sessions of which all repeats have a value. */
+            subjects: number;
         };
         /**
          * @description Whether a surgeon who has a session that stands may have another by the same protocol.
@@ -1727,21 +1879,16 @@ export interface components {
              */
             to?: number | null;
         };
-        /** @description Who wants to sign in. */
-        SignIn: {
-            /** @description Whether the answer is to hold the token, for a program, instead of setting a cookie. */
-            as_bearer?: boolean;
-            /** @description The account's name. */
-            name: string;
-            /** @description Its passphrase. */
-            passphrase: string;
-        };
-        /** @description Who signed in. */
-        SignedInAs: components["schemas"]["Account"] & {
-            /** @description The page of the account's role. */
-            home: string;
-            /** @description The token, to be sent as `Authorization: Bearer`, where it was asked for. */
-            token?: string | null;
+        /** @description What was said in a setting, or beside all settings of a session. */
+        SettingWords: {
+            /** @description The policy that ran. */
+            policy?: string | null;
+            /** @description The session. */
+            session: components["schemas"]["SessionId"];
+            /** @description The setting, from 1; none beside all settings. */
+            setting?: number | null;
+            /** @description What was said, in order. */
+            words: components["schemas"]["Words"][];
         };
         /** @description A site of a study. */
         Site: {
@@ -1878,13 +2025,32 @@ export interface components {
             /** @description Whether its surgeon withdrew. */
             withdrawn: boolean;
         };
-        /** @description The surgeon's link, as text and as a code. */
-        SurgeonLink: {
-            /** @description The link. */
-            link: string;
-            /** @description The same as an SVG picture. */
-            qr: string;
-            session?: components["schemas"]["SessionId"] | null;
+        /** @description What a sample is in short. */
+        Summary: {
+            /**
+             * Format: double
+             * @description Mean; none of nothing.
+             */
+            mean?: number | null;
+            /**
+             * Format: double
+             * @description Median; none of nothing.
+             */
+            median?: number | null;
+            /** @description Values there are. */
+            n: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the sample (divided by n - 1); none of fewer than two.
+             */
+            sd?: number | null;
+        };
+        /** @description A surgeon's mean of each policy. */
+        SurgeonMeans: {
+            /** @description The mean over the settings of each policy, in the order of `policies`; none where a value is missing. */
+            means: (number | null)[];
+            /** @description The surgeon's code. */
+            surgeon: string;
         };
         /** @description A session as the surgeon's browser gets it. Everything in it is the same whatever the policy. */
         SurgeonView: {
@@ -1924,6 +2090,13 @@ export interface components {
             title: string;
             /** @description Whether what stopped the session or its setting last (a pause, an end) is not on the disk yet. */
             unrecorded: boolean;
+        };
+        /** @description What a surgeon said in the sessions that count. */
+        SurgeonWords: {
+            /** @description By setting; those beside all settings come last. */
+            settings: components["schemas"]["SettingWords"][];
+            /** @description The surgeon's code. */
+            surgeon: string;
         };
         /** @description A session over time. Seconds count from its start by the server's clocks, pauses included. */
         Timeline: {
@@ -2001,12 +2174,32 @@ export interface components {
              */
             setting: number;
         };
+        /** @description What Page's test found. */
+        Trend: {
+            /**
+             * Format: double
+             * @description What L is on average where there is no trend.
+             */
+            expected: number;
+            /**
+             * Format: double
+             * @description Page's L: the sum over treatments of place times rank sum.
+             */
+            l: number;
+            /** @description How it was computed. */
+            method: components["schemas"]["Method"];
+            /**
+             * Format: double
+             * @description Two-sided p.
+             */
+            p: number;
+        };
         /** @description Why policies are to be told. */
         Unblind: {
             /** @description Whether to do it though something may be outstanding, which would then not count any more. */
             despite_outstanding?: boolean;
-            /** @description The passphrase of the lead who is signed in, once more: needed for a session of a study. */
-            passphrase?: string | null;
+            /** @description Who does it: needed for a session of a study that is still blinded. */
+            person?: string | null;
             /** @description Kept in the audit trail. */
             reason: string;
         };
@@ -2026,6 +2219,11 @@ export interface components {
          * @enum {string}
          */
         WaitClock: "page-clock" | "wall-clock";
+        /** @description A closing question's answers. */
+        WholeSessions: components["schemas"]["Outcome"] & components["schemas"]["Summary"] & {
+            /** @description Sessions without an answer. */
+            missing: number;
+        };
         /** @description Why a participant withdrew. */
         Withdraw: {
             /** @description Kept in the audit trail. */
@@ -2039,6 +2237,17 @@ export interface components {
             by: components["schemas"]["Role"];
             /** @description Why. */
             reason: string;
+        };
+        /** @description Something that was said. */
+        Words: {
+            /** @description Whether its words were erased. */
+            erased: boolean;
+            /** @description Whether it arrived after the time in which what a surgeon's device held counted. */
+            late: boolean;
+            /** @description The question that it answers; none of a comment. */
+            question?: string | null;
+            /** @description The words, empty where they were erased. */
+            text: string;
         };
     };
     responses: never;
@@ -3702,95 +3911,6 @@ export interface operations {
             };
         };
     };
-    operator_link: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["SurgeonLink"];
-                };
-            };
-            /** @description The request cannot be read */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The role is not held, or another site made the request */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description It took too long */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The server listens on a loopback address and was asked for by another name */
-            421: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The server failed; its log says more */
-            500: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description Too many pages are open at once */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The disk or the database failed; nothing was changed */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-        };
-    };
     researcher_list: {
         parameters: {
             query?: never;
@@ -4900,17 +5020,8 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description No reason was given, or no passphrase for a session of a study */
+            /** @description No reason was given, or nobody signed for a session of a study */
             422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-            /** @description Too many attempts failed */
-            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5270,7 +5381,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The definition is malformed, or a reason is missing */
+            /** @description The definition is malformed, or a person or reason is missing */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -5411,6 +5522,225 @@ export interface operations {
             };
         };
     };
+    researcher_analysis: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Analysis"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such study */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It is not unblinded */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    researcher_analysis_zip: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/zip": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such study */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It is not unblinded */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     researcher_change_study: {
         parameters: {
             query?: never;
@@ -5444,7 +5774,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Nobody is signed in who may, the passphrase is wrong, or the study names others who may unblind */
+            /** @description The study names others who may */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -5511,17 +5841,8 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description A reason or the passphrase is missing, or the reason names a policy */
+            /** @description A person or reason is missing, or the reason names a policy */
             422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-            /** @description Too many attempts failed */
-            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5557,214 +5878,6 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
-                };
-            };
-        };
-    };
-    accounts_sign_in: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["SignIn"];
-            };
-        };
-        responses: {
-            /** @description Signed in: a cookie, or a token where it was asked for */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["SignedInAs"];
-                };
-            };
-            /** @description The request cannot be read */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description Name and passphrase do not belong together, the account is disabled, or another site made the request */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-            /** @description It took too long */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The body is too long */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The body is not said to be application/json */
-            415: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The server listens on a loopback address and was asked for by another name */
-            421: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The body is JSON, but not as described */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description Too many attempts failed */
-            429: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-            /** @description The server failed; its log says more */
-            500: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description Too many pages are open at once */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The disk failed */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-        };
-    };
-    accounts_sign_out: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Signed out */
-            204: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
-            };
-            /** @description The request cannot be read */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description It took too long */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The server listens on a loopback address and was asked for by another name */
-            421: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The server failed; its log says more */
-            500: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description Too many pages are open at once */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
-                };
-            };
-            /** @description The disk failed */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };
@@ -6433,7 +6546,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Not a key of this server, or of a session that has ended */
+            /** @description Not a key of this server */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -7272,14 +7385,13 @@ export interface operations {
             };
         };
     };
-    accounts_page: {
+    researcher_analysis_page: {
         parameters: {
-            query?: {
-                /** @description Path of the page to go on to. */
-                next?: string;
-            };
+            query?: never;
             header?: never;
-            path?: never;
+            path: {
+                study: string;
+            };
             cookie?: never;
         };
         requestBody?: never;
@@ -7303,6 +7415,25 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such study */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
             /** @description It took too long */
             408: {
                 headers: {
@@ -7311,6 +7442,15 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description It is not unblinded */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description The server listens on a loopback address and was asked for by another name */
@@ -7335,6 +7475,16 @@ export interface operations {
             };
             /** @description Too many pages are open at once */
             503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
                 headers: {
                     [name: string]: unknown;
                 };

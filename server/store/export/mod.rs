@@ -23,11 +23,12 @@ pub(super) use self::description::{
 };
 pub use self::destination::ZipStream;
 pub use self::error::ExportError;
+pub(crate) use self::folder::Folder;
+pub(crate) use self::table::{Cell, Row, means, table};
 pub use self::table::{Column, FORMAT, TEXTS_IN_CSV, Table, Type};
 
 use self::blinded::Blinded;
 use self::description::RecordingRow;
-use self::folder::Folder;
 pub use self::folder::{SUMS, folder_name};
 use self::unblinded::Unblinded;
 pub use self::verify::{read_cells, read_json};

@@ -166,7 +166,7 @@ macro_rules! table {
     };
 }
 
-pub(super) use table;
+pub(crate) use table;
 
 /// `rows` as JSON objects.
 #[must_use]

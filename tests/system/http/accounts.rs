@@ -123,6 +123,9 @@ fn doors(session: &str) -> Vec<(&'static str, String, Option<Value>)> {
         ("researcher", of("/unblind"), Some(reason)),
         ("researcher", "/researcher/studies/scope-2026".to_owned(), None),
         ("researcher", "/api/researcher/studies/scope-2026".to_owned(), None),
+        ("researcher", "/researcher/studies/scope-2026/analysis".to_owned(), None),
+        ("researcher", "/api/researcher/studies/scope-2026/analysis".to_owned(), None),
+        ("researcher", "/api/researcher/studies/scope-2026/analysis.zip".to_owned(), None),
         (
             "researcher",
             "/api/researcher/studies/scope-2026/changes".to_owned(),

@@ -244,8 +244,8 @@ async fn two_sites_are_joined_and_what_does_not_belong_together_is_refused() {
     std::fs::write(&said, before).unwrap();
     let description = session.join("datapackage.json");
     let before = std::fs::read_to_string(&description).unwrap();
-    std::fs::write(&description, before.replace("\"format\": 5", "\"format\": 4")).unwrap();
-    assert!(refusal(&["leeds", "london"]).contains("has format 4"), "two versions");
+    std::fs::write(&description, before.replace("\"format\": 6", "\"format\": 5")).unwrap();
+    assert!(refusal(&["leeds", "london"]).contains("has format 5"), "two versions");
 }
 
 #[tokio::test]

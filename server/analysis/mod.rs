@@ -1,0 +1,28 @@
+//! Analysis of a study after it was unblinded: outcomes by policy, tests, agreement, words side by side; its figures
+//! and tables.
+
+mod comparison;
+mod error;
+mod figures;
+mod gathering;
+mod outcomes;
+mod report;
+pub mod statistics;
+mod study;
+mod tables;
+mod words;
+mod writing;
+
+#[cfg(test)]
+mod tests;
+
+pub use comparison::{Comparison, Difference, LEVEL, Pair, PolicySummary, Position, Repeats, SurgeonMeans, compare};
+pub use error::AnalysisError;
+pub use figures::figure;
+pub use outcomes::{Observation, Outcome};
+pub use report::{
+    AnalysedSession, Analysis, ProtocolAnalysis, SettingWords, SurgeonWords, Value, WholeSessions, Words,
+};
+pub use study::{analyse, check};
+pub use tables::TABLES;
+pub use words::{decimals, p_words};

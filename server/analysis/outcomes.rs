@@ -1,0 +1,178 @@
+//! Outcomes: what is compared between the policies of a protocol, as a number for each setting.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::ids::SessionId;
+use crate::store::Motion;
+use crate::trial::instruments::{Measure, measures};
+use crate::trial::protocol::Protocol;
+use crate::trial::question::{AnswerValue, Question, QuestionKind};
+
+/// Changes of direction a second.
+pub const TURNS: &str = "turns";
+/// Way a second.
+pub const TRAVEL: &str = "travel";
+/// Distance from the optimum.
+pub const FOCAL_ERROR: &str = "focal-error";
+/// Share of frames near the optimum.
+pub const IN_FOCUS: &str = "in-focus";
+
+/// Something that each setting has a number of.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Outcome {
+    /// Its name: question and measure, or what of the focal power.
+    pub outcome: String,
+    /// What it is, for reading.
+    pub label: String,
+    /// Its unit or scale.
+    pub unit: String,
+    /// Which end is better, where that is known: `higher` or `lower`.
+    pub better: Option<&'static str>,
+}
+
+/// The value of an outcome in one setting of a session that counts.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Observation {
+    /// The session.
+    pub session: SessionId,
+    /// The surgeon's code, as it was corrected.
+    pub surgeon: String,
+    /// The setting, from 1: its position in the session.
+    pub setting: usize,
+    /// The policy that ran.
+    pub policy: String,
+    /// Which of the policy's settings in the session, from 1.
+    pub repeat: usize,
+    /// The value; none where it is missing.
+    pub value: Option<f64>,
+}
+
+/// The outcomes that the questions of `protocol` give: each single answer, each score of a questionnaire after a
+/// setting, and the rank of each setting.
+#[must_use]
+pub fn asked(protocol: &Protocol) -> Vec<Outcome> {
+    let after_setting = protocol.after_segment.iter().flat_map(of_question);
+    let rankings = protocol.closing.iter().filter(|question| is_ranking(question)).map(of_ranking);
+    after_setting.chain(rankings).collect()
+}
+
+/// The numbers of closing questions that are about the session as a whole.
+#[must_use]
+pub fn asked_of_session(protocol: &Protocol) -> Vec<Outcome> {
+    protocol.closing.iter().filter(|question| !is_ranking(question)).flat_map(of_question).collect()
+}
+
+/// The outcomes that telemetry gives.
+#[must_use]
+pub fn driven() -> Vec<Outcome> {
+    let outcome = |outcome: &str, label: &str, unit: &str, better| Outcome {
+        outcome: outcome.to_owned(),
+        label: label.to_owned(),
+        unit: unit.to_owned(),
+        better,
+    };
+    vec![
+        outcome(FOCAL_ERROR, "True focal error, as the simulation knows it", "focal power, 0 to 1", Some("lower")),
+        outcome(IN_FOCUS, "Frames in focus: true focal error below 0.1", "share, 0 to 1", Some("higher")),
+        outcome(TURNS, "Turns: changes of direction of the focal power", "a second", None),
+        outcome(TRAVEL, "Travel of the focal power, up and down", "focal power a second", None),
+    ]
+}
+
+/// What `motion` has of each outcome of [`driven`]. The optimum must be known of at least half of the frames.
+#[must_use]
+pub fn of_motion(motion: &Motion) -> Vec<(&'static str, f64)> {
+    let mut values = Vec::new();
+    if motion.seconds > 0.0 {
+        values.push((TURNS, motion.turns as f64 / motion.seconds));
+        values.push((TRAVEL, motion.travel / motion.seconds));
+    }
+    if motion.known > 0 && 2 * motion.known >= motion.frames {
+        values.push((FOCAL_ERROR, motion.error / motion.known as f64));
+        values.push((IN_FOCUS, motion.in_focus as f64 / motion.known as f64));
+    }
+    values
+}
+
+/// What an answer to `question` has of each of its outcomes.
+#[must_use]
+pub fn of_answer(question: &Question, value: &AnswerValue) -> Vec<(String, f64)> {
+    let counted = measures(&question.kind, value).into_iter().filter(|measure| is_outcome(&question.kind, measure));
+    counted.filter_map(|measure| Some((name(question, &measure), measure.value?))).collect()
+}
+
+/// The rank of each setting that a ranking gives, in the order of the settings; none where it ranks nothing.
+#[must_use]
+pub fn of_ranks(question: &Question, value: &AnswerValue) -> Vec<Option<f64>> {
+    measures(&question.kind, value).into_iter().map(|measure| measure.value).collect()
+}
+
+/// Whether `question` has all settings put in order.
+#[must_use]
+pub const fn is_ranking(question: &Question) -> bool {
+    matches!(question.kind, QuestionKind::Ranking { .. })
+}
+
+/// The name of the outcome that a ranking gives.
+#[must_use]
+pub fn rank_name(question: &Question) -> String {
+    format!("{}/rank", question.id)
+}
+
+fn of_ranking(question: &Question) -> Outcome {
+    Outcome {
+        outcome: rank_name(question),
+        label: format!("{} (rank)", question.text),
+        unit: "rank, 1 for the best".to_owned(),
+        better: Some("lower"),
+    }
+}
+
+fn of_question(question: &Question) -> Vec<Outcome> {
+    // An answer without any item has the names of all measures.
+    let nothing = match &question.kind {
+        QuestionKind::Sus => AnswerValue::Points(vec![0; crate::trial::instruments::sus::ITEMS]),
+        QuestionKind::NasaTlx { scales } => AnswerValue::Points(vec![0; scales.len()]),
+        QuestionKind::SurgTlx { scales, pairs } => AnswerValue::Points(vec![0; scales.len() + pairs.len()]),
+        QuestionKind::Text => AnswerValue::Text(String::new()),
+        _ => AnswerValue::Point(0),
+    };
+    let counted = measures(&question.kind, &nothing).into_iter().filter(|measure| is_outcome(&question.kind, measure));
+    counted.map(|measure| outcome(question, &measure)).collect()
+}
+
+/// Of a questionnaire its scores count, not each item.
+fn is_outcome(kind: &QuestionKind, measure: &Measure) -> bool {
+    let questionnaire = matches!(kind, QuestionKind::Sus | QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. });
+    if questionnaire { measure.score && !measure.name.starts_with("weight-of-") } else { !is_order(kind) }
+}
+
+const fn is_order(kind: &QuestionKind) -> bool {
+    matches!(kind, QuestionKind::Ranking { .. })
+}
+
+fn outcome(question: &Question, measure: &Measure) -> Outcome {
+    let (unit, better) = match &question.kind {
+        QuestionKind::Likert { points, low, high, .. } => (scale("points, 1", *points, low, high), None),
+        QuestionKind::VisualAnalogue { low, high } => (scale("hundredths of the line, 0", 100, low, high), None),
+        QuestionKind::Sus => ("score, 0 to 100".to_owned(), Some("higher")),
+        QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. } => ("score, 0 to 100".to_owned(), Some("lower")),
+        QuestionKind::Recognition => ("1 no, 2 not sure, 3 yes".to_owned(), None),
+        QuestionKind::Ranking { .. } | QuestionKind::Text => (String::new(), None),
+    };
+    let label = if measure.score { format!("{}: {}", question.text, measure.label) } else { question.text.clone() };
+    Outcome { outcome: name(question, measure), label, unit, better }
+}
+
+fn scale(from: &str, to: u8, low: &str, high: &str) -> String {
+    if low.is_empty() && high.is_empty() {
+        format!("{from} to {to}")
+    } else {
+        format!("{from} ({low}) to {to} ({high})")
+    }
+}
+
+fn name(question: &Question, measure: &Measure) -> String {
+    format!("{}/{}", question.id, measure.name)
+}

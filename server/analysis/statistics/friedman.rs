@@ -1,0 +1,183 @@
+//! Friedman's test (1937, Journal of the American Statistical Association 32:675): whether treatments differ, each
+//! block's values ranked by themselves.
+
+use std::collections::BTreeMap;
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::distributions::chi_square_above;
+use super::ranks::doubled_ranks;
+
+/// Steps that the exact distribution may take; beyond, permutations are drawn.
+const MOST_STEPS: usize = 4_000_000;
+/// Most treatments whose permutations are all written down.
+const MOST_TREATMENTS: usize = 6;
+/// Permutations that are drawn.
+const DRAWS: usize = 9_999;
+
+/// What Friedman's test found.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Friedman {
+    /// The statistic, corrected for ties.
+    pub chi_square: f64,
+    /// Degrees of freedom: treatments less one.
+    pub df: usize,
+    /// p from the chi-square distribution, which is rough for few blocks.
+    pub p_chi_square: f64,
+    /// p over the permutations of each block's ranks.
+    pub p_permutation: f64,
+    /// How it was computed.
+    pub permutation: PermutationMethod,
+    /// Kendall's W, 0..=1: how far the blocks agree on an order.
+    pub kendalls_w: f64,
+    /// The mean rank of each treatment, 1 for the least value.
+    pub mean_ranks: Vec<f64>,
+}
+
+/// How a p over permutations was computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PermutationMethod {
+    /// Over all permutations.
+    Exact,
+    /// Over 9999 permutations that were drawn.
+    MonteCarlo,
+}
+
+/// Tests `blocks` of three or more treatments each. Permutations are drawn from `seed` where there are too many to take
+/// all. `None` of fewer than two blocks, of fewer than three treatments, and where no block has a difference.
+#[must_use]
+pub fn friedman(blocks: &[Vec<f64>], seed: u64) -> Option<Friedman> {
+    let treatments = blocks.first()?.len();
+    if blocks.len() < 2 || treatments < 3 {
+        return None;
+    }
+
+    let ranks: Vec<Vec<i64>> = blocks.iter().map(|block| doubled_ranks(block)).collect();
+    let w = concordance_of(&ranks)?;
+    let df = treatments - 1;
+    let chi_square = w * blocks.len() as f64 * df as f64;
+    let (p_permutation, permutation) = permutation_p(&ranks, seed);
+
+    let mean_ranks = sums(&ranks).into_iter().map(|sum| 0.5 * sum as f64 / blocks.len() as f64).collect();
+    Some(Friedman {
+        chi_square,
+        df,
+        p_chi_square: chi_square_above(chi_square, df as f64),
+        p_permutation,
+        permutation,
+        kendalls_w: w,
+        mean_ranks,
+    })
+}
+
+/// Kendall's W of `blocks`, corrected for ties (Kendall & Babington Smith 1939, Annals of Mathematical Statistics
+/// 10:275); `None` where no block has a difference.
+#[must_use]
+pub fn concordance<'a>(blocks: impl IntoIterator<Item = &'a Vec<f64>>) -> Option<f64> {
+    concordance_of(&blocks.into_iter().map(|block| doubled_ranks(block)).collect::<Vec<_>>())
+}
+
+/// The spread of the rank sums as a share of the greatest that these ranks allow: that of blocks that all agree.
+fn concordance_of(ranks: &[Vec<i64>]) -> Option<f64> {
+    let treatments = ranks.first()?.len() as i64;
+    let blocks = ranks.len() as i64;
+    let mean = treatments + 1;
+
+    let within: i64 = ranks.iter().flatten().map(|rank| (rank - mean).pow(2)).sum();
+    let greatest = blocks * within;
+    (greatest > 0).then(|| spread(&sums(ranks), blocks * mean) as f64 / greatest as f64)
+}
+
+/// The sum of the doubled ranks of each treatment.
+fn sums(ranks: &[Vec<i64>]) -> Vec<i64> {
+    let treatments = ranks.first().map_or(0, Vec::len);
+    (0..treatments).map(|treatment| ranks.iter().map(|block| block[treatment]).sum()).collect()
+}
+
+fn spread(sums: &[i64], mean: i64) -> i64 {
+    sums.iter().map(|sum| (sum - mean).pow(2)).sum()
+}
+
+/// The share of permutations of each block's ranks whose rank sums spread at least as far as these.
+fn permutation_p(ranks: &[Vec<i64>], seed: u64) -> (f64, PermutationMethod) {
+    match exact_p(ranks) {
+        Some(p) => (p, PermutationMethod::Exact),
+        None => (drawn_p(ranks, seed), PermutationMethod::MonteCarlo),
+    }
+}
+
+fn exact_p(ranks: &[Vec<i64>]) -> Option<f64> {
+    let treatments = ranks.first()?.len();
+    if treatments > MOST_TREATMENTS {
+        return None;
+    }
+    let mean = (treatments as i64 + 1) * ranks.len() as i64;
+    let observed = spread(&sums(ranks), mean);
+
+    // The probability of each set of rank sums, in rising order: all treatments are alike, so their order tells
+    // nothing of what comes next.
+    let mut states = BTreeMap::from([(vec![0; treatments], 1.0)]);
+    let mut steps = 0;
+    for block in ranks {
+        let orders = orders_of(block);
+        steps += orders.len() * states.len();
+        if steps > MOST_STEPS {
+            return None;
+        }
+
+        let mut next = BTreeMap::new();
+        for (state, probability) in &states {
+            for (order, share) in &orders {
+                let mut sums: Vec<i64> = state.iter().zip(order).map(|(sum, rank)| sum + rank).collect();
+                sums.sort_unstable();
+                *next.entry(sums).or_insert(0.0) += probability * share;
+            }
+        }
+        states = next;
+    }
+
+    let as_far = states.iter().filter(|(sums, _)| spread(sums, mean) >= observed);
+    Some(as_far.map(|(_, probability)| probability).sum::<f64>().min(1.0))
+}
+
+/// Each order of `ranks` that differs from the others, with its probability.
+fn orders_of(ranks: &[i64]) -> BTreeMap<Vec<i64>, f64> {
+    let mut orders = BTreeMap::from([(Vec::new(), (ranks.to_vec(), 1.0))]);
+    for _ in 0..ranks.len() {
+        let mut next: BTreeMap<Vec<i64>, (Vec<i64>, f64)> = BTreeMap::new();
+        for (order, (left, probability)) in orders {
+            for place in 0..left.len() {
+                let mut longer = order.clone();
+                longer.push(left[place]);
+                let mut rest = left.clone();
+                rest.remove(place);
+                next.entry(longer).or_insert((rest, 0.0)).1 += probability / left.len() as f64;
+            }
+        }
+        orders = next;
+    }
+    orders.into_iter().map(|(order, (_, probability))| (order, probability)).collect()
+}
+
+pub(super) fn drawn_p(ranks: &[Vec<i64>], seed: u64) -> f64 {
+    let treatments = ranks.first().map_or(0, Vec::len);
+    let mean = (treatments as i64 + 1) * ranks.len() as i64;
+    let observed = spread(&sums(ranks), mean);
+
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut drawn = ranks.to_vec();
+    let mut as_far = 0;
+    for _ in 0..DRAWS {
+        for block in &mut drawn {
+            block.shuffle(&mut random);
+        }
+        as_far += usize::from(spread(&sums(&drawn), mean) >= observed);
+    }
+    // The order that was observed is one of the permutations (Phipson & Smyth 2010).
+    (as_far + 1) as f64 / (DRAWS + 1) as f64
+}

@@ -1,0 +1,19 @@
+//! The statistics of an analysis beside those of evaluations: summaries, tests over more than two policies, trends and
+//! agreement. Values are numbers of any unit; a block is a surgeon's or session's values, one for each treatment.
+
+mod agreement;
+mod distributions;
+mod friedman;
+mod interval;
+mod ranks;
+mod summary;
+mod trend;
+
+#[cfg(test)]
+mod tests;
+
+pub use agreement::{Agreement, agreement};
+pub use friedman::{Friedman, PermutationMethod, concordance, friedman};
+pub use interval::Interval;
+pub use summary::{Summary, median, summary};
+pub use trend::{Trend, trend};

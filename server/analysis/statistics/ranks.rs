@@ -1,0 +1,27 @@
+//! Ranks within a block, doubled so that they are whole numbers also where equal values share their mean rank.
+
+/// How far two values may differ in proportion to their size and still count as equal: means of the same ratings,
+/// summed in another order, differ by rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Twice the rank of each of `values`, 2 for the least if nothing is equal to it. The ranks of a block sum up to
+/// k (k + 1), doubled as they are.
+pub fn doubled_ranks(values: &[f64]) -> Vec<i64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+
+    let mut ranks = vec![0; values.len()];
+    let mut start = 0;
+    while let Some(&first) = order.get(start) {
+        let equal = order[start..].iter().take_while(|&&place| are_equal(values[first], values[place])).count();
+        for &place in &order[start..start + equal] {
+            ranks[place] = (2 * start + equal + 1) as i64;
+        }
+        start += equal;
+    }
+    ranks
+}
+
+fn are_equal(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}

@@ -1,0 +1,78 @@
+//! The analysis as a folder or a ZIP file: tables with their data dictionary, all of it as JSON, figures, checksums.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::error::AnalysisError;
+use super::figures::figure;
+use super::report::{Analysis, ProtocolAnalysis};
+use super::tables::rows;
+use crate::store::export::{Folder, TEXTS_IN_CSV, ZipStream};
+
+/// What a folder is.
+const ABOUT: &str = "The analysis of an unblinded study, as parfocal computed it: docs/analysis.md of its sources \
+    explains each figure. analysis.json has all of it; the tables have the same by rows; analysis_values.csv has every \
+    value, so that all of it can be computed again elsewhere.";
+
+impl Analysis {
+    /// Writes the folder `out`, which must be new or empty. It appears whole or not at all. Its files come back.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub async fn into_folder(&self, out: &Path) -> Result<Vec<String>, AnalysisError> {
+        self.write(Folder::beside(out)?).await
+    }
+
+    /// Sends the same files into `zip`.
+    ///
+    /// # Errors
+    /// When they are no longer taken.
+    pub async fn into_zip(&self, zip: ZipStream) -> Result<(), AnalysisError> {
+        self.write(Folder::zipped(zip)).await.map(|_| ())
+    }
+
+    /// Name for a folder or file, without an ending.
+    #[must_use]
+    pub fn folder_name(study: &str) -> String {
+        format!("parfocal-{study}-analysis")
+    }
+
+    async fn write(&self, mut folder: Folder) -> Result<Vec<String>, AnalysisError> {
+        folder.table(&rows(self, ProtocolAnalysis::session_rows)).await?;
+        folder.table(&rows(self, ProtocolAnalysis::policy_rows)).await?;
+        folder.table(&rows(self, ProtocolAnalysis::test_rows)).await?;
+        folder.table(&rows(self, ProtocolAnalysis::pair_rows)).await?;
+        folder.table(&rows(self, ProtocolAnalysis::whole_rows)).await?;
+        folder.table(&rows(self, ProtocolAnalysis::words_rows)).await?;
+        folder.table(&rows(self, ProtocolAnalysis::value_rows)).await?;
+
+        for protocol in &self.protocols {
+            for compared in &protocol.outcomes {
+                let Some(svg) = figure(compared) else { continue };
+                let outcome = compared.outcome.outcome.replace('/', "-");
+                folder.file(&format!("figure-{}-{outcome}.svg", protocol.protocol), svg.as_bytes()).await?;
+            }
+        }
+
+        folder.json("analysis.json", &json!(self)).await?;
+        folder.describe(&self.package()).await?;
+        Ok(folder.finish().await?)
+    }
+
+    fn package(&self) -> serde_json::Value {
+        json!({
+            "profile": "tabular-data-package",
+            "name": Self::folder_name(&self.study),
+            "title": format!("{}: analysis", self.title),
+            "description": format!("{ABOUT} {TEXTS_IN_CSV}"),
+            "parfocal": {
+                "version": env!("CARGO_PKG_VERSION"),
+                "study": self.study,
+                "study_definition_sha256": self.definition_sha256,
+                "unblinded": self.unblinded,
+                "notes": self.notes,
+            },
+        })
+    }
+}

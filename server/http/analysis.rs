@@ -1,0 +1,133 @@
+//! The analysis of an unblinded study: a page that prints, JSON, and a ZIP file. Each look at it is recorded.
+
+use askama::Template;
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{Path, State};
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::{Html, IntoResponse};
+use tokio::runtime::Handle;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::AppState;
+use super::error::{Error, ErrorBody};
+use super::people::Acting;
+use super::roles::Researcher;
+use crate::analysis::{
+    Analysis, AnalysisError, ProtocolAnalysis, SettingWords, SurgeonWords, analyse, check, decimals,
+};
+use crate::conductor::ConductError;
+use crate::store::Access;
+use crate::store::export::ZipStream;
+
+impl From<AnalysisError> for Error {
+    fn from(error: AnalysisError) -> Self {
+        let text = error.to_string();
+        match error {
+            AnalysisError::NoStudy { .. } => Self::NotFound(text),
+            AnalysisError::StillBlinded { .. } => Self::Conflict(text),
+            AnalysisError::Export(error) => error.into(),
+            AnalysisError::Store(_) => Self::Storage(text),
+        }
+    }
+}
+
+/// The analysis of `study`, once it is recorded that it was looked at.
+async fn looked_at(app: &AppState, by: &Researcher, study: &str) -> Result<Analysis, Error> {
+    by.personally()?;
+    let reader = app.conductor.reader();
+    // What is refused is not recorded.
+    check(reader, study).await?;
+    let access = Access::AnalysisViewed { study: study.to_owned() };
+    app.conductor.recorder(by.actor()).record(&access).await.map_err(ConductError::from)?;
+    Ok(analyse(reader, study).await?)
+}
+
+#[derive(Template)]
+#[template(path = "analysis.html")]
+struct AnalysisPage {
+    analysis: Analysis,
+}
+
+impl AnalysisPage {
+    /// When the study was unblinded, in the words of the room.
+    fn unblinded(&self) -> String {
+        super::researcher::day_and_time(&self.analysis.unblinded)
+    }
+}
+
+/// What surgeons said in the settings of one policy, or beside all settings.
+fn said_of<'a>(surgeon: &'a SurgeonWords, policy: Option<&str>) -> Vec<&'a SettingWords> {
+    surgeon.settings.iter().filter(|setting| setting.policy.as_deref() == policy).collect()
+}
+
+/// A number in a table.
+fn number(value: Option<&f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| decimals(*value, 3))
+}
+
+/// The sessions of a protocol that do not count or of which something is to be known.
+fn remarked(protocol: &ProtocolAnalysis) -> Vec<&crate::analysis::AnalysedSession> {
+    protocol.sessions.iter().filter(|session| session.remark.is_some()).collect()
+}
+
+/// The analysis of a study, with its figures; it prints well.
+#[utoipa::path(get, path = "/researcher/studies/{study}/analysis", tag = "researcher",
+    params(("study" = String, Path)), responses(
+    (status = 200, description = "The page", content_type = "text/html"),
+    (status = 404, description = "No such study", body = ErrorBody),
+    (status = 409, description = "It is not unblinded", body = ErrorBody)))]
+async fn analysis_page(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(study): Path<String>,
+) -> Result<Html<String>, Error> {
+    let analysis = looked_at(&app, &by, &study).await?;
+    AnalysisPage { analysis }.render().map(Html).map_err(|_| Error::Internal)
+}
+
+/// The analysis of a study. Each look at it is recorded.
+#[utoipa::path(get, path = "/api/researcher/studies/{study}/analysis", tag = "researcher",
+    params(("study" = String, Path)), responses(
+    (status = 200, body = Analysis),
+    (status = 404, description = "No such study", body = ErrorBody),
+    (status = 409, description = "It is not unblinded", body = ErrorBody)))]
+async fn analysis(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(study): Path<String>,
+) -> Result<Json<Analysis>, Error> {
+    Ok(Json(looked_at(&app, &by, &study).await?))
+}
+
+/// The same as one ZIP file: tables with their data dictionary, figures, JSON, checksums.
+#[utoipa::path(get, path = "/api/researcher/studies/{study}/analysis.zip", tag = "researcher",
+    params(("study" = String, Path)), responses(
+    (status = 200, description = "The file", content_type = "application/zip"),
+    (status = 404, description = "No such study", body = ErrorBody),
+    (status = 409, description = "It is not unblinded", body = ErrorBody)))]
+async fn analysis_zip(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(study): Path<String>,
+) -> Result<impl IntoResponse, Error> {
+    let analysis = looked_at(&app, &by, &study).await?;
+    let name = Analysis::folder_name(&study);
+    let (zip, bytes) = ZipStream::new(name.clone());
+
+    // On a thread of its own: compressing would hold up the streams.
+    tokio::task::spawn_blocking(move || {
+        if let Err(error) = Handle::current().block_on(analysis.into_zip(zip)) {
+            tracing::warn!(%study, %error, "the download of an analysis was cut off");
+        }
+    });
+
+    let disposition = format!("attachment; filename=\"{name}.zip\"");
+    let headers = [(CONTENT_TYPE, "application/zip".to_owned()), (CONTENT_DISPOSITION, disposition)];
+    Ok((headers, Body::from_stream(bytes)))
+}
+
+/// The routes of this file.
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(analysis_page)).routes(routes!(analysis)).routes(routes!(analysis_zip))
+}
