@@ -185,6 +185,9 @@ fn an_effect_is_told_where_there_is_one_and_not_where_there_is_none() {
     );
 }
 
+/// A surgeon's values.
+type Row<'a> = &'a [Option<f64>];
+
 /// Values of one outcome: a row for each surgeon, who has one session with each policy once.
 fn simple(rows: &[&[Option<f64>]]) -> (Vec<String>, Vec<Observation>) {
     let policies: Vec<String> = (0..rows[0].len()).map(|place| format!("policy-{place}")).collect();
@@ -210,7 +213,7 @@ fn compare_simple(rows: &[&[Option<f64>]]) -> Comparison {
 
 #[test]
 fn where_there_is_nothing_to_compute_a_sentence_says_so_and_json_has_no_odd_number() {
-    let cases: [(&str, Vec<&[Option<f64>]>, &str); 6] = [
+    let cases: [(&str, Vec<Row<'_>>, &str); 6] = [
         ("one policy", vec![&[Some(1.0)], &[Some(2.0)]], "There is one policy"),
         ("one surgeon", vec![&[Some(1.0), Some(2.0), Some(3.0)]], "One surgeon has all values"),
         ("nothing", vec![&[None, None, None], &[None, None, None]], "No surgeon has all values"),

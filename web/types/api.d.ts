@@ -230,6 +230,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/operator/surgeon-link": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The surgeon's link: in a session of a study, to that session alone, which it ends with. */
+        get: operations["operator_link"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/sessions": {
         parameters: {
             query?: never;
@@ -500,6 +517,40 @@ export interface paths {
         put?: never;
         /** Opens, closes, locks or unblinds a study, or records that a surgeon withdrew. */
         post: operations["researcher_change_study"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sign-in": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Signs in. The answer takes longer after failed attempts. */
+        post: operations["accounts_sign_in"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sign-out": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Signs out: the token opens nothing any more. Signing out again changes nothing. */
+        post: operations["accounts_sign_out"];
         delete?: never;
         options?: never;
         head?: never;
@@ -781,6 +832,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/sign-in": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The page to sign in. */
+        get: operations["accounts_page"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/static/{version}/{folder}/{name}": {
         parameters: {
             query?: never;
@@ -836,6 +904,24 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /** @description An account. */
+        Account: {
+            /** @description The name that the person signs in with. */
+            account: components["schemas"]["AccountName"];
+            /** @description Whether the person may not sign in. */
+            disabled: boolean;
+            /** @description The person's name, as signatures have it. */
+            display: string;
+            /** @description What the person may do. */
+            role: components["schemas"]["AccountRole"];
+        };
+        /** @description The name that a person signs in with: 1 to 40 lower-case letters, digits, dots and dashes. */
+        AccountName: string;
+        /**
+         * @description What a person does in a study.
+         * @enum {string}
+         */
+        AccountRole: "lead" | "operator" | "researcher" | "monitor";
         /** @description An action on a session. */
         Act: components["schemas"]["Action"] & {
             /** @description The session that the page was showing. */
@@ -1030,8 +1116,8 @@ export interface components {
         };
         /** @description A change of a study, signed. */
         ChangeStudy: components["schemas"]["StudyAction"] & {
-            /** @description Who does it. */
-            person: string;
+            /** @description The passphrase of the lead who is signed in, once more: needed to lock and to unblind. */
+            passphrase?: string | null;
             /** @description Why. */
             reason: string;
         };
@@ -1141,6 +1227,8 @@ export interface components {
         ErrorBody: {
             /** @description What happened and what to do. */
             error: string;
+            /** @description Whether signing in under a personal account would help. */
+            sign_in?: boolean;
         };
         /**
          * @description What of a record is put right.
@@ -1264,6 +1352,8 @@ export interface components {
         Kind: "mosaic" | "view";
         /** @description An event in words. */
         LogLine: {
+            /** @description The account of whoever it was, where the person was signed in. */
+            account?: string | null;
             /** @description When, by the server's wall clock. */
             at: string;
             /** @description Who. */
@@ -1384,6 +1474,8 @@ export interface components {
             participant: string;
             /** @description Protocol's name. */
             protocol: string;
+            /** @description The study that it belongs to; none outside any study. */
+            study?: string | null;
             /** @description Why the disk has not taken what is `unrecorded`, as far as it has said. */
             unrecorded_because?: string | null;
             /** @description Whether the participant withdrew. */
@@ -1483,8 +1575,6 @@ export interface components {
         PlanStudy: {
             /** @description The definition: TOML, as docs/study.md describes it. */
             definition: string;
-            /** @description Who plans it. */
-            person: string;
             /** @description Why. */
             reason: string;
             /** @description The sites of it that this database runs; all of them where none are named. */
@@ -1890,6 +1980,22 @@ export interface components {
             /** @description What was said, in order. */
             words: components["schemas"]["Words"][];
         };
+        /** @description Who wants to sign in. */
+        SignIn: {
+            /** @description Whether the answer is to hold the token, for a program, instead of setting a cookie. */
+            as_bearer?: boolean;
+            /** @description The account's name. */
+            name: string;
+            /** @description Its passphrase. */
+            passphrase: string;
+        };
+        /** @description Who signed in. */
+        SignedInAs: components["schemas"]["Account"] & {
+            /** @description The page of the account's role. */
+            home: string;
+            /** @description The token, to be sent as `Authorization: Bearer`, where it was asked for. */
+            token?: string | null;
+        };
         /** @description A site of a study. */
         Site: {
             /** @description Its name: lower case letters, digits and dashes. */
@@ -2045,6 +2151,14 @@ export interface components {
              */
             sd?: number | null;
         };
+        /** @description The surgeon's link, as text and as a code. */
+        SurgeonLink: {
+            /** @description The link. */
+            link: string;
+            /** @description The same as an SVG picture. */
+            qr: string;
+            session?: components["schemas"]["SessionId"] | null;
+        };
         /** @description A surgeon's mean of each policy. */
         SurgeonMeans: {
             /** @description The mean over the settings of each policy, in the order of `policies`; none where a value is missing. */
@@ -2198,8 +2312,8 @@ export interface components {
         Unblind: {
             /** @description Whether to do it though something may be outstanding, which would then not count any more. */
             despite_outstanding?: boolean;
-            /** @description Who does it: needed for a session of a study that is still blinded. */
-            person?: string | null;
+            /** @description The passphrase of the lead who is signed in, once more: needed for a session of a study. */
+            passphrase?: string | null;
             /** @description Kept in the audit trail. */
             reason: string;
         };
@@ -3911,6 +4025,95 @@ export interface operations {
             };
         };
     };
+    operator_link: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SurgeonLink"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     researcher_list: {
         parameters: {
             query?: never;
@@ -5020,8 +5223,17 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description No reason was given, or nobody signed for a session of a study */
+            /** @description No reason was given, or no passphrase for a session of a study */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Too many attempts failed */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5381,7 +5593,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The definition is malformed, or a person or reason is missing */
+            /** @description The definition is malformed, or a reason is missing */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -5774,7 +5986,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The study names others who may */
+            /** @description Nobody is signed in who may, the passphrase is wrong, or the study names others who may unblind */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -5841,8 +6053,17 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description A person or reason is missing, or the reason names a policy */
+            /** @description A reason or the passphrase is missing, or the reason names a policy */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Too many attempts failed */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5878,6 +6099,214 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_sign_in: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SignIn"];
+            };
+        };
+        responses: {
+            /** @description Signed in: a cookie, or a token where it was asked for */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignedInAs"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Name and passphrase do not belong together, the account is disabled, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is JSON, but not as described */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many attempts failed */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk failed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    accounts_sign_out: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Signed out */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk failed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };
@@ -6546,7 +6975,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Not a key of this server */
+            /** @description Not a key of this server, or of a session that has ended */
             403: {
                 headers: {
                     [name: string]: unknown;
@@ -7485,6 +7914,79 @@ export interface operations {
             };
             /** @description The disk or the database failed; nothing was changed */
             507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
+    accounts_page: {
+        parameters: {
+            query?: {
+                /** @description Path of the page to go on to. */
+                next?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": unknown;
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -70,16 +70,13 @@ fn friedmans_test_agrees_with_scipy_and_with_counting() {
             assert_near(*found, *expected, name);
         }
 
-        match case.p_exact {
-            Some(p) => {
-                assert_eq!(found.permutation, PermutationMethod::Exact, "{name}");
-                assert_near(found.p_permutation, p, name);
-            }
+        if let Some(p) = case.p_exact {
+            assert_eq!(found.permutation, PermutationMethod::Exact, "{name}");
+            assert_near(found.p_permutation, p, name);
+        } else {
             // Five standard errors of a p that was drawn, and what chi-square is off by at this size.
-            None => {
-                assert_eq!(found.permutation, PermutationMethod::MonteCarlo, "{name}");
-                assert!((found.p_permutation - case.p_chi_square).abs() < 0.04, "{name}: {found:?}");
-            }
+            assert_eq!(found.permutation, PermutationMethod::MonteCarlo, "{name}");
+            assert!((found.p_permutation - case.p_chi_square).abs() < 0.04, "{name}: {found:?}");
         }
     }
 }

@@ -314,9 +314,10 @@ fn assert_page_tells(html: &str, protocol: &Value) {
 fn assert_folder_tells(folder: &Path, analysis: &Value) {
     let sharp = outcome(&analysis["protocols"][0], "sharp/point");
     let row = rows(folder, "analysis_tests.csv").into_iter().find(|row| row["outcome"] == "sharp/point").unwrap();
-    assert_eq!(row["friedman_chi_square"].parse::<f64>().unwrap(), sharp["difference"]["friedman"]["chi_square"]);
-    assert_eq!(row["icc"].parse::<f64>().unwrap(), sharp["repeats"]["agreement"]["icc"]);
-    assert_eq!(rows(folder, "analysis_pairs.csv")[0]["p_holm"].parse::<f64>().unwrap(), sharp["pairs"][0]["p_holm"]);
+    let number = |cell: &String| json!(cell.parse::<f64>().unwrap());
+    assert_eq!(number(&row["friedman_chi_square"]), sharp["difference"]["friedman"]["chi_square"]);
+    assert_eq!(number(&row["icc"]), sharp["repeats"]["agreement"]["icc"]);
+    assert_eq!(number(&rows(folder, "analysis_pairs.csv")[0]["p_holm"]), sharp["pairs"][0]["p_holm"]);
 
     let values = rows(folder, "analysis_values.csv");
     assert_eq!(values.iter().filter(|row| row["outcome"] == "sharp/point").count(), 18);
