@@ -91,6 +91,7 @@ impl Source {
     }
 
     /// The export's folder within a package.
+    #[must_use]
     pub fn place(&self) -> String {
         format!("{SESSIONS}/{}", self.session)
     }

@@ -170,7 +170,9 @@ fn dictionary(table: &JoinedTable, variables: &[Variable], cases: usize) -> Vec<
     extension(&mut out, 13, 1, names.join("\t").as_bytes());
 
     let long = variables.iter().filter(|variable| variable.width > SEGMENT);
-    let widths: String = long.map(|variable| format!("{}={:05}\0\t", variable.short_name(), variable.width)).collect();
+    let widths: Vec<String> =
+        long.map(|variable| format!("{}={:05}\0\t", variable.short_name(), variable.width)).collect();
+    let widths = widths.concat();
     if !widths.is_empty() {
         extension(&mut out, 14, 1, widths.as_bytes());
     }

@@ -177,15 +177,15 @@ pub fn sums(folder: &Path) -> Result<String, PackageError> {
     }
 
     files.sort();
-    let mut lines = String::new();
+    let mut lines = Vec::new();
     for file in files {
         let mut digest = Digester(Sha256::new());
         let path = folder.join(&file);
         let mut content = fs::File::open(&path).map_err(PackageError::unreadable(&path))?;
         std::io::copy(&mut content, &mut digest).map_err(PackageError::unreadable(&path))?;
-        lines += &format!("{}  {}\n", hex::encode(digest.0.finalize()), file.display());
+        lines.push(format!("{}  {}\n", hex::encode(digest.0.finalize()), file.display()));
     }
-    Ok(lines)
+    Ok(lines.concat())
 }
 
 /// Takes what is written into a digest.

@@ -347,9 +347,13 @@ async fn a_studys_analysis_has_scipys_figures_on_the_page_on_the_command_line_an
     let data = study.server.data.path();
     assert_refused_while_blinded(&study).await;
     study.change("unblind").await;
-    for role in ["surgeon", "operator"] {
-        assert_eq!(study.get(role, API).await.0, StatusCode::FORBIDDEN, "{role}");
-        assert_eq!(study.get(role, PAGE).await.0, StatusCode::FORBIDDEN, "{role}");
+    study.server.add_account("operator", "operator", "Operator of Leeds");
+    let operator = study.server.sign_in("operator").await;
+    for key in [study.server.key("surgeon"), &operator] {
+        for path in [API, PAGE] {
+            let response = study.server.get(path).bearer_auth(key).send().await.unwrap();
+            assert_eq!(response.status(), StatusCode::FORBIDDEN, "{path}");
+        }
     }
 
     let (status, said) = study.get("researcher", API).await;

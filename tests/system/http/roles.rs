@@ -101,8 +101,8 @@ async fn each_role_opens_its_own_endpoints_and_no_others() {
         let cookie = cookie(&server, role).await;
         for (path, method, tag) in endpoints.iter().filter(|(.., tag)| ROLES.contains(&tag.as_str())) {
             let status = ask(&server, path, method.clone(), &cookie).await;
-            // One study is shown only to somebody who is signed in.
-            let opens = tag == role && !(method == Method::GET && path.ends_with("/{study}"));
+            // One study and its analysis are shown only to somebody who is signed in.
+            let opens = tag == role && !(method == Method::GET && path.contains("/studies/{study}"));
             assert_eq!(status != StatusCode::FORBIDDEN, opens, "{role}: {method} {path} gave {status}");
         }
 
