@@ -216,8 +216,8 @@ impl Accounts {
         Ok(Some(account))
     }
 
-    /// Whether the sign-in with `token` was ended, or is too old: what goes on by itself, such as a live view, ends then.
-    /// That it was not used for a while ends nothing that goes on.
+    /// Whether the sign-in with `token` was ended, or is too old: what goes on by itself, such as a live view, ends
+    /// then. That it was not used for a while ends nothing that goes on.
     ///
     /// # Errors
     /// When the database failed.

@@ -1,5 +1,5 @@
-//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, shows where it stands, analyses it,
-//! and joins what its sites exported.
+//! `parfocal study`: plans a study, opens, closes and locks it while no server runs, shows where it stands, analyses
+//! it, and joins what its sites exported.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -13,8 +13,8 @@ use crate::store::{Head, verify_database};
 /// Arguments of `parfocal verify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Folder that `parfocal export` or `parfocal study merge` wrote, a server's data folder, or a database file such as
-    /// a backup.
+    /// Folder that `parfocal export` or `parfocal study merge` wrote, a server's data folder, or a database file such
+    /// as a backup.
     path: PathBuf,
     /// A head of the chain that was printed, mailed or published: checks that the history up to it is the same.
     #[arg(long, value_name = "NUMBER:HASH")]

@@ -23,9 +23,9 @@ use super::roles::Roles;
     info(
         title = "parfocal",
         description = "Live view, autofocus control and blinded usability trials of a hyperspectral video exoscope. \
-                       A role is shown by the cookie that /enter gives, or by its key as a bearer token. In a study everybody \
-                       but the surgeon signs in under a personal account: by the cookie that /api/sign-in gives, or by \
-                       the token that it answers with as a bearer token."
+                       A role is shown by the cookie that /enter gives, or by its key as a bearer token. In a study \
+                       everybody but the surgeon signs in under a personal account: by the cookie that /api/sign-in \
+                       gives, or by the token that it answers with as a bearer token."
     ),
     components(schemas(ErrorBody))
 )]

@@ -1,8 +1,8 @@
 //! Roles: who a request speaks for, and the links that let a browser in.
 //!
 //! A role is shown by its cookie, or by its key as a bearer token (programs). One cookie a role, so that one laptop can
-//! be operator and researcher at a time. Whoever is signed in has the roles of the account, too. Nothing else shows a role: where a request comes from tells only which proxy
-//! handed it on.
+//! be operator and researcher at a time. Whoever is signed in has the roles of the account, too. Nothing else shows a
+//! role: where a request comes from tells only which proxy handed it on.
 
 use std::sync::Arc;
 
@@ -177,7 +177,8 @@ struct EnterQuery {
 /// Lets a browser in: takes the key of a role's link, sets the role's cookie and goes to the role's page.
 #[utoipa::path(get, path = "/enter", params(EnterQuery), tag = "roles", responses(
     (status = 303, description = "Let in: the role's cookie, and on to its page"),
-    (status = 403, description = "Not a key of this server, or of a session that has ended", body = super::error::ErrorBody)))]
+    (status = 403, description = "Not a key of this server, or of a session that has ended",
+     body = super::error::ErrorBody)))]
 async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> Result<impl IntoResponse, Error> {
     let key = query.key.trim();
     let (role, token) = match (app.keys.role_of(key), app.keys.session_of(key)) {

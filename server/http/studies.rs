@@ -220,7 +220,8 @@ struct ChangeStudy {
     (status = 429, description = "Too many attempts failed", body = ErrorBody),
     (status = 404, description = "No such study", body = ErrorBody),
     (status = 409, description = "It does not fit where the study stands", body = ErrorBody),
-    (status = 422, description = "A reason or the passphrase is missing, or the reason names a policy", body = ErrorBody)))]
+    (status = 422, description = "A reason or the passphrase is missing, or the reason names a policy",
+     body = ErrorBody)))]
 async fn change_study(
     by: Researcher,
     State(app): State<AppState>,

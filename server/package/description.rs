@@ -9,9 +9,9 @@ use super::table::JoinedTable;
 use crate::store::export::{Column, FORMAT, TEXTS_IN_CSV};
 
 /// What a package says of itself first.
-const ABOUT: &str = "A study, joined from the exports of its sessions by parfocal. Those lie in sessions/, whole: parfocal \
-    verify checks each of them, and that the tables here are theirs. Wall times are UTC; monotonic times are nanoseconds, \
-    comparable within a run of a site. Numbers such as run are counted at each site. telemetry and policy_steps are \
+const ABOUT: &str = "A study, joined from the exports of its sessions by parfocal. Those lie in sessions/, whole: \
+    parfocal verify checks each of them, and that the tables here are theirs. Wall times are UTC; monotonic times are \
+    nanoseconds, comparable within a run of a site. Numbers such as run are counted at each site. telemetry and policy_steps are \
     joined as Parquet alone; sessions/ has them as CSV. load.R loads the tables into R, spss/ has them for SPSS, \
     redcap/ has a data dictionary and an import file for REDCap.";
 

@@ -1,5 +1,5 @@
-//! A joined table as an SPSS system file (`.sav`): uncompressed, in UTF-8, little-endian, with the meaning of each column
-//! as its label.
+//! A joined table as an SPSS system file (`.sav`): uncompressed, in UTF-8, little-endian, with the meaning of each
+//! column as its label.
 //!
 //! The layout is that of "System File Format" in the PSPP developers' guide, which its authors found out; SPSS has
 //! published none.
