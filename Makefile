@@ -8,7 +8,13 @@ ARGS ?=
 # GigE Vision and USB3 Vision are checked wherever their library is. Every check is built once, with it or without; `make run` needs neither.
 FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
 
-.PHONY: run test check lint web web-types unit interface readme bench fuzz
+# A Debian package of the release build: target/parfocal_VERSION_amd64.deb.
+package:
+	@.ci/setup package
+	@cargo build --release --locked $(FEATURES)
+	@deploy/debian/build
+
+.PHONY: run test package check lint web web-types unit interface readme packaged bench fuzz
 
 run:
 	@.ci/setup build
@@ -20,7 +26,7 @@ test:
 	@$(MAKE) --no-print-directory check
 
 # The checks alone, on a machine that is already set up.
-check: lint web unit interface readme
+check: lint web unit interface readme packaged
 
 lint:
 	cargo fmt --check
@@ -46,6 +52,10 @@ interface:
 
 readme:
 	.ci/readme
+
+# The Debian package, unpacked.
+packaged:
+	.ci/package
 
 # Speed: each figure that docs/speed.md states comes from here.
 bench:
