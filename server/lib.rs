@@ -20,6 +20,7 @@ pub mod simulation;
 pub mod accounts;
 pub mod autofocus;
 pub mod camera;
+pub mod doctor;
 
 pub mod scans;
 

@@ -4,6 +4,7 @@ mod account;
 mod announce;
 mod backup;
 mod calibrate;
+mod doctor;
 mod evaluate;
 mod export;
 mod inspect;
@@ -44,6 +45,8 @@ enum Command {
     Backup(backup::Arguments),
     /// Calibrate a sensor: take its dark and white references, or import its maker's tables.
     Calibrate(calibrate::Arguments),
+    /// Look whether this machine is ready for a trial, and say what to do where it is not.
+    Doctor(doctor::Arguments),
     /// Write a session's data as a folder of CSV and JSON.
     Export(export::Arguments),
     /// Show content area, patch and focus metrics of pictures and mosaics.
@@ -92,6 +95,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Account(arguments) => account::run(&arguments),
         Command::Backup(arguments) => backup::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Lens(arguments) => lens::run(&arguments),

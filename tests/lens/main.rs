@@ -2,6 +2,7 @@
 
 mod closing;
 mod command_line;
+mod doctor;
 mod driver;
 mod dynamics;
 mod faults;

@@ -1,0 +1,67 @@
+//! `parfocal doctor`: whether this machine is ready for a trial.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::output::{Failure, print};
+use crate::clock::SystemClock;
+use crate::doctor::{Finding, Verdict, lens, machine};
+use crate::lens::open;
+
+/// Arguments of `parfocal doctor`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the server's database and keys.
+    #[arg(long, value_name = "DIR", default_value = "data")]
+    data_dir: PathBuf,
+    /// Ask this lens too, which no server may be using: optotune:auto or optotune:DEVICE.
+    #[arg(long, value_name = "SPEC")]
+    lens: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints every finding on standard output.
+///
+/// # Errors
+/// When something must be put right before a trial, or standard output cannot be written.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut findings = machine(&arguments.data_dir, &SystemClock);
+    if let Some(spec) = &arguments.lens {
+        super::interrupt::let_lenses_go_first()?;
+        let asked = open(spec, Arc::new(SystemClock)).and_then(|mut opened| opened.info());
+        findings.push(lens(asked));
+    }
+
+    let text = if arguments.json { serde_json::to_string_pretty(&findings)? + "\n" } else { written(&findings) };
+    print(&text)?;
+
+    let wrong = findings.iter().filter(|finding| finding.verdict == Verdict::Wrong).count();
+    match wrong {
+        0 => Ok(()),
+        1 => Err("put one thing right before a trial".into()),
+        _ => Err(format!("put {wrong} things right before a trial").into()),
+    }
+}
+
+/// A line a finding, and below it what to do.
+fn written(findings: &[Finding]) -> String {
+    let width = findings.iter().map(|finding| finding.subject.len()).max().unwrap_or(0);
+    let mut text = String::new();
+
+    for Finding { subject, verdict, found, advice } in findings {
+        let mark = match verdict {
+            Verdict::Well => "ok   ",
+            Verdict::Advice => "look ",
+            Verdict::Wrong => "WRONG",
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{mark}  {subject:width$}  {found}");
+        if let Some(advice) = advice {
+            let _ = writeln!(text, "{:7}{:width$}  {advice}", "", "");
+        }
+    }
+    text
+}

@@ -1,0 +1,124 @@
+//! The network: where a tablet can reach this machine, and whether its cables suit a GigE camera.
+
+use std::net::UdpSocket;
+use std::path::Path;
+
+use super::Finding;
+
+/// Where Linux tells of network interfaces.
+const INTERFACES: &str = "/sys/class/net";
+/// Bytes of a packet from which a GigE Vision camera's pictures come in few enough of them.
+const JUMBO: u32 = 8000;
+/// Megabits a second that a GigE Vision camera needs.
+const GIGABIT: u32 = 1000;
+/// A wired network's kind of hardware, as Linux numbers it (`ARPHRD_ETHER`).
+const ETHERNET: u32 = 1;
+
+const NETWORK: &str = "network";
+const CAMERA: &str = "camera's network";
+
+/// Where others can reach this machine.
+pub fn addresses() -> Finding {
+    // Connecting a datagram socket sends nothing; it picks this machine's address on the route there. The
+    // address is one set aside for documentation (RFC 5737).
+    let outward = UdpSocket::bind("0.0.0.0:0").and_then(|socket| {
+        socket.connect("192.0.2.1:9")?;
+        socket.local_addr()
+    });
+
+    match outward {
+        Ok(address) => Finding::well(NETWORK, format!("A tablet can reach this machine at {}.", address.ip())),
+        Err(_) => Finding::advice(
+            NETWORK,
+            "This machine is in no network.",
+            "Connect it to the tablet's network, unless all pages are opened on this machine.",
+        ),
+    }
+}
+
+/// Whether wired networks that are up could carry a GigE camera's pictures. None where there is no such
+/// network.
+pub fn camera_links() -> Vec<Finding> {
+    let Ok(entries) = std::fs::read_dir(INTERFACES) else { return Vec::new() };
+    let mut names: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    names.sort();
+
+    names.iter().filter_map(|interface| Link::read(interface)).map(|link| link.finding()).collect()
+}
+
+/// A wired network interface that is up.
+#[derive(Debug, PartialEq, Eq)]
+struct Link {
+    name: String,
+    /// Most bytes of a packet.
+    mtu: u32,
+    /// Megabits a second; none where the interface does not tell.
+    speed: Option<u32>,
+}
+
+impl Link {
+    /// The interface whose folder is `folder`; none where it is not wired, not real or not up.
+    fn read(folder: &Path) -> Option<Self> {
+        let text = |name: &str| std::fs::read_to_string(folder.join(name)).ok().map(|text| text.trim().to_owned());
+        let number = |name: &str| text(name).and_then(|text| text.parse::<u32>().ok());
+
+        let wired = number("type") == Some(ETHERNET) && !folder.join("wireless").exists();
+        // Bridges and other made-up interfaces have no device.
+        let real = folder.join("device").exists();
+        let up = text("operstate").as_deref() == Some("up");
+        if !(wired && real && up) {
+            return None;
+        }
+
+        let name = folder.file_name()?.to_string_lossy().into_owned();
+        Some(Self { name, mtu: number("mtu")?, speed: number("speed") })
+    }
+
+    fn finding(&self) -> Finding {
+        let name = &self.name;
+
+        if let Some(speed) = self.speed.filter(|&speed| speed < GIGABIT) {
+            let found = format!("{name} runs at {speed} Mbit/s; a GigE camera needs {GIGABIT}.");
+            return Finding::advice(CAMERA, found, "For a GigE camera, use a cable and a port for gigabit Ethernet.");
+        }
+
+        if self.mtu < JUMBO {
+            let found = format!("{name} takes packets of {} bytes.", self.mtu);
+            let advice = format!("For a GigE camera on {name}, take larger ones: ip link set {name} mtu 9000");
+            return Finding::advice(CAMERA, found, advice);
+        }
+
+        Finding::well(CAMERA, format!("{name} takes packets of {} bytes.", self.mtu))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::doctor::Verdict;
+
+    /// An interface's folder, as Linux has it.
+    fn interface(mtu: &str, speed: &str, operstate: &str) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("device")).unwrap();
+        for (name, value) in [("type", "1\n"), ("mtu", mtu), ("speed", speed), ("operstate", operstate)] {
+            std::fs::write(folder.path().join(name), value).unwrap();
+        }
+        folder
+    }
+
+    #[test]
+    fn small_packets_and_slow_cables_are_told() {
+        let verdict = |folder: &tempfile::TempDir| Link::read(folder.path()).unwrap().finding().verdict;
+        assert_eq!(verdict(&interface("9000\n", "1000\n", "up\n")), Verdict::Well);
+        assert_eq!(verdict(&interface("1500\n", "1000\n", "up\n")), Verdict::Advice);
+        assert_eq!(verdict(&interface("9000\n", "100\n", "up\n")), Verdict::Advice);
+        // A virtual machine's card tells no speed.
+        assert_eq!(verdict(&interface("9000\n", "-1\n", "up\n")), Verdict::Well);
+    }
+
+    #[test]
+    fn an_interface_that_is_down_is_left_out() {
+        assert_eq!(Link::read(interface("1500\n", "1000\n", "down\n").path()), None);
+    }
+}

@@ -1,0 +1,66 @@
+//! `parfocal doctor` as whoever sets a machine up uses it.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+use super::{emulator, quick};
+
+/// Whether it was content, what it found by subject, and its last words.
+fn doctor(data: &Path, more: &[&str]) -> (bool, Vec<Value>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
+    let output = command.args(["doctor", "--json", "--data-dir"]).arg(data).args(more).output().unwrap();
+    let findings = serde_json::from_slice(&output.stdout).unwrap();
+    (output.status.success(), findings, String::from_utf8(output.stderr).unwrap())
+}
+
+fn about<'a>(findings: &'a [Value], subject: &str) -> &'a Value {
+    findings.iter().find(|finding| finding["subject"] == subject).expect("it looks at this")
+}
+
+#[test]
+fn it_looks_at_the_machine_and_names_the_lens_with_its_firmware() {
+    let emulator = emulator(quick());
+    let data = tempfile::tempdir().unwrap();
+    let (content, findings, errors) =
+        doctor(data.path(), &["--lens", &format!("optotune:{}", emulator.path().display())]);
+
+    assert!(content, "{errors} {findings:?}");
+    for subject in ["disk", "data folder", "clock", "network", "real-time priority", "locked memory", "videos"] {
+        let finding = about(&findings, subject);
+        assert_eq!(finding["advice"].is_null(), finding["verdict"] == "well", "what is not well has advice: {finding}");
+    }
+
+    let lens = about(&findings, "lens");
+    assert_eq!(lens["verdict"], "well");
+    assert!(lens["found"].as_str().unwrap().contains("firmware type A, version 1.8.3.1"), "{lens}");
+}
+
+#[test]
+fn a_lens_without_its_head_and_a_file_for_a_folder_must_be_put_right() {
+    let emulator = emulator(quick());
+    emulator.set_lens_present(false);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let (content, findings, errors) =
+        doctor(file.path(), &["--lens", &format!("optotune:{}", emulator.path().display())]);
+
+    assert!(!content);
+    assert!(errors.contains("put 2 things right before a trial"), "{errors}");
+    assert_eq!(about(&findings, "data folder")["verdict"], "wrong");
+    assert_eq!(about(&findings, "lens")["verdict"], "wrong");
+}
+
+#[test]
+fn people_read_a_line_a_finding_and_what_to_do() {
+    let output = Command::new(env!("CARGO_BIN_EXE_parfocal"))
+        .args(["doctor", "--data-dir", "/nowhere/at/all", "--lens", "optotune:/dev/null"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+
+    assert!(!output.status.success());
+    assert!(text.contains("There is no folder /nowhere/at/all yet."), "{text}");
+    let lens = text.lines().position(|line| line.starts_with("WRONG  lens")).expect("a line for the lens");
+    assert!(text.lines().nth(lens + 1).unwrap().contains("Check its cable and power"), "{text}");
+}
