@@ -6,6 +6,7 @@ use super::outcomes::{is_ranking, of_answer, of_motion, of_ranks, rank_name};
 use super::report::{AnalysedSession, SettingWords, Words};
 use crate::ids::{SegmentId, SessionId};
 use crate::store::{Latest, Motion, Reader, RunClocks, StoreError, StoredSession, standings};
+use crate::trial::correction::Subject;
 use crate::trial::erasure::Erasable;
 use crate::trial::event::EventKind;
 use crate::trial::phase::SessionStatus;
@@ -125,11 +126,16 @@ impl<'a> Gathering<'a> {
         }
 
         for (_, comment) in reader.comments(session).await? {
+            let typed = corrections.note(Subject::Comment, &comment.key);
+            let is_typed = comment.said == Said::Voice && typed.is_some();
             let text = match comment.said {
                 Said::Text(text) | Said::Quick(text) => text,
                 Said::Mark => "Marked a moment".to_owned(),
+                // What was said aloud can be read once it was typed out.
+                Said::Voice => typed.unwrap_or("Voice comment, not typed out yet").to_owned(),
             };
-            let erased = erased.contains(&(Erasable::Comment, comment.key.to_string()));
+            // The sound may be gone while its words were typed out.
+            let erased = !is_typed && erased.contains(&(Erasable::Comment, comment.key.to_string()));
             self.take_words(comment.segment, Words { question: None, text, late: comment.late, erased });
         }
 

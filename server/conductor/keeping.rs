@@ -1,4 +1,5 @@
-//! What goes on by itself while the server runs: the time is kept, and what waits for the disk is recorded.
+//! What goes on by itself while the server runs: the time is kept, what waits for the disk is recorded, and voice is
+//! erased when its time is over.
 
 use std::time::Duration;
 
@@ -11,7 +12,8 @@ use super::course::Course;
 const BEAT: Duration = Duration::from_secs(1);
 
 impl Conductor {
-    /// Keeps time limits, prompts and the time left, and records what waits for the disk. Never ends; drop it to stop.
+    /// Keeps time limits, prompts and the time left, records what waits for the disk, and erases voice when its time is
+    /// over. Never ends; drop it to stop.
     pub async fn run(self) {
         let keeping_time = async {
             loop {
@@ -34,7 +36,7 @@ impl Conductor {
             }
         };
 
-        tokio::join!(keeping_time, recording);
+        tokio::join!(keeping_time, recording, self.clone().keep_voice_no_longer());
     }
 
     /// Does what the time now asks for, and records what there is to record.

@@ -25,6 +25,7 @@ mod study_changes;
 mod study_reports;
 mod timeline;
 mod views;
+mod voice;
 
 use std::sync::Arc;
 
@@ -37,7 +38,7 @@ pub use library::{Library, LibraryError, ProtocolSummary};
 pub use reports::{AnswerLine, SessionDetail, SettingDetail, Unblinding};
 pub use studies::Studies;
 pub use study_reports::{OpenStudy, SiteDetail, StudyDetail, StudyLine, StudyLogLine, StudyProtocol, StudySession};
-pub use timeline::{PauseSpan, Played, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint};
+pub use timeline::{PauseSpan, Played, SetAside, SettingSpan, Timeline, TimelineComment, TimelinePoint, TimelineVoice};
 
 use crate::autofocus::Registry;
 use crate::clock::Clock;

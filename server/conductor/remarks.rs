@@ -14,13 +14,18 @@ impl Shared {
         acceptance::check_comment(&new.said)?;
 
         let _pen = self.pen.lock().await;
-        let current =
-            self.live().course_of(new.session).map(|course| (course.state.plan().segments.clone(), course.grace));
-        let (segments, grace) = match current {
+        let known = |course: &mut Course| Known {
+            segments: course.state.plan().segments.clone(),
+            grace: course.grace,
+            voice: course.protocol.voice,
+        };
+        let current = self.live().course_of(new.session).map(known);
+        let Known { segments, grace, voice } = match current {
             Some(current) => current,
             None => self.of_earlier(new.session).await?,
         };
 
+        acceptance::check_spoken(&new.said, voice)?;
         let stamp = self.stamp();
         // A segment that is not this session's can only come from a broken page: what was said is
         // kept all the same.
@@ -83,7 +88,7 @@ impl Shared {
 
     /// Keeps an answer to a session whose questions are not known.
     async fn keep_unasked(&self, new: NewAnswer) -> Result<(), ConductError> {
-        let (segments, grace) = self.of_earlier(new.session).await?;
+        let Known { segments, grace, .. } = self.of_earlier(new.session).await?;
         acceptance::check_unasked(&new, &segments)?;
         unless_taken(self.store.keep_answer(&self.stamped(new, grace)).await?)
     }
@@ -104,17 +109,28 @@ impl Shared {
         Answer { key, session, segment, question, value, origin: origin.plausible(), late, stamp }
     }
 
-    /// The segments of an earlier session, and whether what is said of it still counts: known
-    /// whether or not its protocol can still be read, so that a late comment on it is kept.
-    async fn of_earlier(&self, session: SessionId) -> Result<(Vec<SegmentId>, Grace), ConductError> {
+    /// What is known of an earlier session whether or not its protocol can still be read, so that a late comment on it
+    /// is kept.
+    async fn of_earlier(&self, session: SessionId) -> Result<Known, ConductError> {
         let stored = self.store.reader().session(session).await?.ok_or_else(ConductError::no_session)?;
         let grace = stored.grace(&self.run_clock.clocks);
-        Ok((stored.made.segments.into_iter().map(|(segment, _)| segment).collect(), grace))
+        // Where the protocol cannot be read, nothing that was said may be lost.
+        let voice = stored.protocol().map_or(true, |protocol| protocol.voice);
+        let segments = stored.made.segments.into_iter().map(|(segment, _)| segment).collect();
+        Ok(Known { segments, grace, voice })
     }
 
     pub(super) fn stamp(&self) -> Stamp {
         Stamp { wall: self.clock.wall(), at: self.clock.now() }
     }
+}
+
+/// What deciding about a comment needs to know of its session.
+struct Known {
+    segments: Vec<SegmentId>,
+    grace: Grace,
+    /// Whether the session asks for comments aloud.
+    voice: bool,
 }
 
 fn check(course: &Course, new: &NewAnswer) -> Result<(), Refusal> {
@@ -124,8 +140,10 @@ fn check(course: &Course, new: &NewAnswer) -> Result<(), Refusal> {
 fn unless_taken(kept: Kept) -> Result<(), ConductError> {
     match kept {
         Kept::New | Kept::Before => Ok(()),
-        Kept::KeyTaken => {
-            Err(ConductError::Conflict("its key already stands for something else; send it with a new key".to_owned()))
-        }
+        Kept::KeyTaken => Err(taken()),
     }
+}
+
+pub(super) fn taken() -> ConductError {
+    ConductError::Conflict("its key already stands for something else; send it with a new key".to_owned())
 }

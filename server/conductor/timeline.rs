@@ -11,7 +11,7 @@ use super::course::Course;
 use super::{ConductError, Conductor};
 use crate::clock::Moment;
 use crate::ids::{IdempotencyKey, SessionId};
-use crate::store::{Answer, Latest, PathPoint, RunClocks, StoredErasure, standings};
+use crate::store::{Answer, Latest, PathPoint, Recorded, RunClocks, StoredErasure, standings};
 use crate::trial::correction::Subject;
 use crate::trial::erasure::Erasable;
 use crate::trial::event::{Event, EventKind};
@@ -21,6 +21,7 @@ use crate::trial::question::AnswerValue;
 use crate::trial::remark::Said;
 use crate::trial::role::Role;
 use crate::trial::standing::Standing;
+use crate::trial::voice::Ending;
 
 /// A session over time. Seconds count from its start by the server's clocks, pauses included.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -97,11 +98,26 @@ pub struct TimelineComment {
     /// What was said; nothing where it was erased.
     #[serde(flatten)]
     pub said: Said,
-    /// A researcher's note on it.
+    /// A researcher's note on it; of a voice comment what was said, typed out.
     pub note: Option<String>,
+    /// The recording of a voice comment.
+    pub voice: Option<TimelineVoice>,
     /// When its words were erased, by the server's wall clock.
     #[schema(value_type = Option<String>)]
     pub erased: Option<Timestamp>,
+}
+
+/// The recording of a voice comment.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TimelineVoice {
+    /// What it is; none while nothing of it has arrived.
+    pub media_type: Option<String>,
+    /// How long it is, seconds.
+    pub seconds: f64,
+    /// Why it ended; none where it was cut off, or goes on.
+    pub ended: Option<Ending>,
+    /// Pieces of about a second that have not arrived, though later ones have.
+    pub missing: usize,
 }
 
 /// An answer that does not count: a later one from another device says something else, or it arrived too late.
@@ -152,11 +168,13 @@ impl Conductor {
 
         let notes = Latest::of(&reader.corrections(session).await?);
         let erasures = reader.erasures(session).await?;
+        let mut voice = reader.voice(session).await?;
         let comments = reader.comments(session).await?;
         let comments = comments.into_iter().map(|(run, comment)| TimelineComment {
             key: comment.key,
             note: notes.note(Subject::Comment, &comment.key).map(str::to_owned),
             erased: erased(&erasures, Erasable::Comment, &comment.key),
+            voice: (comment.said == Said::Voice).then(|| told_of(&voice.remove(&comment.key).unwrap_or_default())),
             at: comment.stamp.wall,
             seconds: seconds(start, runs.said(run, comment.stamp.at, &comment.origin)).max(0.0),
             setting: comment.segment.map(|segment| course.setting(segment)),
@@ -229,6 +247,15 @@ impl Conductor {
             asked: course.protocol.record,
             ended: course.state.phase().has_ended(),
         })
+    }
+}
+
+fn told_of(recorded: &Recorded) -> TimelineVoice {
+    TimelineVoice {
+        media_type: recorded.media_type().map(|media_type| media_type.name().to_owned()),
+        seconds: recorded.seconds(),
+        ended: recorded.ended(),
+        missing: recorded.missing(),
     }
 }
 

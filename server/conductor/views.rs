@@ -48,6 +48,7 @@ fn surgeon(course: &Course, now: Moment) -> SurgeonView {
         remaining_seconds: inspecting.then(|| state.plan().limit.saturating_sub(inspected).as_secs_f64()),
         prompt: course.protocol.prompt_at(inspected).filter(|_| inspecting).map(|prompt| prompt.text.clone()),
         quick_comments: course.protocol.quick_comments.clone(),
+        voice: course.protocol.voice,
         questions: state.questions().to_vec(),
         answers: answers(course),
         comments: course.comments,

@@ -60,6 +60,7 @@ static ASSETS: &[Asset] = &assets![
     "researcher/timeline_drawing.js",
     "researcher/timeline_words.js",
     "researcher/track.js",
+    "researcher/voice.js",
     "shared/api.js",
     "shared/canvas.js",
     "shared/dialogs.js",
@@ -93,6 +94,7 @@ static ASSETS: &[Asset] = &assets![
     "surgeon/drafts.js",
     "surgeon/holding.js",
     "surgeon/instrument_form.js",
+    "surgeon/microphone.js",
     "surgeon/notice.js",
     "surgeon/notice_dialog.js",
     "surgeon/origin.js",
@@ -104,7 +106,12 @@ static ASSETS: &[Asset] = &assets![
     "surgeon/question_form.js",
     "surgeon/question_panel.js",
     "surgeon/questions.js",
+    "surgeon/talk.js",
+    "surgeon/talk_button.js",
+    "surgeon/talk_keys.js",
     "surgeon/track.js",
+    "surgeon/voice_outbox.js",
+    "surgeon/voice_store.js",
     "surgeon/words.js",
 ];
 

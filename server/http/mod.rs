@@ -19,6 +19,7 @@ mod operator;
 mod people;
 mod places;
 mod playback;
+mod ranges;
 mod recording;
 mod records;
 mod researcher;
@@ -30,6 +31,7 @@ mod state;
 mod studies;
 mod surgeon;
 mod tablets;
+mod voice;
 
 pub use state::{App, AppState, Metrics};
 
@@ -62,6 +64,7 @@ pub fn router(app: AppState) -> Router {
         .merge(roles::routes())
         .merge(sign_in::routes())
         .merge(surgeon::routes())
+        .merge(voice::routes())
         .merge(operator::routes())
         .merge(camera::routes())
         .merge(recording::routes())

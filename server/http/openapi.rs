@@ -58,7 +58,7 @@ const WITH_BODY: [(&str, &str); 3] = [
 const KEY: &str = "key";
 
 /// Limits that a derived schema cannot state: where, which, what.
-const LIMITS: [(&str, &str, Limit); 9] = [
+const LIMITS: [(&str, &str, Limit); 10] = [
     ("Focus/oneOf/0", "additionalProperties", Limit::None),
     ("Focus/oneOf/1", "additionalProperties", Limit::None),
     ("Focus/oneOf/0/properties/focal_power", "minimum", Limit::Number(0)),
@@ -67,6 +67,7 @@ const LIMITS: [(&str, &str, Limit); 9] = [
     ("Said/oneOf/1/properties/text", "pattern", Limit::Text(NOT_BLANK)),
     // A mark says nothing: what somebody said must not be lost as its text.
     ("Said/oneOf/2/properties", "text", Limit::None),
+    ("Said/oneOf/3/properties", "text", Limit::None),
     ("AnswerValue/oneOf/0", "maximum", Limit::Number(u8::MAX)),
     ("AnswerValue/oneOf/1/items", "maximum", Limit::Number(u8::MAX)),
 ];

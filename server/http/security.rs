@@ -19,6 +19,13 @@ use super::error::Error;
 use super::people;
 use super::places::Place;
 
+/// The header that says what of the device a page may use.
+pub const PERMISSIONS_POLICY: HeaderName = HeaderName::from_static("permissions-policy");
+
+/// What the surgeon's page may use of the device where the protocol asks for voice.
+pub const WITH_MICROPHONE: HeaderValue =
+    HeaderValue::from_static("camera=(), display-capture=(), geolocation=(), microphone=(self)");
+
 /// The nonce that inline scripts and styles of this response must carry.
 #[derive(Debug, Clone)]
 pub struct Nonce(pub String);
@@ -40,25 +47,35 @@ pub async fn headers(mut request: Request, next: Next) -> Response {
 
     let nonce = hex::encode(bytes);
     request.extensions_mut().insert(Nonce(nonce.clone()));
+    let plays_sound = request.uri().path().starts_with(PLAYS_SOUND);
     let mut response = next.run(request).await;
 
     let headers = response.headers_mut();
-    if let Ok(policy) = HeaderValue::from_str(&content_security_policy(&nonce)) {
+    if let Ok(policy) = HeaderValue::from_str(&content_security_policy(&nonce, plays_sound)) {
         headers.insert(CONTENT_SECURITY_POLICY, policy);
     }
 
     headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
+    headers.entry(PERMISSIONS_POLICY).or_insert(HeaderValue::from_static(PERMISSIONS));
     headers.entry(CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
 
     response
 }
 
-fn content_security_policy(nonce: &str) -> String {
+/// Where the researcher's page of a session is, the only one that plays sound.
+const PLAYS_SOUND: &str = "/researcher/sessions/";
+
+/// What a page may not use of the device. The surgeon's page takes the microphone back where the protocol asks for
+/// voice.
+const PERMISSIONS: &str = "camera=(), display-capture=(), geolocation=(), microphone=()";
+
+fn content_security_policy(nonce: &str, plays_sound: bool) -> String {
+    let media = if plays_sound { "media-src 'self'; " } else { "" };
     format!(
         "default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'nonce-{nonce}'; \
-         img-src 'self' blob: data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; form-action 'self'; \
+         img-src 'self' blob: data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; {media}form-action 'self'; \
          base-uri 'none'; frame-ancestors 'none'"
     )
 }

@@ -6,7 +6,7 @@ use askama::Template;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
-use axum::response::Html;
+use axum::response::{Html, IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -15,7 +15,7 @@ use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::roles::{Surgeon, SurgeonsTablet};
-use super::security::Nonce;
+use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
 use crate::ids::SessionId;
 use crate::trial::action::Action;
 use crate::trial::remark::{Holding, NewAnswer, NewComment};
@@ -26,6 +26,8 @@ use crate::trial::view::SurgeonView;
 #[template(path = "surgeon.html")]
 struct Page {
     nonce: String,
+    /// Whether the page may ask for the microphone.
+    microphone: bool,
 }
 
 #[derive(Template)]
@@ -38,13 +40,26 @@ struct OverPage {
 /// The surgeon's page.
 #[utoipa::path(get, path = "/surgeon", tag = "surgeon",
     responses((status = 200, description = "The page", content_type = "text/html")))]
-async fn page(_: SurgeonsTablet, surgeon: Result<Surgeon, Error>, Nonce(nonce): Nonce) -> Result<Html<String>, Error> {
+async fn page(
+    _: SurgeonsTablet,
+    surgeon: Result<Surgeon, Error>,
+    State(app): State<AppState>,
+    Nonce(nonce): Nonce,
+) -> Result<Response, Error> {
     // A tablet that is not let in any more still hands over what it holds.
     if let Err(error) = surgeon {
         let message = error.to_string();
-        return OverPage { nonce, message }.render().map(Html).map_err(|_| Error::Internal);
+        let html = OverPage { nonce, message }.render().map_err(|_| Error::Internal)?;
+        return Ok(Html(html).into_response());
     }
-    Page { nonce }.render().map(Html).map_err(|_| Error::Internal)
+
+    let microphone = app.surgeon_view.borrow().as_ref().is_some_and(|view| view.voice);
+    let html = Page { nonce, microphone }.render().map_err(|_| Error::Internal)?;
+    let mut response = Html(html).into_response();
+    if microphone {
+        response.headers_mut().insert(PERMISSIONS_POLICY, WITH_MICROPHONE);
+    }
+    Ok(response)
 }
 
 type View = Json<Option<Arc<SurgeonView>>>;

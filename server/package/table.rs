@@ -21,7 +21,7 @@ const SHARED: [&str; 5] = ["runs", "devices", "studies", "study_events", "weight
 const LONG: [&str; 2] = ["telemetry", "policy_steps"];
 
 /// Tables that prove one export and mean nothing joined.
-const PROOFS: [&str; 2] = ["chain", "chain_salts"];
+const PROOFS: [&str; 3] = ["chain", "chain_salts", "voice_pieces"];
 
 /// Where a cell of a joined table comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

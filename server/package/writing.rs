@@ -106,12 +106,19 @@ fn fill(
 
 /// Copies an export, file by file.
 fn copy(source: &Source, folder: &Path) -> Result<(), PackageError> {
-    let place = folder.join(source.place());
-    fs::create_dir_all(&place).map_err(PackageError::unwritable(&place))?;
-    for entry in fs::read_dir(&source.folder).map_err(PackageError::unreadable(&source.folder))? {
-        let from = entry.map_err(PackageError::unreadable(&source.folder))?;
-        let to = place.join(from.file_name());
-        fs::copy(from.path(), &to).map_err(PackageError::unwritable(&to))?;
+    copy_folder(&source.folder, &folder.join(source.place()))
+}
+
+fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
+    fs::create_dir_all(to).map_err(PackageError::unwritable(to))?;
+    for entry in fs::read_dir(from).map_err(PackageError::unreadable(from))? {
+        let entry = entry.map_err(PackageError::unreadable(from))?;
+        let copy = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy_folder(&entry.path(), &copy)?;
+        } else {
+            fs::copy(entry.path(), &copy).map_err(PackageError::unwritable(&copy))?;
+        }
     }
     Ok(())
 }

@@ -115,6 +115,10 @@ async fn insert_erasure(
         }
     };
     sqlx::query(emptied).bind(&erasure.record).execute(&mut *connection).await?;
+    if erasure.subject == Erasable::Comment {
+        let silenced = sqlx::query("UPDATE voice_pieces SET audio = NULL WHERE comment = ?");
+        silenced.bind(&erasure.record).execute(&mut *connection).await?;
+    }
 
     sqlx::query("DELETE FROM chain_salts WHERE number = (SELECT number FROM chain WHERE kind = ? AND key = ?)")
         .bind(erasure.subject.name())

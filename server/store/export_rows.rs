@@ -33,7 +33,8 @@ impl Reader {
                  UNION SELECT run FROM comments WHERE session = ?1 UNION SELECT run FROM answers WHERE session = ?1
                  UNION SELECT frame_run FROM comments WHERE session = ?1
                  UNION SELECT run FROM corrections WHERE session = ?1
-                 UNION SELECT run FROM consents WHERE session = ?1 UNION SELECT run FROM erasures WHERE session = ?1)
+                 UNION SELECT run FROM consents WHERE session = ?1 UNION SELECT run FROM erasures WHERE session = ?1
+                 UNION SELECT run FROM voice_pieces WHERE session = ?1)
              ORDER BY run",
         )
         .bind(session.to_string())

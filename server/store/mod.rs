@@ -32,6 +32,7 @@ mod studies;
 pub mod telemetry;
 mod values;
 mod verify;
+mod voice;
 mod withdrawals;
 
 pub use accesses::{Access, Recorder};
@@ -51,4 +52,5 @@ pub use schema::MIGRATOR;
 pub use sessions::{NewSession, StoredSession};
 pub use studies::{Enrolment, NewStudy, StoredStudy, StudyBook, StudyChange};
 pub use verify::verify_database;
+pub use voice::{KeptVoice, PieceKept, Recorded, StoredPiece, VoicePiece};
 pub use withdrawals::Withdrawal;

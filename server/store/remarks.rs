@@ -164,7 +164,11 @@ async fn insert_answer(connection: &mut SqliteConnection, run: i64, answer: &Ans
 
 /// Whether the words of what was said under this key were erased: a tablet that sends them again is told that they are
 /// kept, and keeps them no longer itself.
-async fn is_erased(connection: &mut SqliteConnection, subject: &str, key: &IdempotencyKey) -> Result<bool, StoreError> {
+pub(super) async fn is_erased(
+    connection: &mut SqliteConnection,
+    subject: &str,
+    key: &IdempotencyKey,
+) -> Result<bool, StoreError> {
     let erased = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM erasures WHERE subject = ? AND record = ?)");
     Ok(erased.bind(subject).bind(key.to_string()).fetch_one(connection).await?)
 }
@@ -286,6 +290,9 @@ fn said(row: &SqliteRow) -> Result<Said, StoreError> {
         ("text", Some(text)) => Ok(Said::Text(text)),
         ("quick", Some(text)) => Ok(Said::Quick(text)),
         ("mark", None) => Ok(Said::Mark),
+        // An erasure leaves an empty text.
+        ("voice", None) => Ok(Said::Voice),
+        ("voice", Some(text)) if text.is_empty() => Ok(Said::Voice),
         _ => Err(StoreError::Damaged(format!("comment of kind '{kind}'"))),
     }
 }
@@ -296,5 +303,6 @@ pub(super) fn said_columns(said: &Said) -> (&'static str, Option<&str>) {
         Said::Text(text) => ("text", Some(text)),
         Said::Quick(text) => ("quick", Some(text)),
         Said::Mark => ("mark", None),
+        Said::Voice => ("voice", None),
     }
 }

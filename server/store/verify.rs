@@ -39,6 +39,7 @@ pub(super) async fn checks(snapshot: &Reader, expected: Option<Head>) -> Vec<Che
     vec![
         check("database", whole(snapshot).await),
         check("chain", chain(snapshot, expected).await),
+        check("voice", voice(snapshot).await),
         check("commitments", commitments(snapshot).await),
         check("studies", studies(snapshot).await),
     ]
@@ -161,6 +162,11 @@ async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64
         }
     }
     Ok(waiting)
+}
+
+/// Whether the recordings of what surgeons said are as they were sent.
+async fn voice(snapshot: &Reader) -> Result<String, Wrong> {
+    Ok(snapshot.check_voice().await??)
 }
 
 /// Whether each study is as it was planned, and its sessions have the orders drawn for them.

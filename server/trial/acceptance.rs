@@ -21,6 +21,18 @@ pub fn check_comment(said: &Said) -> Result<(), Refusal> {
     check_length(text)
 }
 
+/// Whether a comment that says `said` is accepted in a session that asks for comments aloud, or (`voice` false) does
+/// not: speech is personal data, and nobody consented to its recording.
+///
+/// # Errors
+/// When it was said aloud in a session that does not ask for that.
+pub fn check_spoken(said: &Said, voice: bool) -> Result<(), Refusal> {
+    if *said == Said::Voice && !voice {
+        return Err(Refusal::conflict("this trial does not record voice; type the comment"));
+    }
+    Ok(())
+}
+
 /// Whether `new` is accepted as an answer in a session of `protocol` that stands at `state`.
 ///
 /// # Errors
@@ -60,6 +72,13 @@ fn check_length(text: &str) -> Result<(), Refusal> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn voice_is_taken_only_where_the_protocol_asks_for_it() {
+        assert_eq!(check_spoken(&Said::Voice, true), Ok(()));
+        assert_eq!(check_spoken(&Said::Mark, false), Ok(()));
+        assert!(matches!(check_spoken(&Said::Voice, false), Err(Refusal::Conflict(_))));
+    }
 
     #[test]
     fn a_comment_must_say_something_and_no_more_than_fits() {

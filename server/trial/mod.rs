@@ -28,3 +28,4 @@ pub mod standing;
 pub mod study;
 pub mod unblinding;
 pub mod view;
+pub mod voice;

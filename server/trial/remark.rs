@@ -96,6 +96,8 @@ pub enum Said {
     Quick(String),
     /// "Mark this moment".
     Mark,
+    /// Said aloud: the recording follows in pieces.
+    Voice,
 }
 
 /// An answer as a surgeon's browser sends it. Of several to the same question the one given last counts, as far as it

@@ -43,6 +43,8 @@ pub struct SurgeonView {
     pub prompt: Option<String>,
     /// One-tap comments.
     pub quick_comments: Vec<String>,
+    /// Whether the surgeon may comment aloud.
+    pub voice: bool,
     /// The questions to show in `Questions` and `Closing`.
     pub questions: Vec<Question>,
     /// Answers already kept for those questions, by question id.

@@ -337,7 +337,7 @@ async fn whatever_is_changed_in_an_export_is_found_and_named() {
     assert!(cut.is_err(), "{cut:?}");
 }
 
-fn recomputed(out: &Path) -> Result<Value, String> {
+pub fn recomputed(out: &Path) -> Result<Value, String> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/trial/recompute_chain.py");
     let output = Command::new("python3").arg(script).arg(out).output().unwrap();
     if !output.status.success() {

@@ -17,3 +17,4 @@ mod sessions;
 mod storage;
 mod studies;
 mod verification;
+mod voice;

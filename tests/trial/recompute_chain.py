@@ -55,6 +55,10 @@ OPEN = {
     ),
     "study-session": ("study_sessions", "session study site protocol place"),
     "actor": ("actors", "number kind record session account display"),
+    "voice-piece": (
+        "voice_pieces",
+        "number session comment piece media_type through_ms ended bytes sha256 wall run monotonic_ns",
+    ),
 }
 SEALED = {
     "event": ["reason"],
@@ -97,6 +101,8 @@ def main(folder):
         "study": lambda row: row["study"],
         "study-event": lambda row: f"{row['study']}/{row['number']}",
         "study-session": lambda row: row["session"],
+        "actor": lambda row: row["number"],
+        "voice-piece": lambda row: row["number"],
     }
     records = {(kind, keys[kind](row)): row for kind, found in tables.items() for row in found}
 

@@ -127,7 +127,7 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
 
     assert_eq!(found(&|| write("comments.csv", read("comments.csv").replace('🔬', "!"))), ["copies", "chain"]);
     assert_eq!(found(&|| remove("session.json")), ["copies"]);
-    assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "copies", "study", "chain"]);
+    assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "voice", "copies", "study", "chain"]);
 
     // An answer that counts though it came too late.
     let late = read("answers.csv").replacen(",false,false,\n", ",true,false,\n", 1);

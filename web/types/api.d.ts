@@ -420,6 +420,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/researcher/sessions/{session}/voice/{comment}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** What was said aloud in a voice comment, as far as it has arrived. A request for a range of bytes gets that range. */
+        get: operations["researcher_recording"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/sessions/{session}/withdraw": {
         parameters: {
             query?: never;
@@ -639,6 +656,26 @@ export interface paths {
         get: operations["surgeon_session"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/surgeon/voice/{comment}/{piece}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keeps a piece of a recording: once this has answered, it is on disk. The comment (of kind voice) comes first; its
+         *     pieces may then come late, again, and in any order.
+         */
+        post: operations["surgeon_keep_piece"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1218,6 +1255,11 @@ export interface components {
             /** @description The session. */
             session: components["schemas"]["SessionId"];
         };
+        /**
+         * @description Why a recording ended.
+         * @enum {string}
+         */
+        Ending: "released" | "limit" | "microphone-lost" | "left";
         /**
          * @description A record whose words can be erased.
          * @enum {string}
@@ -1814,6 +1856,10 @@ export interface components {
             /** @enum {string} */
             kind: "mark";
             text?: never;
+        } | {
+            /** @enum {string} */
+            kind: "voice";
+            text?: never;
         };
         /** @description A scale of a questionnaire. */
         Scale: {
@@ -2204,6 +2250,8 @@ export interface components {
             title: string;
             /** @description Whether what stopped the session or its setting last (a pause, an end) is not on the disk yet. */
             unrecorded: boolean;
+            /** @description Whether the surgeon may comment aloud. */
+            voice: boolean;
         };
         /** @description What a surgeon said in the sessions that count. */
         SurgeonWords: {
@@ -2240,7 +2288,7 @@ export interface components {
             key: components["schemas"]["IdempotencyKey"];
             /** @description Whether it arrived after the time in which what a surgeon's device held counted. */
             late: boolean;
-            /** @description A researcher's note on it. */
+            /** @description A researcher's note on it; of a voice comment what was said, typed out. */
             note?: string | null;
             /**
              * Format: double
@@ -2249,6 +2297,7 @@ export interface components {
             seconds: number;
             /** @description Setting, from 1. */
             setting?: number | null;
+            voice?: components["schemas"]["TimelineVoice"] | null;
         };
         /** @description A point of the focal path. */
         TimelinePoint: {
@@ -2287,6 +2336,19 @@ export interface components {
              * @description Setting, from 1.
              */
             setting: number;
+        };
+        /** @description The recording of a voice comment. */
+        TimelineVoice: {
+            ended?: components["schemas"]["Ending"] | null;
+            /** @description What it is; none while nothing of it has arrived. */
+            media_type?: string | null;
+            /** @description Pieces of about a second that have not arrived, though later ones have. */
+            missing: number;
+            /**
+             * Format: double
+             * @description How long it is, seconds.
+             */
+            seconds: number;
         };
         /** @description What Page's test found. */
         Trend: {
@@ -5273,6 +5335,125 @@ export interface operations {
             };
         };
     };
+    researcher_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+                /** @description The comment's key */
+                comment: components["schemas"]["IdempotencyKey"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The recording */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "audio/webm;codecs=opus": number[];
+                    "audio/mp4": number[];
+                    "audio/ogg;codecs=opus": number[];
+                };
+            };
+            /** @description A part of it */
+            206: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session or recording, or it was erased */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It has no such part */
+            416: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     researcher_withdraw: {
         parameters: {
             query?: never;
@@ -6942,6 +7123,158 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+        };
+    };
+    surgeon_keep_piece: {
+        parameters: {
+            query: {
+                /** @description Session that the comment was said in. */
+                session: components["schemas"]["SessionId"];
+                /** @description How far the recording had come at the piece's end, milliseconds. */
+                through_ms: number;
+                /** @description Why the recording ended, on its last piece. */
+                ended?: "released" | "limit" | "microphone-lost" | "left";
+            };
+            header?: never;
+            path: {
+                /** @description The comment's key */
+                comment: components["schemas"]["IdempotencyKey"];
+                /** @description The piece's place in the recording, from 1 */
+                piece: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "audio/mp4": number[];
+                "audio/ogg;codecs=opus": number[];
+                "audio/webm;codecs=opus": number[];
+            };
+        };
+        responses: {
+            /** @description Kept */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The session has no such voice comment */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Another piece stands in its place */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No sound that browsers record, or too large */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk failed; send it again */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };

@@ -247,8 +247,34 @@ const ACTOR: Kind = Kind {
     order: "number",
 };
 
+// The sound itself is in no column here: its hash is, and stays when the sound is erased.
+const VOICE_PIECE: Kind = Kind {
+    name: "voice-piece",
+    table: "voice_pieces",
+    open: &[
+        "number",
+        "session",
+        "comment",
+        "piece",
+        "media_type",
+        "through_ms",
+        "ended",
+        "bytes",
+        "sha256",
+        "wall",
+        "run",
+        "monotonic_ns",
+    ],
+    sealed: &[],
+    select:
+        "SELECT CAST(number AS TEXT) AS chain_key, session AS chain_session, number AS chain_order, number, session,
+         comment, piece, media_type, through_ms, ended, bytes, sha256, wall, run, monotonic_ns FROM voice_pieces",
+    one: "number = ?",
+    order: "number",
+};
+
 /// Every kind but telemetry, which is sealed in blocks.
-pub const KINDS: [Kind; 16] = [
+pub const KINDS: [Kind; 17] = [
     RUN,
     PARTICIPANT,
     SESSION,
@@ -265,6 +291,7 @@ pub const KINDS: [Kind; 16] = [
     STUDY_SESSION,
     ACCOUNT_EVENT,
     ACTOR,
+    VOICE_PIECE,
 ];
 
 /// The kind called `name`.

@@ -1,7 +1,7 @@
 //! The blinded part of an export. What it holds has no field for a policy, the order, the seed, or
 //! a reason that may name them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use serde_json::{Map, Value, json};
@@ -15,13 +15,13 @@ use super::folder::Folder;
 use super::scores::Scored;
 use super::study::ExportedStudy;
 use super::table::{FORMAT, Row, TEXTS_IN_CSV, objects};
-use crate::ids::{SegmentId, SessionId};
+use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::store::remarks::said_columns;
 use crate::store::sessions::StoredSession;
 use crate::store::values::nanoseconds;
 use crate::store::{
-    Answer, Comment, DeviceEvent, Erasure, Head, Latest, Reader, RunClocks, SessionLine, StoreError, StoredConsent,
-    StoredCorrection, StoredErasure, Withdrawal, standings,
+    Answer, Comment, DeviceEvent, Erasure, Head, Latest, Reader, Recorded, RunClocks, SessionLine, StoreError,
+    StoredConsent, StoredCorrection, StoredErasure, Withdrawal, standings,
 };
 use crate::trial::erasure::Erasable;
 use crate::trial::event::{Event, EventKind};
@@ -51,9 +51,11 @@ pub struct Blinded {
     commitment: String,
     segments: Vec<SegmentId>,
     events: Vec<(i64, Event)>,
-    comments: Vec<(i64, Comment)>,
+    pub(super) comments: Vec<(i64, Comment)>,
+    /// The recordings of voice comments.
+    pub(super) voice: BTreeMap<IdempotencyKey, Recorded>,
     answers: Vec<(i64, Answer)>,
-    corrections: Vec<StoredCorrection>,
+    pub(super) corrections: Vec<StoredCorrection>,
     consents: Vec<StoredConsent>,
     erasures: Vec<StoredErasure>,
     withdrawals: Vec<Withdrawal>,
@@ -89,6 +91,7 @@ impl Blinded {
             segments: stored.made.segments.into_iter().map(|(segment, _)| segment).collect(),
             events: stored.events.into_iter().map(blind).collect(),
             comments: reader.comments(session).await?,
+            voice: reader.voice(session).await?,
             answers: reader.answers(session).await?,
             corrections: reader.corrections(session).await?,
             consents: reader.consents(session).await?,
@@ -103,7 +106,7 @@ impl Blinded {
         self.line.practice
     }
 
-    const fn session(&self) -> SessionId {
+    pub(super) const fn session(&self) -> SessionId {
         self.line.session
     }
 
@@ -138,6 +141,9 @@ impl Blinded {
         copy(folder, &mut copies, &ExportedStudy::session_rows(study)).await?;
         copy(folder, &mut copies, ExportedStudy::event_rows(study)).await?;
         copy(folder, &mut copies, &reader.export_actors(self.session()).await?).await?;
+        let voice = self.write_voice(reader, folder).await?;
+        copy(folder, &mut copies, &voice).await?;
+        copy(folder, &mut copies, &self.voice_piece_rows()).await?;
         folder.json("session.json", &Value::Object(copies)).await?;
 
         folder.file("protocol.toml", self.protocol_toml.as_bytes()).await?;
@@ -207,7 +213,7 @@ impl Blinded {
         before.into_iter().any(|(_, event)| matches!(event.kind, EventKind::Completed | EventKind::Aborted { .. }))
     }
 
-    fn setting(&self, segment: Option<SegmentId>) -> Option<usize> {
+    pub(super) fn setting(&self, segment: Option<SegmentId>) -> Option<usize> {
         self.segments.iter().position(|&known| Some(known) == segment).map(|position| position + 1)
     }
 
@@ -327,7 +333,7 @@ impl Blinded {
     }
 
     /// When the words of a record were erased.
-    fn erased(&self, subject: Erasable, record: &str) -> Option<Timestamp> {
+    pub(super) fn erased(&self, subject: Erasable, record: &str) -> Option<Timestamp> {
         let mut erasures = self.erasures.iter().map(|stored| &stored.erasure);
         let its_own = |erasure: &&Erasure| erasure.subject == subject && erasure.record == record;
         erasures.find(its_own).map(|erasure| erasure.stamp.wall)

@@ -138,8 +138,10 @@ table! {
         session: SessionId = SESSION,
         setting: Option<usize> = SETTING,
         segment: Option<SegmentId> = SEGMENT,
-        kind: &'static str = means("text (typed), quick (one tap) or mark (\"mark this moment\")"),
-        text: Option<String> = means("What was said, as it was said; empty for a mark"),
+        kind: &'static str = means(
+            "text (typed), quick (one tap), mark (\"mark this moment\") or voice (said aloud; see voice)",
+        ),
+        text: Option<String> = means("What was said, as it was said; empty for a mark and for voice"),
         frame: Option<u64> = means("Number of the frame on the surgeon's screen"),
         frame_run: Option<i64> = means("Start of the server that counted that frame; see runs"),
         wall: Timestamp = WALL,
@@ -520,6 +522,63 @@ table! {
 }
 
 table! {
+    name: "voice",
+    description: "The recordings of voice comments; each is a file in the folder voice",
+    key: [comment],
+    row:
+    /// The recording of a voice comment.
+    #[derive(Debug, Clone)]
+    VoiceRow {
+        comment: IdempotencyKey = means("Key of the comment, as in comments.csv").since(7),
+        session: SessionId = SESSION.since(7),
+        setting: Option<usize> = SETTING.since(7),
+        file: Option<String> =
+            means("The file; empty where nothing of the recording arrived, or its sound was erased").since(7),
+        media_type: Option<&'static str> = means("What the file is, as the browser recorded it").since(7),
+        seconds: f64 = means("How long the recording is, as the page told").in_unit("s").since(7),
+        pieces: usize = means("Pieces that arrived; see voice_pieces").since(7),
+        missing: usize = means("Pieces that did not arrive, though later ones did").since(7),
+        bytes: i64 = means("Length of the pieces that arrived").since(7),
+        sha256: Option<String> = means("SHA-256 of the file").since(7),
+        ended: Option<&'static str> = means(
+            "Why it ended: released (the surgeon let go), limit (after two minutes), microphone-lost or left (the \
+             page went out of sight); empty where it was cut off",
+        )
+        .since(7),
+        complete: bool = means("Whether it has its end and all its pieces").since(7),
+        transcript: Option<String> =
+            means("What was said, typed out by a researcher; by whom and when is in corrections").since(7),
+        erased: Option<Timestamp> =
+            means("When its sound was erased, by the server's wall clock; by whom and why is in erasures")
+                .in_unit("UTC")
+                .since(7),
+    }
+}
+
+table! {
+    name: "voice_pieces",
+    description: "The pieces in which the recordings of voice comments arrived, in the order they were kept",
+    key: [number],
+    row:
+    /// A piece of a recording.
+    #[derive(Debug, Clone)]
+    VoicePieceRow {
+        number: i64 = means("Order of the record in the database").since(7),
+        session: SessionId = SESSION.since(7),
+        comment: IdempotencyKey = means("Key of the comment, as in comments.csv").since(7),
+        piece: u32 = means("Place in the recording, from 1: the file is the pieces one after another").since(7),
+        media_type: &'static str = means("What it is, as the browser recorded it").since(7),
+        through_ms: i64 = means("How far the recording had come at its end, as the page told").in_unit("ms").since(7),
+        ended: Option<&'static str> = means("On the last piece: why the recording ended, as in voice").since(7),
+        bytes: i64 = means("Its length").since(7),
+        sha256: String = means("SHA-256 of its bytes; stays when the sound is erased").since(7),
+        wall: Timestamp = WALL.since(7),
+        run: i64 = RUN.since(7),
+        monotonic_ns: i64 = MONOTONIC.since(7),
+    }
+}
+
+table! {
     name: "chain",
     description:
         "The chain of all records of the database up to this export, in order: of the rows that are not \
@@ -650,7 +709,7 @@ table! {
 }
 
 /// Every table that an export may have.
-pub const ALL: [Table; 24] = [
+pub const ALL: [Table; 26] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -669,6 +728,8 @@ pub const ALL: [Table; 24] = [
     StudySessionRow::TABLE,
     StudyEventRow::TABLE,
     ActorRow::TABLE,
+    VoiceRow::TABLE,
+    VoicePieceRow::TABLE,
     ChainRow::TABLE,
     TelemetryRow::TABLE,
     AllocationRow::TABLE,

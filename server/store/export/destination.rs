@@ -110,7 +110,11 @@ impl NewFolder {
     }
 
     fn begin(&mut self, name: &str) -> io::Result<()> {
-        self.file = Some(BufWriter::new(File::create(self.temporary.path().join(name))?));
+        let path = self.temporary.path().join(name);
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        self.file = Some(BufWriter::new(File::create(path)?));
         Ok(())
     }
 

@@ -12,6 +12,7 @@ mod study;
 mod table;
 mod unblinded;
 pub mod verify;
+mod voice;
 
 use std::path::{Path, PathBuf};
 

@@ -23,6 +23,8 @@ const MOST_SETTINGS: usize = 24;
 const MOST_BALANCED_SETTINGS: usize = 12;
 /// How many points with labels a scale may have: more cannot be told apart, or reached with gloves.
 const LABELS: std::ops::RangeInclusive<u8> = 2..=9;
+/// Longest time for which a protocol keeps voice: thirty years, as the records of some trials.
+const LONGEST_VOICE_DAYS: u32 = 30 * 366;
 /// Longest text that surgeons read, in characters.
 const LONGEST_TEXT: usize = 400;
 
@@ -71,6 +73,10 @@ struct File {
     grace_minutes: Option<Spanned<u32>>,
     #[serde(default)]
     record: Record,
+    #[serde(default)]
+    voice: bool,
+    #[serde(default)]
+    voice_days: Option<Spanned<u32>>,
     #[serde(default)]
     consent_version: Option<Spanned<String>>,
     #[serde(default)]
@@ -178,6 +184,8 @@ fn parse(source: &str, known: &[PolicyName]) -> Result<Protocol, Fault> {
         quick_comments: reader.all_shown(&file.quick_comments, "quick_comments")?,
         grace,
         record: file.record,
+        voice: file.voice,
+        voice_days: voice_days(&file)?,
         consent: file.consent_version.as_ref().map(consent_version).transpose()?,
         after_segment: reader.questions(&file.after_segment, &mut ids, false)?,
         closing: reader.questions(&file.closing, &mut ids, true)?,
@@ -207,6 +215,15 @@ fn check_order(file: &File, settings: usize) -> Result<(), Fault> {
     }
 
     Ok(())
+}
+
+/// For how many days voice is kept.
+fn voice_days(file: &File) -> Result<Option<u32>, Fault> {
+    let Some(days) = &file.voice_days else { return Ok(None) };
+    if !file.voice {
+        return Err(Fault::new(days.span(), "voice_days", "needs 'voice = true'"));
+    }
+    between(days, "voice_days", 1..=LONGEST_VOICE_DAYS, " days").map(Some)
 }
 
 fn start(given: Option<&Spanned<f64>>) -> Result<FocalPower, Fault> {

@@ -46,6 +46,10 @@ pub struct Protocol {
     pub prompt_stay: Duration,
     /// One-tap comments.
     pub quick_comments: Vec<String>,
+    /// Whether the surgeon may comment aloud.
+    pub voice: bool,
+    /// For how many days the sound of voice comments is kept; none: until somebody erases it.
+    pub voice_days: Option<u32>,
     /// How long after the end what a surgeon's device still holds counts.
     pub grace: Duration,
     /// What is recorded.
@@ -155,6 +159,23 @@ mod tests {
         assert_eq!(grace("grace_minutes = 0"), Ok(Duration::ZERO));
         let said = grace("grace_minutes = 1441").unwrap_err().to_string();
         assert!(said.contains("key 'grace_minutes': must be from 0 to 1440 minutes, not 1441"), "{said}");
+    }
+
+    #[test]
+    fn voice_is_asked_for_by_name_and_kept_as_long_as_the_protocol_says() {
+        let voice = |lines: &str| {
+            let source = PAPER.replace("repeats = 2", &format!("repeats = 2\n{lines}"));
+            let protocol = Protocol::parse(&source, "trial.toml", &known());
+            protocol.map(|protocol| (protocol.voice, protocol.voice_days)).map_err(|error| error.to_string())
+        };
+
+        assert_eq!(voice(""), Ok((false, None)));
+        assert_eq!(voice("voice = true"), Ok((true, None)));
+        assert_eq!(voice("voice = true\nvoice_days = 30"), Ok((true, Some(30))));
+        let without = voice("voice_days = 30").unwrap_err();
+        assert!(without.contains("key 'voice_days': needs 'voice = true'"), "{without}");
+        let none = voice("voice = true\nvoice_days = 0").unwrap_err();
+        assert!(none.contains("must be from 1 to 10980 days, not 0"), "{none}");
     }
 
     #[test]

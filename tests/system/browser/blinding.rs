@@ -30,7 +30,7 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 51] = [
+const KEYS: [&str; 52] = [
     "age",
     "answers",
     "area",
@@ -76,6 +76,7 @@ const KEYS: [&str; 51] = [
     "type",
     "unrecorded",
     "view",
+    "voice",
     "width",
     "x",
     "y",

@@ -62,8 +62,14 @@ impl Driver {
 
     /// A browser with a fresh profile.
     pub async fn browser(&self) -> Browser {
+        self.browser_with(&[]).await
+    }
+
+    /// A browser with a fresh profile and `more` arguments.
+    pub async fn browser_with(&self, more: &[String]) -> Browser {
         let profile = tempfile::tempdir().unwrap();
         let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
+        arguments.extend_from_slice(more);
         arguments.push(format!("--user-data-dir={}", profile.path().display()));
         let wanted = json!({
             "goog:chromeOptions": { "args": arguments },

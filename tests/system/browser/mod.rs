@@ -23,6 +23,7 @@ mod tabs;
 mod theatre;
 mod trial;
 mod view;
+mod voice;
 mod wait;
 mod wire;
 mod writing;

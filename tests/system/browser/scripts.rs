@@ -39,6 +39,11 @@ impl Browser {
         self.run(CUT, &[json!(end)]).await;
     }
 
+    /// Fails all requests of the page, until it is loaded again.
+    pub async fn cut_all(&self) {
+        self.run("window.fetch = () => Promise.reject(new TypeError('Failed to fetch'))", &[]).await;
+    }
+
     /// Lets go what was held or cut.
     pub async fn release(&self) {
         self.run("window.release()", &[]).await;
@@ -81,7 +86,8 @@ impl Browser {
         strings(&self.run(names, &[]).await)
     }
 
-    async fn before_each_page(&self, script: &str) {
+    /// Runs `script` before those of each page from the next load on.
+    pub async fn before_each_page(&self, script: &str) {
         self.tools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": script })).await;
     }
 }

@@ -67,9 +67,14 @@ impl Theatre {
 
     /// The same on the data folder `data`.
     pub async fn on(driver: &Driver, data: Arc<TempDir>) -> Self {
+        Self::heard(driver, data, &[]).await
+    }
+
+    /// The same with `arguments` for the surgeon's browser, such as what its microphone hears.
+    pub async fn heard(driver: &Driver, data: Arc<TempDir>, arguments: &[String]) -> Self {
         let server = start(data, "127.0.0.1:0");
         let proxy = Proxy::to(server.address).await;
-        let (surgeon, operator) = tokio::join!(driver.browser(), driver.browser());
+        let (surgeon, operator) = tokio::join!(driver.browser_with(arguments), driver.browser());
         surgeon.open(&format!("http://{}/enter?key={}", proxy.address, server.key("surgeon"))).await;
         operator.open(&server.url(&format!("/enter?key={}", server.key("operator")))).await;
         Self { server, proxy, surgeon, operator }

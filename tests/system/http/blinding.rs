@@ -135,7 +135,7 @@ async fn a_whole_session_tells_the_surgeons_browser_nothing_of_the_policies() {
         for telling in TELLING {
             // The name of a header that every response has.
             let heard = heard.replace("content-security-policy", "").replace("referrer-policy", "");
-            let heard = heard.replace("cross-origin-resource-policy", "");
+            let heard = heard.replace("cross-origin-resource-policy", "").replace("permissions-policy", "");
             assert!(!heard.contains(telling), "'{telling}' in {heard}");
         }
     }

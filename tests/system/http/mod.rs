@@ -20,3 +20,4 @@ mod service;
 mod sizes;
 mod stopping;
 pub mod studies;
+mod voice;

@@ -148,7 +148,7 @@ async fn the_script_loads_the_tables_into_r() {
     let mut lines = printed.lines();
     assert_eq!(lines.next().unwrap().trim(), "3 6 3");
     assert_eq!(lines.next().unwrap().trim(), "POSIXct POSIXt character logical");
-    assert_eq!(lines.next().unwrap().trim(), "What was said, as it was said; empty for a mark");
+    assert_eq!(lines.next().unwrap().trim(), "What was said, as it was said; empty for a mark and for voice");
     for said in said() {
         assert!(printed.contains(said.trim_end()), "{printed}");
     }
@@ -244,7 +244,7 @@ async fn two_sites_are_joined_and_what_does_not_belong_together_is_refused() {
     std::fs::write(&said, before).unwrap();
     let description = session.join("datapackage.json");
     let before = std::fs::read_to_string(&description).unwrap();
-    std::fs::write(&description, before.replace("\"format\": 6", "\"format\": 5")).unwrap();
+    std::fs::write(&description, before.replace("\"format\": 7", "\"format\": 5")).unwrap();
     assert!(refusal(&["leeds", "london"]).contains("has format 5"), "two versions");
 }
 

@@ -127,8 +127,9 @@ export function unrecordedWords({ unrecorded, unrecorded_because: because }) {
 /** @param {Api.CommentLine} comment */
 export function commentWords(comment) {
   // Nobody says nothing: such a comment was erased.
-  if (comment.kind !== "mark" && comment.text === "") return "Erased";
   if (comment.kind === "mark") return "Marked this moment";
+  if (comment.kind === "voice") return "Voice comment";
+  if (comment.text === "") return "Erased";
   return comment.kind === "quick" ? `${comment.text} (quick)` : comment.text;
 }
 

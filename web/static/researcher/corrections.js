@@ -4,6 +4,7 @@ import { get, post, Refused } from "../shared/api.js";
 import { askIn, askReason } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { answerName, correctable, hint, read, soFar, written } from "./correction_words.js";
+import { voicePlayer } from "./voice.js";
 
 /**
  * @typedef {object} Asked
@@ -11,15 +12,19 @@ import { answerName, correctable, hint, read, soFar, written } from "./correctio
  * @property {string} consequence
  * @property {{ label: string, options: { value: string, text: string }[] }} [which] what is chosen from a list
  * @property {{ label: string, value: string, hint: string }} [text] what is written
+ * @property {string} [reason] what stands in the field for the reason at first
+ * @property {HTMLElement} [player] plays what is typed out
  * @property {(which: string) => void} [chosen] called when something of the list is chosen
  * @property {(answer: { which: string, text: string, reason: string }) => Promise<void>} done
  */
 
 /** @param {Asked} asked */
-function ask({ heading, consequence, which, text, chosen, done }) {
+function ask({ heading, consequence, which, text, reason: usual = "", player, chosen, done }) {
   setText(byId("correct-heading"), heading);
   setText(byId("correct-consequence"), consequence);
-  setText(byId("correct-so-far"), "");
+  // A sound that plays ends with the dialog that it is removed from.
+  byId("correct-so-far").replaceChildren(...(player ? [player] : []));
+  byId("correct-dialog").addEventListener("close", () => player?.remove(), { once: true });
 
   const list = byId("correct-which", HTMLSelectElement);
   byId("correct-which-field").hidden = !which;
@@ -36,7 +41,7 @@ function ask({ heading, consequence, which, text, chosen, done }) {
   field.value = text?.value ?? "";
 
   const reason = byId("correct-reason", HTMLInputElement);
-  reason.value = "";
+  reason.value = usual;
   chosen?.(list.value);
   askIn(byId("correct-dialog", HTMLDialogElement), byId("correct-trouble"), () =>
     done({ which: list.value, text: field.value.trim(), reason: reason.value.trim() }),
@@ -118,6 +123,26 @@ export function askNote(session, key, old) {
     heading: old ? "Change the note" : "Add a note",
     consequence: "The surgeon’s words stay as they are. The note stands beside them, here and in exports.",
     text: { label: "Note", value: old, hint: "" },
+    done: ({ text, reason }) => record(session, { field: "note", record: key, old, new: text, reason }),
+  });
+}
+
+/**
+ * Asks for what was said aloud in a comment, typed out.
+ *
+ * @param {string} session
+ * @param {Api.TimelineComment} comment
+ */
+export function askTranscript(session, comment) {
+  const { key } = comment;
+  const old = comment.note ?? "";
+  ask({
+    heading: old ? "Change what was typed out" : "Type out what was said",
+    consequence:
+      "The recording stays as it is. What you type stands beside it, here and in exports, with who typed it and when.",
+    text: { label: "What was said", value: old, hint: "" },
+    reason: old ? "" : "Typed out from the recording",
+    player: voicePlayer(session, comment) ?? undefined,
     done: ({ text, reason }) => record(session, { field: "note", record: key, old, new: text, reason }),
   });
 }

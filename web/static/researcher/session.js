@@ -6,12 +6,20 @@ import { askConfirmed, askReason } from "../shared/dialogs.js";
 import { byId, make, setText } from "../shared/dom.js";
 import "../shared/sign_in.js";
 import { clockText } from "../shared/text.js";
-import { askErasure, askNote, askWithdrawal, correctAnswer, correctParticipant } from "./corrections.js";
+import {
+  askErasure,
+  askNote,
+  askTranscript,
+  askWithdrawal,
+  correctAnswer,
+  correctParticipant,
+} from "./corrections.js";
 import { drawMetric } from "./metric_drawing.js";
 import { Player } from "./player.js";
 import { lastComment, lengthOf, Scale } from "./timeline.js";
 import { drawTimeline } from "./timeline_drawing.js";
 import { commentWords, outstandingWords, setAsideWords } from "./timeline_words.js";
+import { voicePlayer } from "./voice.js";
 
 const page = byId("session").dataset;
 const session = page.session ?? "";
@@ -115,7 +123,8 @@ function seek(event) {
 function listComments(comments) {
   lines = comments.map((comment, index) => {
     const words = commentWords(comment);
-    const said = comment.kind === "mark" ? make("em", {}, words) : words;
+    const isSaid = comment.kind !== "mark" && !(comment.kind === "voice" && !comment.note);
+    const said = isSaid ? words : make("em", {}, words);
     const late = comment.late && make("span", { className: "badge warn" }, "late");
     const where = comment.setting ? `Setting ${comment.setting}` : "";
     return make(
@@ -138,22 +147,29 @@ function listComments(comments) {
 }
 
 /**
- * The note on a comment, and what can be done with the comment once the session has ended.
+ * The sound of a comment, the note on it, and what can be done with the comment once the session has ended.
  *
  * @param {Api.TimelineComment} comment
  */
-function besideComment({ key, kind, note, erased }) {
-  const noted = note ? make("p", { className: "note" }, `Note: ${note}`) : null;
+function besideComment(comment) {
+  const { key, kind, note, erased } = comment;
+  const isVoice = kind === "voice";
+  // Of a voice comment the note is what was said: it stands in the line itself.
+  const noted = note && !isVoice ? make("p", { className: "note" }, `Note: ${note}`) : null;
   const button = (
     /** @type {string} */ label,
     /** @type {string} */ level,
     /** @type {() => void} */ onclick,
   ) => make("button", { type: "button", className: `small ${level}`, onclick }, label);
-  const deeds = ended ? [button("Note…", "", () => askNote(session, key, note ?? ""))] : [];
-  if (ended && kind !== "mark" && !erased) {
+  const write = () => (isVoice ? askTranscript(session, comment) : askNote(session, key, note ?? ""));
+  const deeds = ended ? [button(isVoice ? "Type out…" : "Note…", "", write)] : [];
+  // Where only the sound is gone, its typed words can still be erased.
+  const hasWords = !erased || (isVoice && note);
+  if (ended && kind !== "mark" && hasWords) {
     deeds.push(button("Erase…", "danger", () => askErasure(session, "comment", key)));
   }
-  return make("div", { className: "beside" }, noted, make("span", { className: "deeds" }, ...deeds));
+  const player = voicePlayer(session, comment);
+  return make("div", { className: "beside" }, player, noted, make("span", { className: "deeds" }, ...deeds));
 }
 
 /**

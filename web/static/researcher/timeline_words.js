@@ -24,8 +24,12 @@ export function description({ settings, pauses, comments, set_aside: setAside },
 
 /** @param {Api.TimelineComment} comment */
 export function commentWords(comment) {
-  if (comment.erased) return `Erased on ${comment.erased.slice(0, 10)}`;
-  return comment.kind === "mark" ? "Marked this moment" : comment.text;
+  const { kind, note, erased } = comment;
+  // What was said aloud can be read once it was typed out, and then stays when the sound goes.
+  if (kind === "voice" && note) return erased ? `${note} (sound erased on ${erased.slice(0, 10)})` : note;
+  if (erased) return `Erased on ${erased.slice(0, 10)}`;
+  if (kind === "voice") return "Voice comment, not typed out yet";
+  return kind === "mark" ? "Marked this moment" : comment.text;
 }
 
 /**

@@ -50,13 +50,21 @@ function wellFormed(_name, value) {
  * @param {"GET" | "POST"} method
  * @param {string} path
  * @param {unknown} [body]
+ */
+function request(method, path, body) {
+  if (body === undefined) return ask(path, { method });
+  const headers = { "content-type": "application/json" };
+  return ask(path, { method, headers, body: JSON.stringify(body, wellFormed) });
+}
+
+/**
+ * @param {string} path
+ * @param {RequestInit} asked
  * @returns {Promise<{ status: number, body: any }>}
  */
-async function request(method, path, body) {
+async function ask(path, asked) {
   const response = await fetch(path, {
-    method,
-    headers: body === undefined ? {} : { "content-type": "application/json" },
-    body: body === undefined ? undefined : JSON.stringify(body, wellFormed),
+    ...asked,
     signal: AbortSignal.timeout(PATIENCE_MS),
     cache: "no-store",
   });
@@ -150,6 +158,18 @@ export async function post(path, body, names = {}) {
  */
 export async function keep(path, body) {
   const { status } = await request("POST", path, body);
+  if (status !== 204) throw new Refused(status, explanation(status), false);
+}
+
+/**
+ * Sends a piece of sound that must not be lost. Only the server's own 204 says that it is on the disk.
+ *
+ * @param {string} path
+ * @param {ArrayBuffer} audio
+ * @param {string} type
+ */
+export async function keepAudio(path, audio, type) {
+  const { status } = await ask(path, { method: "POST", headers: { "content-type": type }, body: audio });
   if (status !== 204) throw new Refused(status, explanation(status), false);
 }
 

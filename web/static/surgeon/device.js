@@ -1,11 +1,13 @@
 // What this device keeps, joined to the browser: its storage, its clocks, its tabs, its network.
 
-import { keep } from "../shared/api.js";
+import { keep, keepAudio } from "../shared/api.js";
 import { storeOn } from "../shared/storage.js";
 import { uuid } from "../shared/uuid.js";
 import { Drafts } from "./drafts.js";
 import { Origins } from "./origin.js";
 import { Outbox } from "./outbox.js";
+import { VoiceOutbox } from "./voice_outbox.js";
+import { voiceStoreOn } from "./voice_store.js";
 
 const TAB = "parfocal.tab";
 
@@ -39,6 +41,40 @@ export function openOutbox() {
     if (!outbox.durable && outbox.waiting.length > 0) event.preventDefault();
   });
   return outbox;
+}
+
+/** An outbox for what is said aloud, which follows this browser's network. */
+export function openVoiceOutbox() {
+  const outbox = new VoiceOutbox({
+    store: voiceStoreOn(() => indexedDB),
+    origins,
+    send: keep,
+    sendAudio: keepAudio,
+    newId: uuid,
+    wall: clock.wall,
+    later,
+  });
+
+  addEventListener("online", () => outbox.nudge());
+  document.addEventListener("visibilitychange", () => document.hidden || outbox.nudge());
+  addEventListener("beforeunload", (event) => {
+    if (!outbox.durable) event.preventDefault();
+  });
+  return outbox;
+}
+
+const RELOADED = "parfocal.reloaded-for-microphone";
+
+/**
+ * Loads the page again, once for each session: a page that was loaded when no voice was asked for
+ * may not use the microphone. Whether it is being loaded again.
+ *
+ * @param {string} session
+ */
+export function reloadForMicrophone(session) {
+  if (tabStore.read(RELOADED) === session || !tabStore.write(RELOADED, session)) return false;
+  location.reload();
+  return true;
 }
 
 /**

@@ -20,6 +20,7 @@ function unlessFinal(error) {
 
 export class Holding {
   #outbox;
+  #voice;
   #drafts;
   #unsent;
   #post;
@@ -35,19 +36,22 @@ export class Holding {
   /**
    * @param {object} around
    * @param {import("./outbox.js").Outbox} around.outbox
+   * @param {Pick<import("./voice_outbox.js").VoiceOutbox, "held" | "sessions" | "subscribe">} around.voice
    * @param {import("./drafts.js").Drafts} around.drafts
    * @param {() => boolean} around.unsent whether the comment box holds a text
    * @param {(session: string, holding: number) => Promise<unknown>} around.post
    * @param {(run: () => void, ms: number) => () => void} around.later
    */
-  constructor({ outbox, drafts, unsent, post, later }) {
+  constructor({ outbox, voice, drafts, unsent, post, later }) {
     this.#outbox = outbox;
+    this.#voice = voice;
     this.#drafts = drafts;
     this.#unsent = unsent;
     this.#post = post;
     this.#later = later;
     this.#sessions = new Set(outbox.sessions);
     outbox.subscribe(() => this.tell());
+    voice.subscribe(() => this.tell());
   }
 
   /** @param {View} state */
@@ -70,7 +74,8 @@ export class Holding {
     );
 
     const onlyInBox = this.#shown?.session === session && this.#unsent() && written.length === 0;
-    return this.#outbox.held(session) + written.length + (onlyInBox ? 1 : 0);
+    const held = this.#outbox.held(session) + this.#voice.held(session);
+    return held + written.length + (onlyInBox ? 1 : 0);
   }
 
   /** @param {string} session */
@@ -82,6 +87,7 @@ export class Holding {
   /** What the server does not know yet, or null. */
   #news() {
     for (const session of this.#outbox.sessions) this.#sessions.add(session);
+    for (const session of this.#voice.sessions) this.#sessions.add(session);
 
     for (const session of this.#sessions) {
       if (this.#underWay(session) && this.#known.get(session) === UNDER_WAY) continue;

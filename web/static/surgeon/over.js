@@ -1,16 +1,19 @@
 // A tablet whose link opens nothing any more: what it still holds is handed over all the same.
 
 import { byId, setText } from "../shared/dom.js";
-import { openOutbox } from "./device.js";
+import { openOutbox, openVoiceOutbox } from "./device.js";
 
 const outbox = openOutbox();
-const began = outbox.waiting.length;
+const voice = openVoiceOutbox();
+let began = outbox.waiting.length;
 
 function draw() {
-  const left = outbox.waiting.length;
+  const left = outbox.waiting.length + voice.waiting;
+  began = Math.max(began, left);
   if (left > 0) setText(byId("held"), `This tablet still holds ${left} of what was said. It is being sent.`);
   else if (began > 0) setText(byId("held"), "All that this tablet held has been saved.");
 }
 
 outbox.subscribe(draw);
+voice.subscribe(draw);
 draw();

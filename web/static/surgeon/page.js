@@ -11,12 +11,15 @@ import { PATH as ANSWERS, placeOf, sendLeftAnswers, slotOf } from "./answers.js"
 import { commentBox } from "./comment_box.js";
 import { Comments } from "./comments.js";
 import { askForSecondPress } from "./confirm_button.js";
-import { drafts, later, openOutbox, origins } from "./device.js";
+import { drafts, later, openOutbox, openVoiceOutbox, origins, reloadForMicrophone } from "./device.js";
 import { Holding } from "./holding.js";
+import { record } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
 import { card, showPanel } from "./panel.js";
 import { QuestionPanel } from "./question_panel.js";
 import { onTopOf } from "./questions.js";
+import { Talk } from "./talk.js";
+import { talkButton } from "./talk_button.js";
 import { headline, isEnded, readyWords, savedWords, simulatedWords, steps, timeLeft } from "./words.js";
 
 const TICK_MS = 250;
@@ -37,8 +40,21 @@ const outbox = openOutbox();
 const viewer = new Viewer(byId("view"), "surgeon");
 const comments = new Comments(outbox, drafts, here);
 const box = commentBox(comments, outbox);
+const voice = openVoiceOutbox();
+const mayRecord = byId("talk").dataset.microphone === "true";
+const talk = new Talk({
+  outbox: voice,
+  record,
+  here,
+  stamp: () => origins.stamp(),
+  now: () => performance.now(),
+  later,
+  changed: () => talking.draw(),
+});
+const talking = talkButton(talk, voice, mayRecord);
 const holding = new Holding({
   outbox,
+  voice,
   drafts,
   later,
   unsent: () => comments.unsent,
@@ -68,8 +84,11 @@ function follow(next) {
   const seconds = next?.remaining_seconds;
   endsAt = seconds == null ? null : performance.now() + seconds * 1000;
 
+  if (state?.voice && !mayRecord && !comments.unsent && reloadForMicrophone(state.session)) return;
+
   drawBar();
   box.follow(state);
+  talking.follow(state);
   drawPanel();
   // After the form has gone, which hands over what stood in it.
   sendLeftAnswers(outbox, drafts, state);
@@ -196,8 +215,8 @@ function kept() {
 }
 
 function saved() {
-  const refused = state ? outbox.refused(state.session).length : 0;
-  return savedWords(refused, outbox.waiting.length);
+  const refused = state ? outbox.refused(state.session).length + voice.refused(state.session) : 0;
+  return savedWords(refused, outbox.waiting.length + voice.waiting);
 }
 
 /** @param {View} view */
@@ -239,6 +258,10 @@ outbox.subscribe(({ entry, state: reached, reason }) => {
   if (reached === "saved" && isLast) refresh();
 });
 
+voice.subscribe(() => {
+  if (state) drawPanel();
+});
+
 /* Wiring */
 
 byId("comment").addEventListener("input", () => {
@@ -258,6 +281,7 @@ viewer.live.listen({
   connection: (open) => {
     if (!open) return;
     outbox.nudge();
+    voice.nudge();
     holding.tell();
     serverAnswered();
   },

@@ -134,7 +134,9 @@ fn records(folder: &Path, format: u64) -> Result<BTreeMap<(&'static str, String)
                 "run" => cell(&row, "run"),
                 "session" | "study-session" => cell(&row, "session"),
                 "event" => format!("{}/{}", cell(&row, "session"), cell(&row, "number")),
-                "device" | "access" | "correction" | "consent" | "erasure" | "actor" => cell(&row, "number"),
+                "device" | "access" | "correction" | "consent" | "erasure" | "actor" | "voice-piece" => {
+                    cell(&row, "number")
+                }
                 "study" => cell(&row, "study"),
                 "study-event" => format!("{}/{}", cell(&row, "study"), cell(&row, "number")),
                 _ => cell(&row, "key"),

@@ -6,6 +6,7 @@ mod chain;
 mod files;
 mod study;
 mod verdict;
+mod voice;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -20,15 +21,18 @@ pub use verdict::Verdict;
 use crate::store::Head;
 use crate::store::export::description::{
     ALL, AccessRow, AnswerRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow,
-    RunRow, ScoreRow, SegmentRow, SessionRow, StudyEventRow, StudyRow, StudySessionRow, WithdrawalRow,
+    RunRow, ScoreRow, SegmentRow, SessionRow, StudyEventRow, StudyRow, StudySessionRow, VoicePieceRow, VoiceRow,
+    WithdrawalRow,
 };
 use crate::store::export::folder::SUMS;
 use crate::store::export::table::{Row, Table};
+use crate::store::export::voice::FOLDER as RECORDINGS;
 use allocation::{commitment, schedule};
 use chain::chain;
 use files::{cells, csv, format, json, session_cell, text};
 use study::study;
 use verdict::Outcome;
+use voice::voice;
 
 /// One thing checked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -58,6 +62,7 @@ pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
         check("columns", columns(folder)),
         check("events", events(folder)),
         check("said", said(folder)),
+        check("voice", recorded(folder)),
         check("copies", copies(folder)),
         check("references", references(folder)),
         check("protocol", protocol(folder)),
@@ -77,11 +82,20 @@ fn chained(folder: &Path, expected: Option<&Head>) -> Outcome {
     }
 }
 
+/// Exports have recordings since their seventh format.
+fn recorded(folder: &Path) -> Outcome {
+    match format(folder)? {
+        ..7 => Ok(Verdict::Passed("an earlier version wrote the export, without voice".to_owned())),
+        _ => voice(folder),
+    }
+}
+
 fn checksums(folder: &Path) -> Outcome {
     let mut listed = BTreeSet::from([SUMS.to_owned()]);
     for line in text(folder, SUMS)?.lines() {
         let (sum, file) = line.split_once("  ").ok_or_else(|| format!("{SUMS}: no checksum in '{line}'"))?;
-        if file.contains('/') {
+        let within = file.strip_prefix(RECORDINGS).and_then(|rest| rest.strip_prefix('/')).unwrap_or(file);
+        if within.contains('/') || within.starts_with("..") {
             return Err(format!("{SUMS}: '{file}' is not a file of the folder"));
         }
 
@@ -92,14 +106,32 @@ fn checksums(folder: &Path) -> Outcome {
         listed.insert(file.to_owned());
     }
 
-    for entry in std::fs::read_dir(folder).map_err(|error| error.to_string())? {
-        let name = entry.map_err(|error| error.to_string())?.file_name().to_string_lossy().into_owned();
+    for name in file_names(folder)? {
         if !listed.contains(&name) {
             return Err(format!("{name} was added since it was exported"));
         }
     }
 
     Ok(Verdict::Passed(format!("{} files are as they were exported", listed.len() - 1)))
+}
+
+/// The files of an export, those in its folder of recordings included.
+fn file_names(folder: &Path) -> Result<Vec<String>, String> {
+    let names = |folder: &Path, before: &str| -> Result<Vec<String>, String> {
+        let entries = std::fs::read_dir(folder).map_err(|error| error.to_string())?;
+        let name = |entry: std::io::Result<std::fs::DirEntry>| {
+            let entry = entry.map_err(|error| error.to_string())?;
+            Ok(format!("{before}{}", entry.file_name().to_string_lossy()))
+        };
+        entries.map(name).collect()
+    };
+
+    let mut found = names(folder, "")?;
+    if folder.join(RECORDINGS).is_dir() {
+        found.retain(|name| name != RECORDINGS);
+        found.extend(names(&folder.join(RECORDINGS), &format!("{RECORDINGS}/"))?);
+    }
+    Ok(found)
 }
 
 fn columns(folder: &Path) -> Outcome {
@@ -194,7 +226,7 @@ const UNBLINDED: [(&str, u64); 5] = [
 ];
 
 /// Tables that session.json repeats.
-const COPIED: [Table; 17] = [
+const COPIED: [Table; 19] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -212,6 +244,8 @@ const COPIED: [Table; 17] = [
     StudyRow::TABLE,
     StudySessionRow::TABLE,
     StudyEventRow::TABLE,
+    VoiceRow::TABLE,
+    VoicePieceRow::TABLE,
 ];
 
 fn copies(folder: &Path) -> Outcome {

@@ -1,0 +1,132 @@
+//! Voice: pieces of recordings as they arrive, and their erasure when the protocol's time is over.
+
+use std::time::Duration;
+
+use jiff::{SignedDuration, Timestamp};
+use tokio::time::sleep;
+
+use super::remarks::taken;
+use super::{ConductError, Conductor, Shared};
+use crate::ids::{IdempotencyKey, SessionId};
+use crate::store::{Erasure, KeptVoice, PieceKept, VoicePiece};
+use crate::trial::erasure::Erasable;
+use crate::trial::protocol::Protocol;
+use crate::trial::role::Role;
+use crate::trial::voice::{self, MediaType, NewPiece};
+
+/// Time between two looks for recordings whose time is over.
+const DAILY: Duration = Duration::from_hours(24);
+
+/// Time until the next look where this one could not be finished, as while a session is under way.
+const SOON: Duration = Duration::from_hours(1);
+
+impl Conductor {
+    /// Keeps a piece of a recording. When this returns, it is on disk. Pieces may come late, and in any order.
+    ///
+    /// # Errors
+    /// When the session has no such voice comment, the piece is no sound or too large, something else stands in its
+    /// place, or the disk failed.
+    pub async fn voice_piece(&self, piece: NewPiece) -> Result<(), ConductError> {
+        self.to_the_end(|shared| async move { shared.voice_piece(piece).await }).await
+    }
+
+    /// The sound of a voice comment of `session`, with what it is.
+    ///
+    /// # Errors
+    /// When there is none, it was erased, or the database failed.
+    pub async fn voice_audio(
+        &self,
+        session: SessionId,
+        comment: IdempotencyKey,
+    ) -> Result<(MediaType, Vec<u8>), ConductError> {
+        let found = self.shared.store.reader().voice_audio(session, comment).await?;
+        let none = || ConductError::NotFound("this session has no such recording, or it was erased".to_owned());
+        found.ok_or_else(none)
+    }
+
+    /// Erases what was said aloud once it has been kept as long as its protocol says: how many recordings.
+    ///
+    /// # Errors
+    /// When a session is under way, or the disk failed.
+    pub async fn erase_expired_voice(&self) -> Result<usize, ConductError> {
+        self.to_the_end(|shared| async move { shared.erase_expired_voice().await }).await
+    }
+
+    /// Erases at once, and then daily, what was said aloud and has been kept long enough. Never ends; drop it to stop.
+    pub async fn keep_voice_no_longer(self) {
+        loop {
+            let wait = match self.erase_expired_voice().await {
+                Ok(0) => DAILY,
+                Ok(erased) => {
+                    tracing::info!("{erased} voice comments were erased: their protocols keep them no longer");
+                    DAILY
+                }
+                Err(ConductError::Conflict(_)) => SOON,
+                Err(error) => {
+                    tracing::warn!("voice comments whose time is over were not erased: {error}");
+                    SOON
+                }
+            };
+            sleep(wait).await;
+        }
+    }
+}
+
+impl Shared {
+    async fn voice_piece(&self, new: NewPiece) -> Result<(), ConductError> {
+        let media_type = voice::check_piece(&new)?;
+        let NewPiece { comment, session, piece, media_type: _, through_ms, ended, audio } = new;
+
+        // No pen: a piece changes nothing that anybody decides, and must not wait for those who do.
+        let stamp = self.stamp();
+        let piece = VoicePiece { comment, session, piece, media_type, through_ms, ended, audio, stamp };
+        match self.store.keep_voice(&piece).await? {
+            PieceKept::Kept => Ok(()),
+            PieceKept::PlaceTaken => Err(taken()),
+            PieceKept::TooLarge => Err(voice::too_large().into()),
+            PieceKept::NoSuchComment => {
+                Err(ConductError::NotFound("this session has no such voice comment; send the comment first".to_owned()))
+            }
+        }
+    }
+
+    async fn erase_expired_voice(&self) -> Result<usize, ConductError> {
+        let mut pen = self.pen.lock().await;
+        self.record_stops(&mut pen).await?;
+
+        let stamp = self.stamp();
+        let kept = self.store.reader().kept_voice().await?;
+        let erasure = |kept: KeptVoice| {
+            let days = days_over(&kept, stamp.wall)?;
+            Some(Erasure {
+                session: kept.session,
+                subject: Erasable::Comment,
+                record: kept.comment.to_string(),
+                reason: format!("the protocol keeps voice for {days} days"),
+                by: Role::System,
+                stamp,
+            })
+        };
+        let erasures: Vec<Erasure> = kept.into_iter().filter_map(erasure).collect();
+        if erasures.is_empty() {
+            return Ok(0);
+        }
+
+        // Erasing writes the whole database anew, for which what a surgeon says would have to wait.
+        let under_way = self.live().shown_phase().is_some_and(|phase| !phase.has_ended());
+        if under_way {
+            return Err(ConductError::Conflict("a session is under way; voice is erased once it has ended".to_owned()));
+        }
+        self.store.erase(&erasures, None).await?;
+        Ok(erasures.len())
+    }
+}
+
+/// For how many days the protocol keeps this recording, if that time is over at `now`. A protocol that cannot be read
+/// erases nothing.
+fn days_over(kept: &KeptVoice, now: Timestamp) -> Option<u32> {
+    let protocol = Protocol::parse_kept(&kept.protocol_toml, "the protocol kept with the session").ok()?;
+    let days = protocol.voice_days?;
+    let age = now.duration_since(kept.wall);
+    (age >= SignedDuration::from_hours(24 * i64::from(days))).then_some(days)
+}

@@ -1,0 +1,110 @@
+//! Voice over HTTP: pieces are taken from a surgeon's tablet alone and played to the researcher alone, in parts as a
+//! browser asks for them; only pages that need the microphone or play sound may.
+
+use serde_json::{Value, json};
+
+use crate::support::Server;
+
+const COMMENT: &str = "00000000-0000-4000-8000-000000000001";
+const OPUS: &str = "audio/webm;codecs=opus";
+
+fn server() -> Server {
+    let protocols = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/system/browser");
+    Server::with(&["--bind", "127.0.0.1:0", "--protocols", protocols])
+}
+
+async fn post(server: &Server, role: &str, path: &str, body: &Value) -> Value {
+    let answer = server.post_as(role, path).json(body).send().await.unwrap();
+    let status = answer.status();
+    let said = answer.text().await.unwrap();
+    assert!(status.is_success(), "{path} {body}: {status} {said}");
+    serde_json::from_str(&said).unwrap_or_default()
+}
+
+/// A session by `protocol`, which was made and has not started; its id.
+async fn a_session(server: &Server, participant: &str, protocol: &str) -> String {
+    post(server, "operator", "/api/operator/participants", &json!({"code": participant})).await;
+    let new = json!({"participant": participant, "protocol": protocol});
+    let made = post(server, "operator", "/api/operator/sessions", &new).await;
+    made["session"].as_str().unwrap().to_owned()
+}
+
+/// Sends a piece; the status, and what is said where it is refused.
+async fn send(server: &Server, role: &str, query: &str, media_type: &str, audio: Vec<u8>) -> (u16, String) {
+    let path = format!("/api/surgeon/voice/{COMMENT}/{query}");
+    let answer = server.post_as(role, &path).header("content-type", media_type).body(audio).send().await.unwrap();
+    let status = answer.status().as_u16();
+    let text = answer.text().await.unwrap();
+    (status, serde_json::from_str::<Value>(&text).unwrap_or_default()["error"].as_str().unwrap_or_default().to_owned())
+}
+
+#[tokio::test]
+async fn a_recording_comes_in_pieces_from_a_tablet_and_is_played_in_parts_to_the_researcher() {
+    let server = server();
+    let session = a_session(&server, "S-05", "spoken").await;
+    let first = format!("1?session={session}&through_ms=1000");
+    let (status, said) = send(&server, "surgeon", &first, OPUS, b"0123456789".to_vec()).await;
+    assert!(status == 404 && said.contains("send the comment first"), "{status} {said}");
+
+    let comment = json!({"key": COMMENT, "session": session, "kind": "voice"});
+    post(&server, "surgeon", "/api/surgeon/comments", &comment).await;
+    for _ in 0..2 {
+        assert_eq!(send(&server, "surgeon", &first, OPUS, b"0123456789".to_vec()).await, (204, String::new()));
+    }
+    let last = format!("2?session={session}&through_ms=1400&ended=released");
+    assert_eq!(send(&server, "surgeon", &last, OPUS, b"abcdef".to_vec()).await.0, 204);
+
+    for role in ["operator", "researcher"] {
+        assert_eq!(send(&server, role, &first, OPUS, Vec::new()).await.0, 403, "{role}");
+    }
+    let other = send(&server, "surgeon", &first, OPUS, b"other".to_vec()).await;
+    assert!(other.0 == 409 && other.1.contains("key already stands for something else"), "{other:?}");
+    let wrong = send(&server, "surgeon", &format!("3?session={session}&through_ms=1500"), "image/png", vec![1]).await;
+    assert!(wrong.0 == 422 && wrong.1.contains("not 'image/png'"), "{wrong:?}");
+    let large = format!("3?session={session}&through_ms=1500");
+    assert_eq!(send(&server, "surgeon", &large, OPUS, vec![0; 200_000]).await.0, 422);
+    assert_eq!(send(&server, "surgeon", &format!("3?session={session}"), OPUS, vec![0]).await.0, 400);
+
+    let path = format!("/api/researcher/sessions/{session}/voice/{COMMENT}");
+    let whole = server.get_as("researcher", &path).send().await.unwrap();
+    assert_eq!((whole.status().as_u16(), &whole.headers()["content-type"]), (200, &OPUS.parse().unwrap()));
+    assert_eq!(whole.headers()["accept-ranges"], "bytes");
+    assert_eq!(whole.bytes().await.unwrap().as_ref(), b"0123456789abcdef");
+
+    let part = server.get_as("researcher", &path).header("range", "bytes=8-11").send().await.unwrap();
+    assert_eq!((part.status().as_u16(), &part.headers()["content-range"]), (206, &"bytes 8-11/16".parse().unwrap()));
+    assert_eq!(part.bytes().await.unwrap().as_ref(), b"89ab");
+    let beyond = server.get_as("researcher", &path).header("range", "bytes=16-").send().await.unwrap();
+    assert_eq!((beyond.status().as_u16(), &beyond.headers()["content-range"]), (416, &"bytes */16".parse().unwrap()));
+
+    for role in ["surgeon", "operator"] {
+        assert_eq!(server.get_as(role, &path).send().await.unwrap().status(), 403, "{role}");
+    }
+    let nobody = path.replace(COMMENT, "00000000-0000-4000-8000-000000000002");
+    assert_eq!(server.get_as("researcher", &nobody).send().await.unwrap().status(), 404);
+}
+
+#[tokio::test]
+async fn only_the_pages_that_need_it_may_use_the_microphone_or_play_sound() {
+    let server = server();
+    let headers = async |role: &str, path: &str| {
+        let answer = server.get_as(role, path).header("accept", "text/html").send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{path}");
+        let header = |name: &str| answer.headers()[name].to_str().unwrap().to_owned();
+        (header("permissions-policy").contains("microphone=(self)"), header("content-security-policy"))
+    };
+
+    assert!(!headers("surgeon", "/surgeon").await.0, "no session");
+    let silent = a_session(&server, "S-05", "practice").await;
+    assert!(!headers("surgeon", "/surgeon").await.0, "a session without voice");
+    let abort = json!({"session": silent, "action": "abort", "reason": "enough"});
+    post(&server, "operator", "/api/operator/actions", &abort).await;
+
+    let session = a_session(&server, "S-06", "spoken").await;
+    let (microphone, policy) = headers("surgeon", "/surgeon").await;
+    assert!(microphone && !policy.contains("media-src"), "{policy}");
+    assert!(!headers("operator", "/operator").await.0);
+    let (microphone, policy) = headers("researcher", &format!("/researcher/sessions/{session}")).await;
+    assert!(!microphone && policy.contains("media-src 'self'"), "{policy}");
+    assert!(!headers("researcher", "/researcher").await.1.contains("media-src"));
+}

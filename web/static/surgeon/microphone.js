@@ -1,0 +1,159 @@
+// The microphone, and what the browser records of it. What goes wrong is said in a sentence that
+// tells what to do.
+
+/** In the order in which they are preferred. The server takes these and no others. */
+const TYPES = ["audio/webm;codecs=opus", "audio/mp4", "audio/ogg;codecs=opus"];
+
+/** Enough for speech that somebody types out. */
+const BITS_PER_SECOND = 32000;
+
+/** A recording is handed out in pieces of this length. */
+const PIECE_MS = 1000;
+
+/** What is wrong, for the person who reads it. */
+export class MicrophoneTrouble extends Error {}
+
+/**
+ * Why this page cannot record at all; empty where it can.
+ *
+ * @param {boolean} allowed whether the page was loaded with the right to ask for the microphone
+ */
+export function whyNoMicrophone(allowed) {
+  if (!globalThis.isSecureContext) {
+    return "Voice needs an encrypted connection (https), which this page does not have. Type your comments.";
+  }
+  if (!navigator.mediaDevices?.getUserMedia || typeof MediaRecorder === "undefined" || !recordedType()) {
+    return "This browser cannot record voice. Type your comments.";
+  }
+  return allowed ? "" : "Load this page again to use the microphone. Until then, type your comments.";
+}
+
+function recordedType() {
+  return TYPES.find((type) => MediaRecorder.isTypeSupported(type));
+}
+
+/**
+ * A recording under way.
+ *
+ * @typedef {object} Recording
+ * @property {string} type what it is, as the server knows it
+ * @property {() => number} level how loud it is now, from 0 to 1
+ * @property {() => void} stop
+ */
+
+/**
+ * What a recording does.
+ *
+ * @typedef {object} Heard
+ * @property {() => void} started
+ * @property {(sound: Blob) => void} piece
+ * @property {() => void} lost the microphone was taken away
+ * @property {() => void} stopped nothing more comes
+ */
+
+/**
+ * Opens the microphone and records until it is stopped.
+ *
+ * @param {Heard} heard
+ * @returns {Promise<Recording>}
+ */
+export async function record(heard) {
+  const stream = await openMicrophone();
+  const type = recordedType() ?? "";
+  const meter = levelOf(stream);
+  const release = () => {
+    for (const track of stream.getTracks()) track.stop();
+    meter.close();
+  };
+
+  try {
+    const recorder = new MediaRecorder(stream, { mimeType: type, audioBitsPerSecond: BITS_PER_SECOND });
+    recorder.onstart = heard.started;
+    recorder.ondataavailable = ({ data }) => data.size > 0 && heard.piece(data);
+    recorder.onerror = heard.lost;
+    recorder.onstop = () => {
+      release();
+      heard.stopped();
+    };
+    for (const track of stream.getTracks()) track.onended = heard.lost;
+
+    recorder.start(PIECE_MS);
+    return {
+      type,
+      level: meter.level,
+      stop: () => {
+        if (recorder.state !== "inactive") recorder.stop();
+      },
+    };
+  } catch {
+    release();
+    throw new MicrophoneTrouble("This browser could not begin to record. Type your comment.");
+  }
+}
+
+async function openMicrophone() {
+  try {
+    return await navigator.mediaDevices.getUserMedia({ audio: true });
+  } catch (error) {
+    throw new MicrophoneTrouble(refusalWords(error instanceof Error ? error.name : ""));
+  }
+}
+
+/**
+ * Why the browser gave no microphone.
+ *
+ * @param {string} name of the error
+ */
+export function refusalWords(name) {
+  switch (name) {
+    case "NotAllowedError":
+    case "SecurityError":
+      return "The microphone is blocked for this page. Allow it in the browser’s settings, or type your comment.";
+    case "NotFoundError":
+    case "OverconstrainedError":
+      return "This device has no microphone. Connect one, or type your comment.";
+    case "NotReadableError":
+    case "AbortError":
+      return "Another program uses the microphone. Close it, or type your comment.";
+    default:
+      return "The microphone could not be opened. Type your comment.";
+  }
+}
+
+/**
+ * Measures how loud a stream is. Where that cannot be measured the level is 0, and recording goes on.
+ *
+ * @param {MediaStream} stream
+ */
+function levelOf(stream) {
+  try {
+    const context = new AudioContext();
+    const analyser = context.createAnalyser();
+    context.createMediaStreamSource(stream).connect(analyser);
+    const samples = new Float32Array(analyser.fftSize);
+    return {
+      level: () => {
+        analyser.getFloatTimeDomainData(samples);
+        return loudness(samples);
+      },
+      close: () => void context.close(),
+    };
+  } catch {
+    return { level: () => 0, close: () => {} };
+  }
+}
+
+/** The quietest sound that the meter shows, in decibels below full scale. */
+const QUIETEST_DB = -60;
+
+/**
+ * How loud samples from -1 to 1 are: 0 for QUIETEST_DB and below, 1 for full scale.
+ *
+ * @param {Float32Array} samples
+ */
+export function loudness(samples) {
+  let sum = 0;
+  for (const sample of samples) sum += sample * sample;
+  const decibels = 10 * Math.log10(sum / samples.length);
+  return Math.min(Math.max(1 - decibels / QUIETEST_DB, 0), 1);
+}

@@ -1,0 +1,117 @@
+// The button that is held to talk, and the keys that do the same.
+
+import { byId, setText } from "../shared/dom.js";
+import { whyNoMicrophone } from "./microphone.js";
+import { focusOn, isTalkKey } from "./talk_keys.js";
+
+/**
+ * Draws `talk`, and passes on presses.
+ *
+ * @param {import("./talk.js").Talk} talk
+ * @param {import("./voice_outbox.js").VoiceOutbox} outbox
+ * @param {boolean} allowed whether the page may ask for the microphone
+ */
+export function talkButton(talk, outbox, allowed) {
+  const button = byId("talk", HTMLButtonElement);
+  const meter = byId("talk-level");
+  const why = whyNoMicrophone(allowed);
+  let open = false;
+  /** What is held: a pointer, or a key. @type {string | null} */
+  let held = null;
+  let drawing = 0;
+
+  /** @param {Api.SurgeonView | null} state */
+  function follow(state) {
+    const asked = state?.voice ?? false;
+    const ended = state?.phase === "completed" || state?.phase === "aborted";
+    open = asked && !ended;
+    button.hidden = !open;
+    button.disabled = why !== "";
+    setText(byId("voice-why"), open ? why : "");
+    draw();
+  }
+
+  function draw() {
+    const { state } = talk;
+    setText(byId("talk-label"), talk.label);
+    button.classList.toggle("recording", state === "recording");
+    button.setAttribute("aria-pressed", String(state !== "idle"));
+    setText(byId("talk-heard"), state === "recording" ? "Recording" : "");
+    setText(byId("voice-trouble"), talk.trouble);
+    drawStatus();
+    if (state === "recording" && drawing === 0) drawing = requestAnimationFrame(drawLevel);
+  }
+
+  function drawLevel() {
+    drawing = 0;
+    meter.style.transform = `scaleX(${talk.state === "recording" ? talk.level.toFixed(3) : 0})`;
+    setText(byId("talk-label"), talk.label);
+    if (talk.state === "recording") drawing = requestAnimationFrame(drawLevel);
+  }
+
+  function drawStatus() {
+    const { kind, text } = outbox.status;
+    const status = byId("voice-state");
+    // A piece is on its way every second: that would flicker.
+    const speaking = talk.state === "recording" && kind !== "unsaved";
+    setText(status, speaking ? "Saved as you speak." : text);
+    status.classList.toggle("unsaved", kind === "unsaved");
+  }
+
+  /** @param {string} by */
+  function press(by) {
+    if (!open || why !== "" || held !== null) return;
+    if (talk.press()) held = by;
+  }
+
+  /** @param {string} by */
+  function release(by) {
+    if (held !== by) return;
+    held = null;
+    talk.release();
+  }
+
+  /** The page no longer hears whether something is held. */
+  function leave() {
+    if (held === null) return;
+    held = null;
+    talk.release("left");
+  }
+
+  button.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    // Neither focus nor selection moves: a comment that is being typed stays where it is.
+    event.preventDefault();
+    button.setPointerCapture(event.pointerId);
+    press(`pointer ${event.pointerId}`);
+  });
+  // Wherever the finger is by then.
+  for (const end of ["pointerup", "pointercancel"]) {
+    addEventListener(end, (event) => {
+      if (event instanceof PointerEvent) release(`pointer ${event.pointerId}`);
+    });
+  }
+  // A long press is not a wish for a menu.
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+
+  addEventListener("keydown", (event) => {
+    const onButton = document.activeElement === button && (event.key === " " || event.key === "Enter");
+    if (!open || event.isComposing || !(onButton || isTalkKey(event, focusOn(document.activeElement))))
+      return;
+    // It neither scrolls the page nor, held, presses again and again.
+    event.preventDefault();
+    if (!event.repeat) press(`key ${event.code || event.key}`);
+  });
+  addEventListener("keyup", (event) => {
+    const by = `key ${event.code || event.key}`;
+    if (held !== by) return;
+    event.preventDefault();
+    release(by);
+  });
+  addEventListener("blur", leave);
+  addEventListener("pagehide", leave);
+  document.addEventListener("visibilitychange", () => document.hidden && leave());
+
+  outbox.subscribe(drawStatus);
+  return { follow, draw };
+}

@@ -1,0 +1,286 @@
+// Keeps what was said aloud until the server has it. A recording is a step that begins its comment,
+// and then a piece a second. Each is first kept on this device, and sent while the surgeon still
+// speaks. The comment's key and the piece's number make sending a step twice harmless. What the
+// server refuses stays on this device, and is tried again when the page is next opened.
+
+import { inWords, Refused } from "../shared/api.js";
+import { counted } from "../shared/text.js";
+import { PATH as COMMENTS } from "./comments.js";
+
+const FIRST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 8000;
+
+/** @typedef {import("./origin.js").Stamp} Stamp */
+/** @typedef {"released" | "limit" | "microphone-lost" | "left"} Ending */
+
+/**
+ * What begins a recording: its comment, with the place and the moment of the press.
+ *
+ * @typedef {object} Begin
+ * @property {"begin"} kind
+ * @property {string} id sorts in the order in which things were said
+ * @property {string} comment
+ * @property {string} session
+ * @property {Record<string, unknown>} body
+ * @property {Stamp} given
+ */
+
+/**
+ * A piece of a recording. The last is empty and says why the recording ended.
+ *
+ * @typedef {object} Piece
+ * @property {"piece"} kind
+ * @property {string} id
+ * @property {string} comment
+ * @property {string} session
+ * @property {number} piece
+ * @property {string} type
+ * @property {number} through_ms
+ * @property {Ending | null} ended
+ * @property {ArrayBuffer} audio
+ */
+
+/** @typedef {Begin | Piece} Step */
+
+/**
+ * @typedef {object} Surroundings
+ * @property {import("./voice_store.js").VoiceStore} store
+ * @property {import("./origin.js").Origins} origins
+ * @property {(path: string, body: unknown) => Promise<void>} send sends JSON; resolves once the server has saved it
+ * @property {(path: string, audio: ArrayBuffer, type: string) => Promise<void>} sendAudio
+ * @property {() => string} newId
+ * @property {() => number} wall milliseconds since 1970
+ * @property {(run: () => void, ms: number) => () => void} later returns what cancels it
+ */
+
+export class VoiceOutbox {
+  /** Why the last attempt failed, if it did. @type {string | null} */
+  trouble = null;
+
+  /** Settles once what an earlier page left is here. @type {Promise<void>} */
+  ready;
+
+  #around;
+  /** What is not saved yet, by id. @type {Map<string, Step>} */
+  #steps = new Map();
+  /** The recordings that the server refused, by comment, and why. @type {Map<string, string>} */
+  #refused = new Map();
+  /** The steps that this device does not keep over a reload, by id. @type {Set<string>} */
+  #unkept = new Set();
+  /** @type {Set<() => void>} */
+  #listeners = new Set();
+  #flushing = false;
+  #wait = FIRST_WAIT_MS;
+  #cancel = () => {};
+  #latest = 0;
+
+  /** @param {Surroundings} around */
+  constructor(around) {
+    this.#around = around;
+    this.ready = this.#load();
+  }
+
+  async #load() {
+    for (const step of await this.#around.store.all()) {
+      this.#steps.set(step.id, step);
+      this.#latest = Math.max(this.#latest, Number.parseInt(step.id, 10) || 0);
+    }
+    this.#tell();
+    this.nudge();
+  }
+
+  /**
+   * Calls `listener` whenever something changed. Returns what ends that.
+   *
+   * @param {() => void} listener
+   */
+  subscribe(listener) {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  }
+
+  /** Whether this device keeps every unsaved step over a reload. */
+  get durable() {
+    return this.#unkept.size === 0;
+  }
+
+  /** How many recordings are not saved yet, those that the server refused left aside. */
+  get waiting() {
+    const comments = this.#queue().map(({ comment }) => comment);
+    return new Set(comments).size;
+  }
+
+  /** The sessions that recordings on this page belong to. @returns {Set<string>} */
+  get sessions() {
+    return new Set([...this.#steps.values()].map(({ session }) => session));
+  }
+
+  /**
+   * How many recordings of a session this device holds: not saved yet, or refused.
+   *
+   * @param {string} session
+   */
+  held(session) {
+    const ofSession = [...this.#steps.values()].filter((step) => step.session === session);
+    return new Set(ofSession.map(({ comment }) => comment)).size;
+  }
+
+  /**
+   * How many recordings of a session the server refused.
+   *
+   * @param {string} session
+   */
+  refused(session) {
+    const ofSession = [...this.#steps.values()].filter((step) => step.session === session);
+    const refused = ofSession.filter(({ comment }) => this.#refused.has(comment));
+    return new Set(refused.map(({ comment }) => comment)).size;
+  }
+
+  /**
+   * Begins a recording; returns its comment's key.
+   *
+   * @param {{ session: string, segment: string | null, frame: number | null, run: number | null }} place
+   * @param {Stamp} given when the surgeon began to speak
+   */
+  begin({ session, segment, frame, run }, given) {
+    const comment = this.#around.newId();
+    const body = { key: comment, session, segment, frame, run, kind: "voice" };
+    this.#add({ kind: "begin", id: this.#nextId(), comment, session, body, given });
+    return comment;
+  }
+
+  /**
+   * Takes a piece of a recording.
+   *
+   * @param {Omit<Piece, "kind" | "id">} piece
+   */
+  add(piece) {
+    this.#add({ ...piece, kind: "piece", id: this.#nextId() });
+  }
+
+  /** Tries now rather than at the end of the present wait. */
+  nudge() {
+    this.#cancel();
+    this.#wait = FIRST_WAIT_MS;
+    this.#flush();
+  }
+
+  /**
+   * How far what was said aloud has got.
+   *
+   * @returns {{ kind: "" | "saving" | "unsaved", text: string }}
+   */
+  get status() {
+    const refusal = [...this.#refused.values()].at(-1);
+    if (refusal !== undefined) {
+      const many = counted(this.#refused.size, "recording was", "recordings were");
+      const text = `${many} not saved and stays on this device. Tell the operator. ${refusal}`;
+      return { kind: "unsaved", text };
+    }
+
+    const { waiting } = this;
+    if (waiting === 0) return { kind: "", text: "" };
+    if (this.trouble === null && this.durable) return { kind: "saving", text: "Saving the recording…" };
+
+    const many = counted(waiting, "recording is", "recordings are");
+    const kept = this.durable ? "Kept on this device." : "Kept on this page only: do not close it.";
+    return { kind: "unsaved", text: `${many} not saved yet. ${kept} ${this.trouble ?? ""}`.trim() };
+  }
+
+  #nextId() {
+    // A clock that is set back must not put what is said later before what was said.
+    this.#latest = Math.max(this.#around.wall(), this.#latest + 1);
+    return `${String(this.#latest).padStart(15, "0")}-${this.#around.newId()}`;
+  }
+
+  /** @param {Step} step */
+  #add(step) {
+    this.#steps.set(step.id, step);
+    this.#keep(step);
+    this.#tell();
+    if (!this.#flushing) this.nudge();
+  }
+
+  /** @param {Step} step */
+  async #keep(step) {
+    const kept = await this.#around.store.put(step);
+    if (!this.#steps.has(step.id)) {
+      // It was saved meanwhile.
+      await this.#around.store.remove(step.id);
+    } else if (!kept) {
+      this.#unkept.add(step.id);
+      this.#tell();
+    }
+  }
+
+  /** What is to be sent, in order. */
+  #queue() {
+    const open = [...this.#steps.values()].filter(({ comment }) => !this.#refused.has(comment));
+    return open.sort((a, b) => (a.id < b.id ? -1 : 1));
+  }
+
+  async #flush() {
+    if (this.#flushing) return;
+    this.#flushing = true;
+    for (let step = this.#queue()[0]; step; step = this.#queue()[0]) {
+      if (!(await this.#send(step))) break;
+    }
+    this.#flushing = false;
+
+    if (this.#queue().length > 0) {
+      this.#cancel = this.#around.later(() => this.#flush(), this.#wait);
+      this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
+    }
+  }
+
+  /**
+   * Sends one step. Returns whether the next is worth trying.
+   *
+   * @param {Step} step
+   */
+  async #send(step) {
+    try {
+      await this.#post(step);
+    } catch (error) {
+      return this.#failed(step, error);
+    }
+
+    this.trouble = null;
+    this.#wait = FIRST_WAIT_MS;
+    this.#steps.delete(step.id);
+    this.#unkept.delete(step.id);
+    await this.#around.store.remove(step.id);
+    this.#tell();
+    return true;
+  }
+
+  /** @param {Step} step */
+  #post(step) {
+    const { send, sendAudio, origins } = this.#around;
+    if (step.kind === "begin") return send(COMMENTS, { ...step.body, ...origins.tell(step.given) });
+
+    const { comment, session, piece, through_ms, ended, audio, type } = step;
+    const query = new URLSearchParams({ session, through_ms: String(through_ms) });
+    if (ended) query.set("ended", ended);
+    return sendAudio(`/api/surgeon/voice/${comment}/${piece}?${query}`, audio, type);
+  }
+
+  /**
+   * @param {Step} step
+   * @param {unknown} error
+   */
+  #failed(step, error) {
+    if (error instanceof Refused && error.final) {
+      this.#refused.set(step.comment, error.message);
+      this.#tell();
+      return true;
+    }
+    this.trouble = inWords(error, "No connection. This page keeps trying.");
+    this.#tell();
+    return false;
+  }
+
+  #tell() {
+    for (const listener of [...this.#listeners]) listener();
+  }
+}

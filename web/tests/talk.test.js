@@ -1,0 +1,164 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { loudness, MicrophoneTrouble, refusalWords } from "../static/surgeon/microphone.js";
+import { LIMIT_MS, Talk } from "../static/surgeon/talk.js";
+import { isTalkKey } from "../static/surgeon/talk_keys.js";
+import { FakeTime, settle } from "./around.js";
+
+const PLACE = { session: "s", segment: "g", setting: 1, frame: 7, run: 1 };
+
+/** A surgeon's page with a microphone that a test works by hand. */
+function openPage() {
+  const time = new FakeTime();
+  /** What reached the outbox, in short. @type {string[]} */
+  const kept = [];
+  const outbox = {
+    begin: (/** @type {{ frame: number | null }} */ { frame }) => {
+      kept.push(`begin ${frame}`);
+      return "c";
+    },
+    add: (/** @type {{ piece: number, through_ms: number, ended: string | null }} */ piece) =>
+      kept.push(`${piece.piece} ${piece.through_ms} ${piece.ended ?? ""}`.trim()),
+  };
+
+  const microphone = {
+    /** @type {import("../static/surgeon/microphone.js").Heard | null} */
+    heard: null,
+    stops: 0,
+    /** Settles the wish for a microphone. @type {(error?: Error) => void} */
+    opened: () => {},
+  };
+  const record = (/** @type {import("../static/surgeon/microphone.js").Heard} */ heard) => {
+    microphone.heard = heard;
+    const stop = () => {
+      microphone.stops += 1;
+    };
+    return new Promise((resolve, reject) => {
+      microphone.opened = (error) =>
+        error ? reject(error) : resolve({ type: "audio/mp4", level: () => 0.5, stop });
+    });
+  };
+
+  let place = PLACE;
+  const talk = new Talk({
+    outbox: /** @type {any} */ (outbox),
+    record: /** @type {any} */ (record),
+    here: () => place,
+    stamp: () => ({ client_millis: time.wall() }),
+    now: time.page,
+    later: time.later,
+    changed: () => {},
+  });
+  /** @param {Partial<typeof PLACE>} to */
+  const move = (to) => {
+    place = { ...PLACE, ...to };
+  };
+  return { time, kept, microphone, talk, move };
+}
+
+/** @param {ReturnType<typeof openPage>} page */
+async function begin({ talk, microphone }) {
+  talk.press();
+  microphone.opened();
+  await settle();
+  microphone.heard?.started();
+}
+
+const SOUND = new Blob(["sound"]);
+
+test("what is said is about the moment of the press, and ends with its reason", async () => {
+  const page = openPage();
+  page.talk.press();
+  assert.deepEqual([page.talk.state, page.talk.label], ["opening", "Wait…"]);
+  page.move({ frame: 99 });
+  page.microphone.opened();
+  await settle();
+  page.microphone.heard?.started();
+  assert.deepEqual([page.talk.state, page.talk.level], ["recording", 0.5]);
+
+  await page.time.pass(1000);
+  page.microphone.heard?.piece(SOUND);
+  assert.equal(page.talk.label, "Recording 0:01");
+  await page.time.pass(400);
+  page.talk.release();
+  assert.equal(page.microphone.stops, 1);
+  page.microphone.heard?.piece(SOUND);
+  page.microphone.heard?.stopped();
+  await settle();
+  assert.deepEqual(page.kept, ["begin 7", "1 1000", "2 1400", "3 1400 released"]);
+  assert.deepEqual([page.talk.state, page.talk.trouble], ["idle", ""]);
+});
+
+test("a pedal held for an hour ends after two minutes, told before, and talks again only when pressed anew", async () => {
+  const page = openPage();
+  await begin(page);
+  await page.time.pass(LIMIT_MS - 10_000);
+  assert.equal(page.talk.label, "Ends in 10 s");
+  await page.time.pass(10_000);
+  assert.equal(page.microphone.stops, 1);
+  page.microphone.heard?.stopped();
+  await settle();
+  assert.equal(page.kept.at(-1), "1 120000 limit");
+  assert.match(page.talk.trouble, /ended after two minutes\. What you said is kept/);
+
+  await page.time.pass(3_600_000);
+  page.talk.release();
+  assert.equal(page.talk.state, "idle");
+});
+
+test("a microphone that is taken away ends the recording, and what was said is kept", async () => {
+  const page = openPage();
+  await begin(page);
+  page.microphone.heard?.piece(SOUND);
+  page.microphone.heard?.lost();
+  page.microphone.heard?.stopped();
+  await settle();
+  assert.equal(page.kept.at(-1), "2 0 microphone-lost");
+  assert.match(page.talk.trouble, /taken away\. What you said until then is kept/);
+});
+
+test("a refused microphone is said in a sentence, and leaves no comment", async () => {
+  const page = openPage();
+  page.talk.press();
+  page.microphone.opened(new MicrophoneTrouble(refusalWords("NotAllowedError")));
+  await settle();
+  assert.deepEqual(page.kept, []);
+  assert.match(page.talk.trouble, /blocked for this page/);
+  assert.equal(page.talk.state, "idle");
+  assert.equal(page.talk.press(), true, "and can be tried again");
+  assert.equal(page.talk.trouble, "");
+});
+
+test("let go before the microphone was open: nothing is kept, and the page says what to do", async () => {
+  const page = openPage();
+  page.talk.press();
+  page.talk.release();
+  page.microphone.opened();
+  await settle();
+  page.microphone.heard?.started();
+  page.microphone.heard?.piece(SOUND);
+  page.microphone.heard?.stopped();
+  await settle();
+  assert.deepEqual(page.kept, []);
+  assert.match(page.talk.trouble, /Nothing was recorded/);
+  assert.equal(page.talk.state, "idle");
+});
+
+test("keys talk where they do nothing else", () => {
+  const talks = (/** @type {string} */ key, /** @type {"field" | "control" | "page"} */ focus) =>
+    isTalkKey({ key }, focus);
+  assert.deepEqual([talks(" ", "page"), talks(" ", "control"), talks(" ", "field")], [true, false, false]);
+  assert.deepEqual(
+    [talks("PageDown", "page"), talks("PageDown", "control"), talks("PageDown", "field")],
+    [true, true, false],
+  );
+  assert.deepEqual([talks("F13", "field"), talks("F24", "page"), talks("F5", "page")], [true, true, false]);
+  assert.equal(isTalkKey({ key: " ", ctrlKey: true }, "page"), false);
+});
+
+test("the meter shows full scale as 1, -30 dB as a half and silence as 0", () => {
+  assert.equal(loudness(new Float32Array(8).fill(1)), 1);
+  assert.ok(Math.abs(loudness(new Float32Array(8).fill(10 ** (-30 / 20))) - 0.5) < 1e-6);
+  assert.equal(loudness(new Float32Array(8)), 0);
+});

@@ -1,0 +1,140 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Refused } from "../static/shared/api.js";
+import { Origins } from "../static/surgeon/origin.js";
+import { VoiceOutbox } from "../static/surgeon/voice_outbox.js";
+import { countedIds, FakeTime, fakeStore, settle } from "./around.js";
+
+const PLACE = { session: "s", segment: "g", frame: 7, run: 1 };
+const noNetwork = () => new TypeError("Failed to fetch");
+
+/** What a device keeps of recordings; `full` makes every write fail. */
+function fakeVoiceStore() {
+  /** @type {Map<string, import("../static/surgeon/voice_outbox.js").Step>} */
+  const kept = new Map();
+  return {
+    full: false,
+    kept,
+    all: async () => [...kept.values()],
+    /** @param {import("../static/surgeon/voice_outbox.js").Step} step */
+    async put(step) {
+      if (!this.full) kept.set(step.id, step);
+      return !this.full;
+    },
+    /** @param {string} id */
+    async remove(id) {
+      kept.delete(id);
+    },
+  };
+}
+
+/** A page on `store`, before a server whose answers a test gives. */
+function openPage(store = fakeVoiceStore(), time = new FakeTime(), newId = countedIds()) {
+  /** What the server was sent, in short. @type {string[]} */
+  const got = [];
+  /** What it throws, in turn; null takes what was sent. @type {(Error | null)[]} */
+  const answers = [];
+  const take = (/** @type {string} */ what) => {
+    got.push(what);
+    const answer = answers.shift();
+    return answer ? Promise.reject(answer) : Promise.resolve();
+  };
+
+  const origins = new Origins(fakeStore(), time, newId);
+  const open = () =>
+    new VoiceOutbox({
+      store,
+      origins,
+      send: (_, body) => take(`begin ${/** @type {any} */ (body).kind} ${/** @type {any} */ (body).frame}`),
+      sendAudio: (path, audio, type) => take(`${path.split("/").at(-1)} ${audio.byteLength} ${type}`),
+      newId,
+      wall: time.wall,
+      later: time.later,
+    });
+  return { store, time, got, answers, origins, open };
+}
+
+/** @param {VoiceOutbox} outbox @param {string} comment @param {number} piece @param {"released" | null} [ended] */
+function add(outbox, comment, piece, ended = null) {
+  const audio = new ArrayBuffer(ended ? 0 : 10 * piece);
+  outbox.add({ comment, session: "s", piece, type: "audio/mp4", through_ms: 1000 * piece, ended, audio });
+}
+
+test("a recording is sent while it is spoken, in order, and taken off the device once saved", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  const comment = outbox.begin(PLACE, page.origins.stamp());
+  await settle();
+  assert.deepEqual(page.got, ["begin voice 7"]);
+
+  add(outbox, comment, 1);
+  await settle();
+  add(outbox, comment, 2);
+  add(outbox, comment, 3, "released");
+  await settle();
+  assert.deepEqual(page.got.slice(1), [
+    "1?session=s&through_ms=1000 10 audio/mp4",
+    "2?session=s&through_ms=2000 20 audio/mp4",
+    "3?session=s&through_ms=3000&ended=released 0 audio/mp4",
+  ]);
+  assert.equal(page.store.kept.size, 0);
+  assert.deepEqual([outbox.waiting, outbox.held("s"), outbox.status.text], [0, 0, ""]);
+});
+
+test("without a network everything stays on the device and lands in order, over a reload too", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.answers.push(...Array.from({ length: 4 }, noNetwork));
+  const comment = outbox.begin(PLACE, page.origins.stamp());
+  add(outbox, comment, 1);
+  await settle();
+  assert.equal(page.store.kept.size, 2);
+  assert.equal(outbox.waiting, 1, "one recording, however many pieces");
+  assert.match(outbox.status.text, /1 recording is not saved yet\. Kept on this device\. No connection/);
+
+  // The page is loaded again, and the network is back.
+  page.answers.length = 0;
+  page.got.length = 0;
+  const again = page.open();
+  await again.ready;
+  await settle();
+  assert.deepEqual(page.got, ["begin voice 7", "1?session=s&through_ms=1000 10 audio/mp4"]);
+  assert.equal(page.store.kept.size, 0);
+});
+
+test("a recording that the server refuses stays on the device and stops no other", async () => {
+  const page = openPage();
+  const outbox = page.open();
+  page.answers.push(new Refused(409, "this trial does not record voice", true));
+  const refused = outbox.begin(PLACE, page.origins.stamp());
+  add(outbox, refused, 1);
+  const other = outbox.begin({ ...PLACE, frame: 8 }, page.origins.stamp());
+  add(outbox, other, 1);
+  await settle();
+
+  assert.deepEqual(page.got, ["begin voice 7", "begin voice 8", "1?session=s&through_ms=1000 10 audio/mp4"]);
+  assert.equal(page.store.kept.size, 2, "both steps of the refused one");
+  assert.deepEqual(
+    [outbox.waiting, outbox.held("s"), outbox.refused("s"), outbox.refused("t")],
+    [0, 1, 1, 0],
+  );
+  assert.match(outbox.status.text, /this trial does not record voice/);
+});
+
+test("a device without room says so, and sends all the same", async () => {
+  const page = openPage();
+  page.store.full = true;
+  const outbox = page.open();
+  page.answers.push(noNetwork(), noNetwork());
+  const comment = outbox.begin(PLACE, page.origins.stamp());
+  await settle();
+  assert.equal(outbox.durable, false);
+  assert.match(outbox.status.text, /Kept on this page only: do not close it/);
+
+  add(outbox, comment, 1);
+  await settle();
+  await page.time.pass(1000);
+  assert.equal(outbox.waiting, 0);
+  assert.equal(outbox.durable, true);
+});

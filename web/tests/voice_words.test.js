@@ -1,0 +1,37 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { commentWords } from "../static/researcher/timeline_words.js";
+import { voiceWords } from "../static/researcher/voice.js";
+
+const WHOLE = {
+  media_type: "audio/mp4",
+  seconds: 64.6,
+  ended: /** @type {const} */ ("released"),
+  missing: 0,
+};
+
+test("a recording says its length and what is wrong with it", () => {
+  assert.equal(voiceWords(WHOLE), "1:05");
+  assert.equal(voiceWords({ ...WHOLE, ended: null }), "1:05, cut off");
+  assert.equal(voiceWords({ ...WHOLE, missing: 2 }), "1:05, 2 seconds are missing");
+  assert.match(voiceWords({ ...WHOLE, ended: "microphone-lost" }), /microphone was taken away/);
+  assert.match(voiceWords({ ...WHOLE, media_type: null }), /Nothing of the recording/);
+});
+
+test("a voice comment reads as it was typed out, also once its sound is gone", () => {
+  const comment = /** @type {Api.TimelineComment} */ ({
+    kind: "voice",
+    note: null,
+    erased: null,
+    voice: WHOLE,
+  });
+  assert.equal(commentWords(comment), "Voice comment, not typed out yet");
+  assert.equal(commentWords({ ...comment, note: "it wanders" }), "it wanders");
+  const erased = "2026-03-01T10:00:00Z";
+  assert.equal(
+    commentWords({ ...comment, note: "it wanders", erased }),
+    "it wanders (sound erased on 2026-03-01)",
+  );
+  assert.equal(commentWords({ ...comment, erased }), "Erased on 2026-03-01");
+});
