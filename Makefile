@@ -1,7 +1,7 @@
 # The two commands that matter: `make run` and `make test`. Each sets up what is missing first.
 
 # Where `make run` listens, and what it adds to `parfocal serve`:
-#   make run BIND=0.0.0.0:8080 ARGS='--camera footage:clip.mp4'
+#   make run BIND=0.0.0.0:8080 ARGS='--tls --camera footage:clip.mp4'
 BIND ?= 127.0.0.1:8080
 ARGS ?=
 

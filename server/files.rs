@@ -1,10 +1,10 @@
 //! Files that are whole or absent, even when the disk is full or the power fails; and files that other
 //! accounts cannot read.
 
-use std::fs::{self, File, Permissions};
+use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write};
-use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::path::{Path, PathBuf};
 
 /// Puts a file with these bytes at `path` (see [`replace_with`]), or where a link there leads. A device or
 /// a pipe is written to, never replaced.
@@ -27,17 +27,41 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// When it cannot be written; then no part of it is left.
 pub fn replace_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let beside = partial(path);
+    let written = File::create(&beside).and_then(|file| fill_through(file, fill));
+    put_in_place(&beside, path, written)
+}
+
+/// Puts a file with these bytes at `path` as [`replace_with`] does. At no moment can other accounts read it.
+///
+/// # Errors
+/// When it cannot be written; then no part of it is left.
+pub fn replace_private(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let beside = partial(path);
+    // One that a killed process left behind could be open elsewhere.
+    let _ = fs::remove_file(&beside);
+
+    let created = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&beside);
+    let written = created.and_then(|file| fill_through(file, |writer| writer.write_all(bytes)));
+    put_in_place(&beside, path, written)
+}
+
+/// Where a file is written before it is moved to `path`.
+fn partial(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let beside = path.with_file_name(format!(".{name}.partial"));
+    path.with_file_name(format!(".{name}.partial"))
+}
 
-    let written = write_through_with(&beside, fill).and_then(|()| fs::rename(&beside, path));
+/// Moves what was `written` at `beside` to `path`, or removes it if writing or moving failed.
+fn put_in_place(beside: &Path, path: &Path, written: io::Result<()>) -> io::Result<()> {
+    let moved = written.and_then(|()| fs::rename(beside, path));
 
-    match &written {
+    match &moved {
         Ok(()) => sync_folder_of(path),
-        Err(_) => drop(fs::remove_file(&beside)),
+        Err(_) => drop(fs::remove_file(beside)),
     }
 
-    written
+    moved
 }
 
 /// Writes a file and waits until the disk has it.
@@ -45,11 +69,11 @@ pub fn replace_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::
 /// # Errors
 /// When it cannot be written; then a part of it may be left.
 pub fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    write_through_with(path, |writer| writer.write_all(bytes))
+    fill_through(File::create(path)?, |writer| writer.write_all(bytes))
 }
 
-fn write_through_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
-    let mut writer = BufWriter::with_capacity(1 << 20, File::create(path)?);
+fn fill_through(opened: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let mut writer = BufWriter::with_capacity(1 << 20, opened);
     fill(&mut writer)?;
 
     // A file renamed before the disk has it may be empty after a power cut.
@@ -127,6 +151,22 @@ mod tests {
         assert_eq!(replace_with(&path, full).unwrap_err().kind(), io::ErrorKind::StorageFull);
         assert_eq!(fs::read(&path).unwrap(), b"before");
         assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_private_file_is_its_owners_alone_even_if_a_readable_one_was_left_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("secret.pem");
+        let beside = folder.path().join(".secret.pem.partial");
+        for before in [&path, &beside] {
+            fs::write(before, "old").unwrap();
+            fs::set_permissions(before, Permissions::from_mode(0o644)).unwrap();
+        }
+
+        replace_private(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        assert!(!beside.exists());
     }
 
     #[test]

@@ -13,6 +13,7 @@ pub mod priority;
 
 pub mod imaging;
 pub mod lens;
+pub mod tls;
 
 pub mod recording;
 pub mod simulation;

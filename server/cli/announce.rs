@@ -8,20 +8,21 @@ use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
 use crate::control::ControlStatus;
+use crate::http::Reach;
 use crate::http::error::role_name;
 use crate::http::keys::{Keys, ROLES};
 use crate::imaging::Calibration;
 use crate::trial::role::Role;
 
-/// The announcement for people of a server that others reach at `host`. On a `terminal` the code has colours.
+/// The announcement for people of a server that others `reach`. On a `terminal` the code has colours.
 pub fn announcement(
-    host: SocketAddr,
+    reach: &Reach,
     keys: &Keys,
     status: &ControlStatus,
     calibration: &Calibration,
     terminal: bool,
 ) -> String {
-    let link = |role| format!("http://{host}/enter?key={}", keys.of(role));
+    let link = |role| reach.link(keys.of(role));
     let mut text = String::new();
 
     // Writing to a string cannot fail.
@@ -46,14 +47,24 @@ pub fn announcement(
         "A page opens only by its link, and whoever has the link has the role: give each link only to its person.\n",
     );
 
-    let advice = if host.ip().is_loopback() {
-        "Only this machine can connect. For a tablet, start with --bind 0.0.0.0:8080 on a network that you trust."
-    } else {
-        "The connection is not encrypted: use a network that you trust."
-    };
-
-    let _ = writeln!(text, "{advice}\nCtrl-C stops the server.");
+    let _ = writeln!(text, "{}\nCtrl-C stops the server.", advice(reach));
     text
+}
+
+/// What to know of the connection to the server.
+fn advice(reach: &Reach) -> String {
+    let mut advice = Vec::new();
+    if reach.loopback_only {
+        advice.push("Only this machine can connect. For a tablet, start with --bind 0.0.0.0:8080 --tls.".to_owned());
+    } else if !reach.encrypted {
+        advice.push("The connection is not encrypted (--insecure): use a network that you trust.".to_owned());
+    }
+
+    if let (Some(page), Some(authority)) = (reach.trust_page(), &reach.authority) {
+        advice.push(format!("Each tablet and laptop must trust this server once. To do so, open {page} on it."));
+        advice.push(format!("Compare the fingerprint (SHA-256) there: {}", authority.fingerprint));
+    }
+    advice.join("\n")
 }
 
 /// The code, black on white whatever the terminal's own colours are.

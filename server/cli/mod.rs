@@ -5,6 +5,7 @@ mod announce;
 mod backup;
 mod calibrate;
 mod doctor;
+mod encryption;
 mod evaluate;
 mod export;
 mod inspect;

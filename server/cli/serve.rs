@@ -18,6 +18,7 @@ use tokio::time::timeout;
 use tracing_subscriber::EnvFilter;
 
 use super::announce::{announcement, reachable};
+use super::encryption::Encryption;
 use super::library::protocols;
 use super::output::Failure;
 use crate::accounts::{Accounts, Cost};
@@ -27,20 +28,23 @@ use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Parts};
 use crate::control::{self, Command, ControlLoop, Drive, Rig, Settings};
 use crate::http::keys::Keys;
-use crate::http::{self, App};
+use crate::http::{self, App, Reach};
 use crate::imaging::{Calibration, Developer, Reconstructor, Size};
 use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
 use crate::playback::Player;
 use crate::recorder::{self, Recordings};
 use crate::store::{self, Store, device_log, telemetry};
+use crate::tls::Certificates;
 use crate::{lens, live, priority, recording};
 
 /// Arguments of `parfocal serve`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Address to listen on; 0.0.0.0:8080 lets a tablet connect.
+    /// Address to listen on; 0.0.0.0:8080 lets a tablet connect, and needs --tls.
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
     bind: SocketAddr,
+    #[command(flatten)]
+    encryption: Encryption,
     /// Folder for the database and the keys.
     #[arg(long, value_name = "DIR", default_value = "data")]
     data_dir: PathBuf,
@@ -136,6 +140,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         tracing::debug!("memory is not locked; `parfocal serve --help` says how to allow it");
     }
 
+    arguments.encryption.check(arguments.bind)?;
+
     // First of all: what cannot be reached need not be set up, and early visitors wait in its queue.
     let listener = TcpListener::bind(arguments.bind).await.map_err(|error| cannot_listen(arguments.bind, &error))?;
     let address = listener.local_addr()?;
@@ -147,6 +153,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
     tracing::info!("the chain of records is at {}", store.reader().head().await?);
     let keys = Keys::load_or_create(&arguments.data_dir)?;
+    let certificates = arguments.encryption.start(&arguments.data_dir, address.ip(), &clock)?;
+    let settings = certificates.as_ref().map(Certificates::settings).transpose()?;
     let mut seeded = seeded(arguments)?;
     let library = protocols(arguments.protocols.as_deref(), &registry)?;
 
@@ -198,6 +206,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
 
+    let reach = reach(address, certificates.as_deref());
     let accounts = Accounts::of_server(&store, Arc::clone(&clock), Cost::default());
     let app = Arc::new(App {
         clock,
@@ -211,18 +220,16 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         conductor,
         registry,
         keys: keys.clone(),
-        address: reachable(address),
-        loopback_only: address.ip().is_loopback(),
+        reach: reach.clone(),
         metrics: http::Metrics::default(),
         shutdown,
         control: control.observer(),
     });
 
-    let host = app.address;
-    let server = tokio::spawn(http::run(listener, app));
+    let server = tokio::spawn(http::run(listener, app, settings));
 
     let announcement =
-        announcement(host, &keys, &control.status.borrow(), &calibration, std::io::stdout().is_terminal());
+        announcement(&reach, &keys, &control.status.borrow(), &calibration, std::io::stdout().is_terminal());
 
     // The server serves whether or not anyone reads this.
     let _ = std::io::stdout().write_all(announcement.as_bytes());
@@ -248,6 +255,17 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let _ = timeout(GRACE, store_the_rest(&store, &ending, writer)).await;
 
     Ok(())
+}
+
+/// How others reach a server that listens on `address`.
+fn reach(address: SocketAddr, certificates: Option<&Certificates>) -> Reach {
+    let reachable = reachable(address);
+    Reach {
+        host: certificates.map_or_else(|| reachable.to_string(), |certificates| certificates.host(reachable)),
+        encrypted: certificates.is_some(),
+        loopback_only: address.ip().is_loopback(),
+        authority: certificates.and_then(Certificates::authority).cloned(),
+    }
 }
 
 /// Waits until the disk has what is still to be written, and closes the database.

@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-use super::Finding;
+use super::finding::Finding;
 use crate::recording::room;
 
 /// Room below which a trial should not begin, bytes: a day of sessions takes some 100 MB.
@@ -86,7 +86,7 @@ mod tests {
     use std::fs::{Permissions, set_permissions};
 
     use super::*;
-    use crate::doctor::Verdict;
+    use crate::doctor::finding::Verdict;
 
     #[test]
     fn a_folder_that_others_can_read_is_told() {

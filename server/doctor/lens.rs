@@ -1,6 +1,6 @@
 //! A lens that was asked about itself.
 
-use super::Finding;
+use super::finding::Finding;
 use crate::lens::{LensError, LensInfo};
 
 const LENS: &str = "lens";

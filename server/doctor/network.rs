@@ -3,7 +3,7 @@
 use std::net::UdpSocket;
 use std::path::Path;
 
-use super::Finding;
+use super::finding::Finding;
 
 /// Where Linux tells of network interfaces.
 const INTERFACES: &str = "/sys/class/net";
@@ -95,7 +95,7 @@ impl Link {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict;
+    use crate::doctor::finding::Verdict;
 
     /// An interface's folder, as Linux has it.
     fn interface(mtu: &str, speed: &str, operstate: &str) -> tempfile::TempDir {

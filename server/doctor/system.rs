@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use rustix::process::{Resource, getrlimit};
 use rustix::thread::{CapabilitySet, capabilities};
 
-use super::Finding;
+use super::finding::Finding;
 use crate::clock::Clock;
 use crate::priority::Place;
 

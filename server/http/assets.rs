@@ -113,6 +113,9 @@ static ASSETS: &[Asset] = &assets![
     "surgeon/voice_outbox.js",
     "surgeon/voice_store.js",
     "surgeon/words.js",
+    "trust/page.css",
+    "trust/page.js",
+    "trust/verdict.js",
 ];
 
 /// Hash of all files, in hexadecimal.

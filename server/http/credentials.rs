@@ -51,6 +51,13 @@ pub(super) const fn cookie_name(role: Role) -> &'static str {
     }
 }
 
+/// The header that sets cookie `name` for `seconds`: for this site's own requests alone, and where the server is
+/// `encrypted` never sent in the clear.
+pub(super) fn set_cookie(name: &str, value: &str, seconds: u64, encrypted: bool) -> String {
+    let secure = if encrypted { "; Secure" } else { "" };
+    format!("{name}={value}; Path=/; Max-Age={seconds}; HttpOnly; SameSite=Strict{secure}")
+}
+
 pub(super) fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     let cookies = headers.get_all(COOKIE).iter().filter_map(|header| header.to_str().ok());
     cookies.flat_map(|header| header.split(';')).find_map(|pair| pair.trim().strip_prefix(name)?.strip_prefix('='))

@@ -71,9 +71,15 @@ pub enum Error {
     /// A name that the server does not go by.
     #[error(
         "This server is reached as localhost or 127.0.0.1. To reach it from elsewhere, \
-         start it with --bind 0.0.0.0:8080."
+         start it with --bind 0.0.0.0:8080 --tls."
     )]
     WrongHost,
+    /// A request to change something that could be read on the way.
+    #[error(
+        "This server takes encrypted requests alone. Send this one to https://{0} instead. A key or passphrase in it \
+         could be read on the way: change it if others use this network."
+    )]
+    Unencrypted(String),
     /// Members have no place left.
     #[error("Too many pages are open at once. Close some of them, then try again.")]
     Busy,
@@ -113,6 +119,7 @@ impl Error {
             | Self::NeedsSessionLink
             | Self::Forbidden(_)
             | Self::WrongKey
+            | Self::Unencrypted(_)
             | Self::CrossSite => StatusCode::FORBIDDEN,
             Self::TooMany(_) => StatusCode::TOO_MANY_REQUESTS,
             Self::WrongHost => StatusCode::MISDIRECTED_REQUEST,

@@ -1,8 +1,6 @@
 //! The three roles' keys: unguessable, kept in the data folder, compared in constant time.
 
 use std::fs;
-use std::io::Write;
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -10,7 +8,7 @@ use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
 use uuid::Uuid;
 
-use crate::files::make_private;
+use crate::files::{make_private, replace_private};
 use crate::ids::SessionId;
 use crate::trial::role::Role;
 
@@ -108,17 +106,9 @@ impl Keys {
         Ok(keys)
     }
 
-    /// Writes aside and moves into place, so that a full disk leaves no half-written file.
     fn write(&self, path: &Path) -> std::io::Result<()> {
-        let text = toml::to_string(self).map_err(std::io::Error::other)?;
-        let aside = path.with_extension("toml.new");
-
-        let mut file = fs::OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&aside)?;
-        file.write_all(HEADER.as_bytes())?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-
-        fs::rename(aside, path)
+        let keys = toml::to_string(self).map_err(std::io::Error::other)?;
+        replace_private(path, format!("{HEADER}{keys}").as_bytes())
     }
 
     /// The key of `role`; empty, and opening nothing, for [`Role::System`].

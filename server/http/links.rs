@@ -15,13 +15,27 @@ use crate::trial::role::Role;
 ///
 /// In a session of a study the link is to that session alone, and only somebody who is `signed_in` is told it.
 pub fn surgeon_link(app: &App, headers: &HeaderMap, signed_in: bool) -> String {
-    let asked = headers.get(HOST).and_then(|host| host.to_str().ok()).filter(|host| !is_loopback_name(host));
-    let host = asked.map_or_else(|| app.address.to_string(), str::to_owned);
+    let host = tablets_host(app, headers);
     let key = match app.linked_session() {
         Some(session) if signed_in => app.keys.of_session(session),
         _ => app.keys.of(Role::Surgeon).to_owned(),
     };
-    format!("http://{host}/enter?key={key}")
+    app.reach.link_by(host, &key)
+}
+
+/// The page on which a tablet learns to trust the server, if it must.
+pub(super) fn trust_page(app: &App, headers: &HeaderMap) -> Option<String> {
+    app.reach.trust_page_by(tablets_host(app, headers))
+}
+
+/// The name that a request came by.
+pub(super) fn asked_host(headers: &HeaderMap) -> Option<&str> {
+    headers.get(HOST).and_then(|host| host.to_str().ok())
+}
+
+/// The name that a request came by, unless that leads nowhere from a tablet.
+fn tablets_host<'a>(app: &'a App, headers: &'a HeaderMap) -> &'a str {
+    asked_host(headers).filter(|host| !is_loopback_name(host)).unwrap_or(&app.reach.host)
 }
 
 /// `link` as the inside of a page: an `<svg>` element.

@@ -5,6 +5,7 @@ pub mod assets;
 mod camera;
 mod connections;
 mod credentials;
+mod door;
 pub mod error;
 mod export;
 mod health;
@@ -18,8 +19,10 @@ mod openapi;
 mod operator;
 mod people;
 mod places;
+mod plain;
 mod playback;
 mod ranges;
+mod reach;
 mod recording;
 mod records;
 mod researcher;
@@ -31,8 +34,10 @@ mod state;
 mod studies;
 mod surgeon;
 mod tablets;
+mod trust;
 mod voice;
 
+pub use reach::Reach;
 pub use state::{App, AppState, Metrics};
 
 use std::sync::Arc;
@@ -41,6 +46,7 @@ use std::time::Duration;
 use axum::http::StatusCode;
 use axum::{Extension, Router, middleware};
 use tokio::net::TcpListener;
+use tokio_rustls::rustls::ServerConfig;
 use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::limit::RequestBodyLimitLayer;
@@ -49,6 +55,7 @@ use tower_http::trace::TraceLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 
+use door::Door;
 use error::Error;
 
 /// The largest body that is read: a comment of the greatest length in JSON, with room.
@@ -77,6 +84,7 @@ pub fn router(app: AppState) -> Router {
         .merge(live::routes())
         .merge(mjpeg::routes())
         .merge(health::routes())
+        .merge(trust::routes())
         .merge(metrics::routes())
         .merge(assets::routes())
         .merge(openapi::routes())
@@ -103,8 +111,13 @@ fn span<B>(request: &axum::http::Request<B>) -> tracing::Span {
     tracing::debug_span!("request", method = %request.method(), path = request.uri().path())
 }
 
-/// Serves `app` on `listener` until `app.shutdown` turns true and what is under way is answered.
-pub async fn run(listener: TcpListener, app: AppState) {
+/// Serves `app` on `listener`, encrypted if there are settings for `tls`, until `app.shutdown` turns true and what is
+/// under way is answered.
+pub async fn run(listener: TcpListener, app: AppState, tls: Option<Arc<ServerConfig>>) {
     let shutdown = app.shutdown.clone();
-    connections::serve(listener, router(app), shutdown).await;
+    let door = match tls {
+        Some(tls) => Door::Encrypted { tls: tls.into(), pages: router(Arc::clone(&app)), plain: plain::router(app) },
+        None => Door::Plain { pages: router(app) },
+    };
+    connections::serve(listener, door, shutdown).await;
 }

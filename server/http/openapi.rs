@@ -35,8 +35,18 @@ pub struct Document;
 pub type Finished = Arc<OnceLock<String>>;
 
 /// What answers without a key.
-const OPEN: [&str; 6] =
-    ["/api/sign-in", "/api/sign-out", "/enter", "/healthz", "/sign-in", "/static/{version}/{folder}/{name}"];
+const OPEN: [&str; 10] = [
+    "/api/sign-in",
+    "/api/sign-out",
+    "/enter",
+    "/healthz",
+    "/sign-in",
+    "/static/{version}/{folder}/{name}",
+    "/trust",
+    "/trust/authority.crt",
+    "/trust/authority.mobileconfig",
+    "/trust/check",
+];
 
 /// Answers that any request may get.
 const ALWAYS: [(&str, &str); 5] = [

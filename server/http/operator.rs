@@ -45,8 +45,29 @@ struct Page {
     loopback_only: bool,
     /// The link as an SVG picture.
     qr: String,
+    /// Where a device learns to trust the server, if it must.
+    trust: Option<Trust>,
     code_pattern: &'static str,
     code_hint: &'static str,
+}
+
+/// Where a device learns to trust the server.
+struct Trust {
+    link: String,
+    /// The link as an SVG picture.
+    qr: String,
+    /// The fingerprint to compare.
+    fingerprint: String,
+}
+
+impl Trust {
+    fn of(app: &App, headers: &HeaderMap) -> Result<Option<Self>, Error> {
+        let (Some(link), Some(authority)) = (super::links::trust_page(app, headers), &app.reach.authority) else {
+            return Ok(None);
+        };
+        let qr = super::links::qr_svg(&link)?;
+        Ok(Some(Self { link, qr, fingerprint: authority.fingerprint.clone() }))
+    }
 }
 
 /// The operator's page.
@@ -63,6 +84,7 @@ async fn page(
 ) -> Result<Html<String>, Error> {
     let surgeon_link = super::links::surgeon_link(&app, &headers, by.account().is_some());
     let qr = super::links::qr_svg(&surgeon_link)?;
+    let trust = Trust::of(&app, &headers)?;
     let researcher = roles.choose(Some(Role::Researcher)).is_ok();
     let page = Page {
         nonce,
@@ -70,7 +92,8 @@ async fn page(
         chain: super::researcher::chain_words(&app).await,
         researcher,
         surgeon_link,
-        loopback_only: app.loopback_only,
+        loopback_only: app.reach.loopback_only,
+        trust,
         qr,
         code_pattern: CODE_PATTERN,
         code_hint: CODE_HINT,

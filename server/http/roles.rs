@@ -14,7 +14,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::credentials::{Pass, cookie_name, holds, pass};
+use super::credentials::{Pass, cookie_name, holds, pass, set_cookie};
 use super::error::{Error, role_name};
 use super::keys::ROLES;
 use super::people::{Acting, Person};
@@ -25,7 +25,7 @@ use crate::trial::account::Account;
 use crate::trial::role::Role;
 
 /// A cookie outlives a study day, not a study.
-const COOKIE_SECONDS: u32 = 30 * 24 * 3600;
+const COOKIE_SECONDS: u64 = 30 * 24 * 3600;
 
 /// Proof that the request speaks for the surgeon of the session on the screens.
 #[derive(Debug, Clone, Copy)]
@@ -187,7 +187,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
         (None, Some(_)) => return Err(Error::SessionOver),
         (None, None) => return Err(Error::WrongKey),
     };
-    let cookie = format!("{}={token}; Path=/; Max-Age={COOKIE_SECONDS}; HttpOnly; SameSite=Strict", cookie_name(role));
+    let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.reach.encrypted);
 
     // The door opens on a full disk, too: the log then tells of it alone.
     match app.conductor.recorder(role).record(&Access::Entered).await {

@@ -57,6 +57,8 @@ pub async fn headers(mut request: Request, next: Next) -> Response {
 
     headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    // No Strict-Transport-Security: a device that has forgotten the local authority, or a new one that somebody took past
+    // its warning, could then open the page that explains how to trust the server no more. Cookies are Secure instead.
     headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
     headers.entry(PERMISSIONS_POLICY).or_insert(HeaderValue::from_static(PERMISSIONS));
     headers.entry(CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
@@ -87,7 +89,7 @@ pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next
     let person = people::find(&app, request.headers()).await;
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
-    if app.loopback_only && !is_loopback_name(host) {
+    if app.reach.loopback_only && !is_loopback_name(host) {
         return Error::WrongHost.into_response();
     }
 
@@ -97,7 +99,7 @@ pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next
     }
 
     let changes = !matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
-    if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host) {
+    if (changes || headers.contains_key(UPGRADE)) && !is_same_origin(headers, host, app.reach.encrypted) {
         return Error::CrossSite.into_response();
     }
     if let Some(person) = person {
@@ -109,11 +111,15 @@ pub async fn guard(State(app): State<AppState>, mut request: Request, next: Next
 
 /// Judges by `Sec-Fetch-Site` and `Origin`, whichever the browser sends. A client that sends
 /// neither is not a browser, and has no cookie to be tricked out of.
-fn is_same_origin(headers: &HeaderMap, host: &str) -> bool {
+///
+/// A page that came unencrypted may hold anything that somebody put in on the way: an `encrypted` server does nothing
+/// for it. One that is not encrypted itself may stand behind a proxy that encrypts.
+fn is_same_origin(headers: &HeaderMap, host: &str, encrypted: bool) -> bool {
     let site_fits = headers.get("sec-fetch-site").is_none_or(|site| site == "same-origin");
     let origin_fits = headers.get(ORIGIN).is_none_or(|origin| {
         let origin = origin.to_str().unwrap_or_default();
-        let authority = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+        let plain = origin.strip_prefix("http://").filter(|_| !encrypted);
+        let authority = plain.or_else(|| origin.strip_prefix("https://"));
         authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host))
     });
 
@@ -153,7 +159,7 @@ mod tests {
             for (name, value) in pairs {
                 headers.insert(*name, HeaderValue::from_static(value));
             }
-            is_same_origin(&headers, "localhost:8080")
+            is_same_origin(&headers, "localhost:8080", false)
         };
 
         assert!(verdict(&[]));
@@ -163,5 +169,16 @@ mod tests {
         assert!(!verdict(&[("sec-fetch-site", "cross-site")]));
         assert!(!verdict(&[("sec-fetch-site", "same-site")]));
         assert!(!verdict(&[("origin", "http://localhost:8080"), ("sec-fetch-site", "cross-site")]));
+    }
+
+    #[test]
+    fn a_page_that_came_unencrypted_may_ask_nothing_of_an_encrypted_server() {
+        let verdict = |origin| {
+            let headers = HeaderMap::from_iter([(ORIGIN, HeaderValue::from_static(origin))]);
+            [false, true].map(|encrypted| is_same_origin(&headers, "10.0.0.5:8080", encrypted))
+        };
+
+        assert_eq!(verdict("http://10.0.0.5:8080"), [true, false]);
+        assert_eq!(verdict("https://10.0.0.5:8080"), [true, true]);
     }
 }

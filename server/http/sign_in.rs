@@ -11,7 +11,7 @@ use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::AppState;
-use super::credentials::ACCOUNT_COOKIE;
+use super::credentials::{ACCOUNT_COOKIE, set_cookie};
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::people::{From, SignedIn};
@@ -99,7 +99,7 @@ async fn sign_in(
         let token = Some(token.as_str().to_owned());
         return Ok(Json(SignedInAs { account, home, token }).into_response());
     }
-    let cookie = cookie(token.as_str(), SIGN_IN_LIMIT.as_secs());
+    let cookie = set_cookie(ACCOUNT_COOKIE, token.as_str(), SIGN_IN_LIMIT.as_secs(), app.reach.encrypted);
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Json(SignedInAs { account, home, token: None })).into_response())
 }
 
@@ -111,11 +111,8 @@ async fn sign_out(State(app): State<AppState>, SignedIn(person): SignedIn) -> Re
     if let Some(person) = person {
         app.accounts.sign_out(&person.token).await?;
     }
-    Ok((StatusCode::NO_CONTENT, AppendHeaders([(SET_COOKIE, cookie("", 0))])))
-}
-
-fn cookie(token: &str, seconds: u64) -> String {
-    format!("{ACCOUNT_COOKIE}={token}; Path=/; Max-Age={seconds}; HttpOnly; SameSite=Strict")
+    let cookie = set_cookie(ACCOUNT_COOKIE, "", 0, app.reach.encrypted);
+    Ok((StatusCode::NO_CONTENT, AppendHeaders([(SET_COOKIE, cookie)])))
 }
 
 /// The role whose page an account's role begins with.

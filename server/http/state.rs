@@ -1,6 +1,5 @@
 //! The parts of the server that every handler can use.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
@@ -8,6 +7,7 @@ use prometheus_client::metrics::counter::Counter;
 use tokio::sync::watch;
 
 use super::keys::Keys;
+use super::reach::Reach;
 use crate::accounts::Accounts;
 use crate::autofocus::Registry;
 use crate::clock::Clock;
@@ -48,10 +48,8 @@ pub struct App {
     pub accounts: Accounts,
     /// Keys of the three roles.
     pub keys: Keys,
-    /// Where other machines reach the server.
-    pub address: SocketAddr,
-    /// Whether the server listens on the machine itself alone, where no tablet reaches it.
-    pub loopback_only: bool,
+    /// How others reach the server.
+    pub reach: Reach,
     /// Counters for Prometheus.
     pub metrics: Metrics,
     /// Turns true when the server is to end; streams then close by themselves.

@@ -1,5 +1,5 @@
-//! The whole system from outside: the real server, met over HTTP, in browsers, and with a camera on the
-//! wire.
+//! The whole system from outside: the real server, met over HTTP, encrypted, in browsers, and with a
+//! camera on the wire.
 //!
 //! These subjects share `support`, and so are one test: `cargo test --test system http::` runs one
 //! of them.
@@ -9,3 +9,4 @@ mod browser;
 mod gige;
 mod http;
 mod support;
+mod tls;

@@ -58,7 +58,7 @@ fn train(mut run: Run, legs: u64) -> bool {
 #[test]
 fn a_short_training_beats_a_lens_that_stays_where_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    let mut recipe = small("parfocal", 500);
+    let mut recipe = small("parfocal", 300);
     if let Some(belief) = &mut recipe.belief {
         belief.scans = 32;
     }

@@ -65,11 +65,11 @@ impl Driver {
         self.browser_with(&[]).await
     }
 
-    /// A browser with a fresh profile and `more` arguments.
-    pub async fn browser_with(&self, more: &[String]) -> Browser {
+    /// The same, with these options of Chromium.
+    pub async fn browser_with(&self, options: &[String]) -> Browser {
         let profile = tempfile::tempdir().unwrap();
         let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
-        arguments.extend_from_slice(more);
+        arguments.extend_from_slice(options);
         arguments.push(format!("--user-data-dir={}", profile.path().display()));
         let wanted = json!({
             "goog:chromeOptions": { "args": arguments },

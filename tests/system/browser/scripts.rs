@@ -149,7 +149,6 @@ impl Browser {
     }
 
     /// Mean gray of the live picture, 0..=255.
-    #[cfg(feature = "aravis")]
     pub async fn brightness(&self) -> f64 {
         let mean = "const from = document.querySelector('#view canvas');
             const small = Object.assign(document.createElement('canvas'), { width: 32, height: 32 });

@@ -18,7 +18,7 @@ const FLOOD: usize = 600;
 /// A server that may have fewer files open than there are connections in the flood.
 fn server() -> Server {
     let data = Arc::new(tempfile::tempdir().unwrap());
-    let serve = command(data.path(), &["--bind", "0.0.0.0:0", "--fps", "5"]);
+    let serve = command(data.path(), &["--bind", "0.0.0.0:0", "--insecure", "--fps", "5"]);
     let mut limited = std::process::Command::new("sh");
     limited.args(["-c", "ulimit -n 500; exec \"$0\" \"$@\""]).arg(serve.get_program()).args(serve.get_args());
     limited.env("RUST_LOG", "error");

@@ -259,7 +259,7 @@ async fn a_belief_goes_to_the_operator_and_never_to_a_surgeon() {
 
 #[tokio::test]
 async fn a_role_that_is_not_held_is_not_served() {
-    let server = Server::with(&["--bind", "0.0.0.0:0"]);
+    let server = Server::with(&["--bind", "0.0.0.0:0", "--insecure"]);
     let error =
         connect_async(upgrade(&server, "/live?role=operator", "surgeon")).await.expect_err("a surgeon is no operator");
     assert!(matches!(error, tungstenite::Error::Http(response) if response.status() == 403));

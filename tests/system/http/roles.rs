@@ -11,12 +11,22 @@ use crate::support::{Server, client};
 const ROLES: [&str; 3] = ["surgeon", "operator", "researcher"];
 
 /// What anyone may ask for.
-const OPEN: [&str; 6] =
-    ["/healthz", "/enter", "/sign-in", "/api/sign-in", "/api/sign-out", "/static/{version}/{folder}/{name}"];
+const OPEN: [&str; 10] = [
+    "/healthz",
+    "/enter",
+    "/sign-in",
+    "/api/sign-in",
+    "/api/sign-out",
+    "/static/{version}/{folder}/{name}",
+    "/trust",
+    "/trust/authority.crt",
+    "/trust/authority.mobileconfig",
+    "/trust/check",
+];
 
 /// A server that others can reach.
 fn open_server() -> Server {
-    Server::with(&["--bind", "0.0.0.0:0"])
+    Server::with(&["--bind", "0.0.0.0:0", "--insecure"])
 }
 
 async fn enter(server: &Server, key: &str) -> Response {
@@ -149,7 +159,7 @@ async fn a_cookie_outlives_a_restart() {
     let mut server = open_server();
     let cookie = cookie(&server, "surgeon").await;
     assert!(server.end(rustix::process::Signal::TERM));
-    let again = Server::on(server.data.clone(), &["--bind", "0.0.0.0:0"]);
+    let again = Server::on(server.data.clone(), &["--bind", "0.0.0.0:0", "--insecure"]);
     assert_eq!(ask(&again, "/surgeon", Method::GET, &cookie).await, StatusCode::OK);
 }
 

@@ -41,9 +41,15 @@ fn what_cannot_be_served_is_refused_in_a_sentence() {
     assert_eq!(code, Some(1));
     assert!(said.contains(&address) && said.contains("in use") && said.contains("--bind"), "{said}");
 
-    let (code, said) = refused(data.path(), &["--bind", "192.0.2.1:8080"]);
+    let (code, said) = refused(data.path(), &["--bind", "192.0.2.1:8080", "--insecure"]);
     assert_eq!(code, Some(1));
     assert!(said.contains("this machine does not have the address"), "{said}");
+
+    // Nothing listens, and nothing is made, before this is decided.
+    let (code, said) = refused(data.path(), &["--bind", "0.0.0.0:0"]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("not be encrypted") && said.contains("--tls") && said.contains("--insecure"), "{said}");
+    assert_eq!(data.path().read_dir().unwrap().count(), 0);
 
     let (code, _) = refused(data.path(), &["--bind", "nonsense"]);
     assert_eq!(code, Some(2));

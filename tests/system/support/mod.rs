@@ -30,6 +30,11 @@ impl Server {
         Self::with(&["--bind", "127.0.0.1:0"])
     }
 
+    /// The same, encrypted with a certificate of its own local authority.
+    pub fn encrypted() -> Self {
+        Self::with(&["--bind", "127.0.0.1:0", "--tls"])
+    }
+
     /// A server with these arguments beside its data folder.
     pub fn with(arguments: &[&str]) -> Self {
         Self::on(Arc::new(tempfile::tempdir().unwrap()), arguments)
@@ -89,7 +94,8 @@ impl Server {
 
     /// Address of `path`.
     pub fn url(&self, path: &str) -> String {
-        format!("http://{}{path}", self.address)
+        let scheme = if self.said.contains("https://") { "https" } else { "http" };
+        format!("{scheme}://{}{path}", self.address)
     }
 
     /// A GET without any credential.

@@ -1,0 +1,44 @@
+//! What an encrypted server answers to a browser that does not encrypt: how to trust it, and the way to the encrypted
+//! page. Nothing else, and nothing that needs a key.
+
+use axum::Router;
+use axum::extract::{Request, State};
+use axum::http::Method;
+use axum::http::header::HOST;
+use axum::http::uri::Authority;
+use axum::middleware;
+use axum::response::{IntoResponse, Redirect, Response};
+use tower::ServiceBuilder;
+use tower_http::catch_panic::CatchPanicLayer;
+use utoipa_axum::router::OpenApiRouter;
+
+use super::error::{self, Error};
+use super::{AppState, assets, security, trust};
+
+/// The routes of connections that are not encrypted. None of them reads a body or waits for anything.
+pub(super) fn router(app: AppState) -> Router {
+    let (router, _) = OpenApiRouter::new().merge(trust::routes()).merge(assets::routes()).split_for_parts();
+
+    let layers = ServiceBuilder::new()
+        .layer(middleware::from_fn(security::headers))
+        .layer(middleware::from_fn(error::render))
+        .layer(CatchPanicLayer::custom(|_| Error::Internal.into_response()));
+
+    router.fallback(on_to_the_encrypted_page).layer(layers).with_state(app)
+}
+
+/// Sends a browser on to the same address, encrypted. A request that changes something is refused instead: whoever wrote
+/// the program behind it should learn that what it sends can be read on the way.
+async fn on_to_the_encrypted_page(State(app): State<AppState>, request: Request) -> Result<Response, Error> {
+    let asked = request.headers().get(HOST).and_then(|host| host.to_str().ok());
+    let asked = asked.and_then(|host| host.parse::<Authority>().ok());
+    let host = asked.as_ref().map_or(app.reach.host.as_str(), Authority::as_str);
+
+    if !matches!(*request.method(), Method::GET | Method::HEAD) {
+        return Err(Error::Unencrypted(host.to_owned()));
+    }
+
+    let path = request.uri().path_and_query().map_or("/", |path| path.as_str());
+    // Temporary: a browser would remember a permanent one, also when the server is started without TLS one day.
+    Ok(Redirect::temporary(&format!("https://{host}{path}")).into_response())
+}

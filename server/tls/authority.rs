@@ -1,0 +1,264 @@
+//! The local authority: made once, kept in the data folder, trusted once by each tablet and laptop. It signs the
+//! server's certificates.
+//!
+//! Its certificate limits what it can sign for: private networks, this machine's names, and the addresses that the
+//! machine had when the authority was made. So whoever steals its key cannot pretend to be any other site towards the
+//! devices that trust it.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::net::IpAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use jiff::Timestamp;
+use rcgen::{
+    BasicConstraints, CertificateParams, CidrSubnet, DistinguishedName, DnType, ExtendedKeyUsagePurpose,
+    GeneralSubtree, IsCa, Issuer, KeyPair, KeyUsagePurpose, NameConstraints, SanType,
+};
+use sha2::{Digest, Sha256};
+use time::OffsetDateTime;
+use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+
+use super::error::TlsError;
+use super::facts::{Facts, Permitted};
+use super::names::Names;
+use crate::files::{make_private, replace, replace_private};
+
+/// Name of the authority's folder in the data folder.
+pub const FOLDER: &str = "tls";
+
+/// The authority's certificate and private key.
+const FILE: &str = "authority.pem";
+
+/// The authority's certificate alone, for programs on this machine (`curl --cacert`).
+const PUBLIC_FILE: &str = "authority.crt";
+
+const DAY: Duration = Duration::from_hours(24);
+
+/// How long the authority lives. Every device has to trust a new one, so it outlives a study.
+const AUTHORITY_LIVES: Duration = DAY.saturating_mul(10 * 365);
+
+/// How long a certificate lives. Apple's devices refuse one of a local authority that lives over 825 days
+/// (support.apple.com/en-us/103769). As a new one is signed at each start, less does.
+const CERTIFICATE_LIVES: Duration = DAY.saturating_mul(90);
+
+/// How far the clock of a tablet may be behind this machine's.
+const SLOW_CLOCKS: Duration = DAY.saturating_mul(2);
+
+/// Networks that anybody may use as their own: RFC 1918, RFC 6598, RFC 3927, RFC 4193, and each machine's own.
+const PRIVATE_NETWORKS: [(&str, u8); 8] = [
+    ("10.0.0.0", 8),
+    ("172.16.0.0", 12),
+    ("192.168.0.0", 16),
+    ("100.64.0.0", 10),
+    ("169.254.0.0", 16),
+    ("127.0.0.0", 8),
+    ("fc00::", 7),
+    ("::1", 128),
+];
+
+/// What everybody may know of the authority.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PublicAuthority {
+    /// Its certificate, PEM.
+    pub pem: String,
+    /// What devices call it.
+    pub name: String,
+    /// SHA-256 of its certificate, in pairs of hexadecimal digits, as devices show it.
+    pub fingerprint: String,
+    /// SHA-256 of its certificate.
+    pub digest: [u8; 32],
+}
+
+/// A certificate with its private key.
+pub(super) struct Signed {
+    pub(super) certificate: CertificateDer<'static>,
+    pub(super) key: PrivateKeyDer<'static>,
+    pub(super) facts: Facts,
+}
+
+/// The local authority.
+pub(super) struct Authority {
+    issuer: Issuer<'static, KeyPair>,
+    permitted: Permitted,
+    facts: Facts,
+    path: PathBuf,
+    pub(super) public: PublicAuthority,
+}
+
+impl Authority {
+    /// The authority kept in `data_dir`; made on first use, with a private key that only its owner can read.
+    pub(super) fn load_or_create(data_dir: &Path, now: Timestamp) -> Result<Self, TlsError> {
+        let folder = data_dir.join(FOLDER);
+        let path = folder.join(FILE);
+        let unwritable = |source| TlsError::Unwritable { path: path.clone(), source };
+
+        let pem = match fs::read_to_string(&path) {
+            Ok(pem) => {
+                make_private(&path).map_err(unwritable)?;
+                pem
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                let pem = make(&Names::of_whole_machine(), now)?;
+                fs::create_dir_all(&folder).map_err(unwritable)?;
+                make_private(&folder).map_err(unwritable)?;
+                replace_private(&path, pem.as_bytes()).map_err(unwritable)?;
+                tracing::info!("made a local authority in {}", path.display());
+                pem
+            }
+            Err(source) => return Err(TlsError::Unreadable { path, source }),
+        };
+
+        let authority = Self::parse(&pem, &path)?;
+        replace(&folder.join(PUBLIC_FILE), authority.public.pem.as_bytes()).map_err(unwritable)?;
+        authority.check(now)?;
+        Ok(authority)
+    }
+
+    fn parse(pem: &str, path: &Path) -> Result<Self, TlsError> {
+        let damaged = |reason| TlsError::DamagedAuthority { path: path.to_owned(), reason };
+        let certificate =
+            CertificateDer::from_pem_slice(pem.as_bytes()).map_err(|_| damaged("it holds no certificate"))?;
+        let key = PrivateKeyDer::from_pem_slice(pem.as_bytes()).map_err(|_| damaged("it holds no private key"))?;
+        let key = KeyPair::try_from(&key).map_err(|_| damaged("its private key cannot be read"))?;
+
+        let (_, read) =
+            x509_parser::parse_x509_certificate(&certificate).map_err(|_| damaged("its certificate cannot be read"))?;
+        if read.public_key().subject_public_key.data != key.public_key_raw() {
+            return Err(damaged("its private key belongs to another certificate"));
+        }
+        let name = read.subject().iter_common_name().next().and_then(|name| name.as_str().ok());
+        let name = name.unwrap_or_default().to_owned();
+
+        let facts = Facts::read(&certificate).ok_or_else(|| damaged("its certificate has no dates"))?;
+        let permitted = Permitted::read(&certificate).ok_or_else(|| damaged("its certificate names no limits"))?;
+        let digest: [u8; 32] = Sha256::digest(&certificate).into();
+
+        Ok(Self {
+            permitted,
+            facts,
+            path: path.to_owned(),
+            public: PublicAuthority {
+                pem: certificate_alone(pem).ok_or_else(|| damaged("it holds no certificate"))?,
+                name,
+                fingerprint: digest.map(|byte| format!("{byte:02X}")).join(":"),
+                digest,
+            },
+            issuer: Issuer::from_ca_cert_der(&certificate, key)?,
+        })
+    }
+
+    fn check(&self, now: Timestamp) -> Result<(), TlsError> {
+        let Facts { from, until, .. } = self.facts;
+        if now < from || now >= until {
+            return Err(TlsError::AuthorityNotValid { path: self.path.clone(), from, until, now });
+        }
+        Ok(())
+    }
+
+    /// A new certificate for `names`. Those that the authority may not sign for are left out, since one of them would
+    /// make the whole certificate invalid.
+    pub(super) fn sign(&self, names: &Names, now: Timestamp) -> Result<Signed, TlsError> {
+        self.check(now)?;
+        let hosts = names.hosts.iter().filter(|host| self.permitted.host(host));
+        let addresses = names.addresses.iter().filter(|address| self.permitted.address(**address));
+
+        let mut params = CertificateParams::default();
+        for host in hosts {
+            params.subject_alt_names.push(SanType::DnsName(host.as_str().try_into()?));
+        }
+        params.subject_alt_names.extend(addresses.map(|address| SanType::IpAddress(*address)));
+
+        params.distinguished_name = named("parfocal server");
+        params.not_before = date(self.facts.from.max(earlier(now, SLOW_CLOCKS)));
+        params.not_after = date(self.facts.until.min(later(now, CERTIFICATE_LIVES)));
+        params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+        params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
+        params.use_authority_key_identifier_extension = true;
+
+        let key = KeyPair::generate()?;
+        let certificate = params.signed_by(&key, &self.issuer)?.der().clone();
+        let facts = Facts::read(&certificate).ok_or(rcgen::Error::CouldNotParseCertificate)?;
+        let key = PrivateKeyDer::try_from(key.serialize_der()).map_err(|_| rcgen::Error::CouldNotParseKeyPair)?;
+        Ok(Signed { certificate, key, facts })
+    }
+
+    /// Those of `names` that the authority may not sign for, in words.
+    pub(super) fn not_permitted(&self, names: &Names) -> Vec<String> {
+        let hosts = names.hosts.iter().filter(|host| !self.permitted.host(host)).cloned();
+        let addresses = names.addresses.iter().filter(|address| !self.permitted.address(**address));
+        hosts.chain(addresses.map(ToString::to_string)).collect()
+    }
+
+    /// The file that holds it.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// A new authority for a machine with these names: certificate and private key, PEM.
+fn make(machine: &Names, now: Timestamp) -> Result<String, TlsError> {
+    let host = machine.hosts.iter().find(|host| host.as_str() != "localhost");
+    let name = host.map_or_else(|| "parfocal".to_owned(), |host| format!("parfocal on {host}"));
+
+    let mut params = CertificateParams::default();
+    params.distinguished_name = named(&name);
+    params.not_before = date(earlier(now, SLOW_CLOCKS));
+    params.not_after = date(later(now, AUTHORITY_LIVES));
+    params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+    params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+    params.name_constraints = Some(limits(machine));
+
+    let key = KeyPair::generate()?;
+    let certificate = params.self_signed(&key)?;
+    Ok(format!("{}{}", certificate.pem(), key.serialize_pem()))
+}
+
+/// What the authority of a machine with these names may sign for.
+fn limits(machine: &Names) -> NameConstraints {
+    // `local` is every machine's name in its own network (RFC 6762), so that the machine can be renamed.
+    let hosts = machine.hosts.iter().map(String::as_str).chain(["local"]);
+    let hosts = hosts.map(|host| GeneralSubtree::DnsName(host.to_owned()));
+
+    let private = PRIVATE_NETWORKS.into_iter().filter_map(|(network, bits)| Some((network.parse().ok()?, bits)));
+    let single = |address: &IpAddr| (*address, if address.is_ipv4() { 32 } else { 128 });
+    let own = machine.addresses.iter().filter(|address| !address.is_loopback()).map(single);
+    let networks = private.chain(own).map(|(network, bits)| CidrSubnet::from_addr_prefix(network, bits));
+
+    NameConstraints {
+        permitted_subtrees: hosts.chain(networks.map(GeneralSubtree::IpAddress)).collect(),
+        excluded_subtrees: Vec::new(),
+    }
+}
+
+fn named(name: &str) -> DistinguishedName {
+    let mut distinguished = DistinguishedName::new();
+    distinguished.push(DnType::CommonName, name);
+    distinguished
+}
+
+/// The certificate in `pem`, without the private key.
+fn certificate_alone(pem: &str) -> Option<String> {
+    const BEGIN: &str = "-----BEGIN CERTIFICATE-----";
+    const END: &str = "-----END CERTIFICATE-----";
+
+    let begin = pem.find(BEGIN)?;
+    let end = begin + pem[begin..].find(END)?;
+    let body = pem[begin + BEGIN.len()..end].trim();
+    Some(format!("{BEGIN}\n{body}\n{END}\n"))
+}
+
+fn earlier(now: Timestamp, by: Duration) -> Timestamp {
+    now.saturating_sub(by).unwrap_or(Timestamp::UNIX_EPOCH)
+}
+
+fn later(now: Timestamp, by: Duration) -> Timestamp {
+    now.saturating_add(by).unwrap_or(now)
+}
+
+/// Certificates count in seconds.
+fn date(timestamp: Timestamp) -> OffsetDateTime {
+    OffsetDateTime::from_unix_timestamp(timestamp.as_second()).unwrap_or(OffsetDateTime::UNIX_EPOCH)
+}

@@ -1,0 +1,102 @@
+//! A client that looks into TLS: which certificate it was shown, and which HTTP was agreed on.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use http_body_util::{BodyExt, Full};
+use hyper::body::Incoming;
+use hyper::client::conn::{http1, http2};
+use hyper::{Request, Response};
+use hyper_util::rt::{TokioExecutor, TokioIo};
+use tokio::net::TcpStream;
+use tokio_rustls::TlsConnector;
+use tokio_rustls::client::TlsStream;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName};
+use tokio_rustls::rustls::{ClientConfig, RootCertStore};
+
+use crate::support::Server;
+
+/// What a client trusts and speaks.
+pub struct Trust {
+    connector: TlsConnector,
+}
+
+impl Trust {
+    /// Trusts the authority in the file `authority` and nobody else; speaks `protocols`, the best first.
+    pub fn in_authority(authority: &Path, protocols: &[&str]) -> Self {
+        let mut roots = RootCertStore::empty();
+        roots.add(CertificateDer::from_pem_file(authority).unwrap()).unwrap();
+        let mut config = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
+            .with_safe_default_protocol_versions()
+            .unwrap()
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        config.alpn_protocols = protocols.iter().map(|protocol| protocol.as_bytes().to_vec()).collect();
+        Self { connector: TlsConnector::from(Arc::new(config)) }
+    }
+
+    /// Trusts the local authority of `server`.
+    pub fn of(server: &Server, protocols: &[&str]) -> Self {
+        Self::in_authority(&server.data.path().join("tls/authority.crt"), protocols)
+    }
+
+    /// Shakes hands with what listens on `address`, which must prove to be `name`.
+    pub async fn connect(&self, address: SocketAddr, name: &str) -> std::io::Result<TlsStream<TcpStream>> {
+        let stream = TcpStream::connect(address).await.unwrap();
+        self.connector.connect(ServerName::try_from(name.to_owned()).unwrap(), stream).await
+    }
+}
+
+/// The certificate that `stream` was opened with.
+pub fn certificate(stream: &TlsStream<TcpStream>) -> Vec<u8> {
+    stream.get_ref().1.peer_certificates().unwrap()[0].to_vec()
+}
+
+/// What both ends of `stream` agreed on.
+pub fn protocol(stream: &TlsStream<TcpStream>) -> String {
+    String::from_utf8(stream.get_ref().1.alpn_protocol().unwrap_or_default().to_vec()).unwrap()
+}
+
+/// A GET of `path` with the key of `role`.
+pub fn get_as(server: &Server, role: &str, path: &str) -> Request<Full<Bytes>> {
+    request(server, role, "GET", path, Bytes::new())
+}
+
+/// A request with the key of `role`, with a body of JSON if there is any.
+pub fn request(server: &Server, role: &str, method: &str, path: &str, body: Bytes) -> Request<Full<Bytes>> {
+    let mut request = Request::builder()
+        .method(method)
+        .uri(format!("https://{}{path}", server.address))
+        .header("authorization", format!("Bearer {}", server.key(role)));
+    if !body.is_empty() {
+        request = request.header("content-type", "application/json");
+    }
+    request.body(Full::new(body)).unwrap()
+}
+
+/// A connection that speaks HTTP/2.
+pub async fn http2(server: &Server) -> http2::SendRequest<Full<Bytes>> {
+    let stream = Trust::of(server, &["h2", "http/1.1"]).connect(server.address, "127.0.0.1").await.unwrap();
+    assert_eq!(protocol(&stream), "h2");
+    let (sender, connection) = http2::handshake(TokioExecutor::new(), TokioIo::new(stream)).await.unwrap();
+    tokio::spawn(connection);
+    sender
+}
+
+/// Asks for `path` in the clear, as a browser does for `http://`.
+pub async fn plain(server: &Server, method: &str, path: &str) -> Response<Incoming> {
+    let stream = TcpStream::connect(server.address).await.unwrap();
+    let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await.unwrap();
+    tokio::spawn(connection);
+    let request = Request::builder().method(method).uri(path).header("host", server.address.to_string());
+    sender.send_request(request.body(Full::<Bytes>::default()).unwrap()).await.unwrap()
+}
+
+/// The whole body of `response`, as text.
+pub async fn text(response: Response<Incoming>) -> String {
+    String::from_utf8(response.into_body().collect().await.unwrap().to_bytes().to_vec()).unwrap()
+}

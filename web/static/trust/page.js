@@ -1,0 +1,35 @@
+// The page on which a device learns to trust the server.
+
+import { byId, setText } from "../shared/dom.js";
+import { judge, kindOf, WORDS } from "./verdict.js";
+
+/** An answer that takes longer will not come. */
+const PATIENCE_MS = 10_000;
+
+const verdict = byId("check");
+
+/** @param {string} address */
+function ask(address) {
+  // Without cookies: the answer is the same for everyone.
+  return fetch(address, { cache: "no-store", credentials: "omit", signal: AbortSignal.timeout(PATIENCE_MS) });
+}
+
+async function check() {
+  const found = await judge(ask, location.host);
+  const { said, advice } = WORDS[found];
+  verdict.dataset.verdict = found;
+  setText(verdict, said);
+  setText(byId("check-advice"), advice);
+  byId("go-on").hidden = found !== "trusted";
+}
+
+byId("check-again").onclick = check;
+
+// The steps lead into the device's settings and back.
+document.addEventListener("visibilitychange", () => {
+  if (!document.hidden) check();
+});
+
+const kind = kindOf(navigator.userAgent, navigator.maxTouchPoints);
+byId(`steps-${kind}`, HTMLDetailsElement).open = true;
+check();
