@@ -240,12 +240,11 @@ impl Storer {
 
         let Self { mut writer, progress, lost, .. } = self;
         writer.set_lost(lost.load(Ordering::Relaxed));
-        let stored = writer.stored();
         let finished = writer.finish(ended.clone());
 
         let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
         // A shard that could not be written took the frames with it that waited for it.
-        progress.frames = *finished.as_ref().unwrap_or(&stored) as u64;
+        progress.frames = writer.stored() as u64;
         progress.ended = Some(match (ended, finished) {
             (Ended::Stopped, Err(error)) => Ended::Failed(error.to_string()),
             (ended, _) => ended,

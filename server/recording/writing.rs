@@ -33,6 +33,8 @@ pub struct Writer {
     waiting: Vec<Vec<u8>>,
     /// Frames in whole shards.
     stored: usize,
+    /// Of those, the frames that the recording's description speaks of: what a reader finds.
+    described: usize,
 }
 
 impl Writer {
@@ -64,7 +66,7 @@ impl Writer {
             fixed.push((array.name.to_owned(), description));
         }
 
-        let writer = Self {
+        let mut writer = Self {
             folder: folder.to_owned(),
             header,
             size,
@@ -74,6 +76,7 @@ impl Writer {
             rows: Vec::new(),
             waiting: Vec::new(),
             stored: 0,
+            described: 0,
         };
         writer.describe()?;
         Ok(writer)
@@ -100,7 +103,7 @@ impl Writer {
     /// Frames that would be there if the program were killed now.
     #[must_use]
     pub const fn stored(&self) -> usize {
-        self.stored
+        self.described
     }
 
     /// Bytes that the frames that wait for their shard will take.
@@ -124,14 +127,13 @@ impl Writer {
         if self.waiting.len() == SHARD_FRAMES { self.store() } else { Ok(()) }
     }
 
-    /// Stores the frames that still wait, and notes how the recording ended.
+    /// Stores the frames that still wait, and notes how the recording ended. No frame can be added after that.
     ///
     /// # Errors
-    /// When it cannot be written.
-    pub fn finish(mut self, ended: Ended) -> Result<usize, RecordingError> {
+    /// When it cannot be written; [`Writer::stored`] tells how many frames are there all the same.
+    pub fn finish(&mut self, ended: Ended) -> Result<(), RecordingError> {
         self.header.ended = Some(ended);
-        if self.waiting.is_empty() { self.describe() } else { self.store() }?;
-        Ok(self.stored)
+        if self.waiting.is_empty() { self.describe() } else { self.store() }
     }
 
     /// Makes a file of the frames that wait, and the arrays longer by these.
@@ -166,13 +168,14 @@ impl Writer {
     }
 
     /// Describes what is stored now: first all of it in one file, then each array for readers that do not look there.
-    fn describe(&self) -> Result<(), RecordingError> {
+    fn describe(&mut self) -> Result<(), RecordingError> {
         let growing = growing(&self.header, self.size, self.stored);
         let mut arrays = growing.clone();
         arrays.extend(self.fixed.iter().cloned());
 
         let whole = group(&self.header, &arrays)?;
         put(&self.folder.join(DESCRIPTION), self.stored, &pretty(&whole))?;
+        self.described = self.stored;
 
         for (name, description) in &growing {
             put(&self.folder.join(name).join(DESCRIPTION), self.stored, &pretty(description))?;
