@@ -32,9 +32,9 @@ pub struct Writer {
     /// Frames that wait for their shard, compressed.
     waiting: Vec<Vec<u8>>,
     /// Frames in whole shards.
-    stored: usize,
+    sharded: usize,
     /// Of those, the frames that the recording's description speaks of: what a reader finds.
-    described: usize,
+    stored: usize,
 }
 
 impl Writer {
@@ -75,8 +75,8 @@ impl Writer {
             columns: Columns::new()?,
             rows: Vec::new(),
             waiting: Vec::new(),
+            sharded: 0,
             stored: 0,
-            described: 0,
         };
         writer.describe()?;
         Ok(writer)
@@ -103,7 +103,7 @@ impl Writer {
     /// Frames that would be there if the program were killed now.
     #[must_use]
     pub const fn stored(&self) -> usize {
-        self.described
+        self.stored
     }
 
     /// Bytes that the frames that wait for their shard will take.
@@ -149,11 +149,11 @@ impl Writer {
         }
 
         for column in Column::ALL {
-            let file = self.folder.join(column.name()).join("c").join((self.stored / COLUMN_CHUNK).to_string());
-            put(&file, self.stored, &self.columns.encode(column, &self.rows)?)?;
+            let file = self.folder.join(column.name()).join("c").join((self.sharded / COLUMN_CHUNK).to_string());
+            put(&file, self.sharded, &self.columns.encode(column, &self.rows)?)?;
         }
 
-        self.stored += frames.len();
+        self.sharded += frames.len();
         if self.rows.len() == COLUMN_CHUNK {
             self.rows.clear();
         }
@@ -161,24 +161,24 @@ impl Writer {
     }
 
     fn store_shard(&self, frames: &[Vec<u8>], index: &[u8]) -> Result<(), RecordingError> {
-        let path = self.folder.join(MOSAIC).join(format!("c/{}/0/0", self.stored / SHARD_FRAMES));
-        let failed = |error| RecordingError::unwritable(&self.folder, self.stored, error);
+        let path = self.folder.join(MOSAIC).join(format!("c/{}/0/0", self.sharded / SHARD_FRAMES));
+        let failed = |error| RecordingError::unwritable(&self.folder, self.sharded, error);
         make_parent(&path).map_err(failed)?;
         replace_with(&path, |out| shard::write(out as &mut dyn Write, frames, index)).map_err(failed)
     }
 
     /// Describes what is stored now: first all of it in one file, then each array for readers that do not look there.
     fn describe(&mut self) -> Result<(), RecordingError> {
-        let growing = growing(&self.header, self.size, self.stored);
+        let growing = growing(&self.header, self.size, self.sharded);
         let mut arrays = growing.clone();
         arrays.extend(self.fixed.iter().cloned());
 
         let whole = group(&self.header, &arrays)?;
-        put(&self.folder.join(DESCRIPTION), self.stored, &pretty(&whole))?;
-        self.described = self.stored;
+        put(&self.folder.join(DESCRIPTION), self.sharded, &pretty(&whole))?;
+        self.stored = self.sharded;
 
         for (name, description) in &growing {
-            put(&self.folder.join(name).join(DESCRIPTION), self.stored, &pretty(description))?;
+            put(&self.folder.join(name).join(DESCRIPTION), self.sharded, &pretty(description))?;
         }
         Ok(())
     }
