@@ -181,11 +181,25 @@ pub fn withdrawn() -> bool {
 /// memory would be refused.
 #[must_use]
 pub fn lock_memory() -> bool {
-    let unlimited = getrlimit(Resource::Memlock).current.is_none();
-    let allowed = unlimited || capabilities(None).is_ok_and(|sets| sets.effective.contains(CapabilitySet::IPC_LOCK));
-
     // Without ONFAULT all of libtorch would be read in, of which the policies need little.
-    allowed && mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT).is_ok()
+    may_lock_memory() && mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT).is_ok()
+}
+
+/// Whether this process may keep all of its memory from being swapped out.
+#[must_use]
+pub fn may_lock_memory() -> bool {
+    getrlimit(Resource::Memlock).current.is_none() || has(CapabilitySet::IPC_LOCK)
+}
+
+/// Whether this process may put a thread at the real-time priority of each [`Place`].
+#[must_use]
+pub fn may_run_first() -> bool {
+    let highest = Place::Wire as u64;
+    getrlimit(Resource::Rtprio).current.is_none_or(|most| most >= highest) || has(CapabilitySet::SYS_NICE)
+}
+
+fn has(capability: CapabilitySet) -> bool {
+    capabilities(None).is_ok_and(|sets| sets.effective.contains(capability))
 }
 
 fn nice(value: i32) -> bool {

@@ -2,12 +2,13 @@
 //! the tablet to scan, and, loudly, what is simulated.
 
 use std::fmt::Write;
-use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
 use crate::control::ControlStatus;
+use crate::doctor::outward;
 use crate::http::Reach;
 use crate::http::error::role_name;
 use crate::http::keys::{Keys, ROLES};
@@ -93,12 +94,4 @@ fn simulated(status: &ControlStatus) -> Option<String> {
 pub fn reachable(listening: SocketAddr) -> SocketAddr {
     let outward = if listening.ip().is_unspecified() { outward() } else { None };
     SocketAddr::new(outward.unwrap_or(listening.ip()), listening.port())
-}
-
-/// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The address
-/// asked for is one set aside for documentation (RFC 5737).
-fn outward() -> Option<IpAddr> {
-    let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
-    socket.connect("192.0.2.1:9").ok()?;
-    socket.local_addr().ok().map(|address| address.ip())
 }

@@ -11,6 +11,7 @@ use std::path::Path;
 
 pub use finding::{Finding, Verdict};
 pub use lens::lens;
+pub use network::outward;
 
 use crate::clock::Clock;
 

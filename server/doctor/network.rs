@@ -1,6 +1,6 @@
 //! The network: where a tablet can reach this machine, and whether its cables suit a GigE camera.
 
-use std::net::UdpSocket;
+use std::net::{IpAddr, UdpSocket};
 use std::path::Path;
 
 use super::finding::Finding;
@@ -19,21 +19,25 @@ const CAMERA: &str = "camera's network";
 
 /// Where others can reach this machine.
 pub fn addresses() -> Finding {
-    // Connecting a datagram socket sends nothing; it picks this machine's address on the route there. The
-    // address is one set aside for documentation (RFC 5737).
-    let outward = UdpSocket::bind("0.0.0.0:0").and_then(|socket| {
-        socket.connect("192.0.2.1:9")?;
-        socket.local_addr()
-    });
-
-    match outward {
-        Ok(address) => Finding::well(NETWORK, format!("A tablet can reach this machine at {}.", address.ip())),
-        Err(_) => Finding::advice(
+    match outward() {
+        Some(address) => Finding::well(NETWORK, format!("A tablet can reach this machine at {address}.")),
+        None => Finding::advice(
             NETWORK,
             "This machine is in no network.",
             "Connect it to the tablet's network, unless all pages are opened on this machine.",
         ),
     }
+}
+
+/// The address that this machine would talk to the world from; none where it is in no network.
+///
+/// Connecting a datagram socket sends nothing; it only picks the route and so this machine's address on it. The address
+/// asked for is one set aside for documentation (RFC 5737).
+#[must_use]
+pub fn outward() -> Option<IpAddr> {
+    let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
+    socket.connect("192.0.2.1:9").ok()?;
+    socket.local_addr().ok().map(|address| address.ip())
 }
 
 /// Whether wired networks that are up could carry a GigE camera's pictures. None where there is no such

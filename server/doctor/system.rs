@@ -2,12 +2,9 @@
 
 use std::process::{Command, Stdio};
 
-use rustix::process::{Resource, getrlimit};
-use rustix::thread::{CapabilitySet, capabilities};
-
 use super::finding::Finding;
 use crate::clock::Clock;
-use crate::priority::Place;
+use crate::priority::{may_lock_memory, may_run_first};
 
 const CLOCK: &str = "clock";
 const REAL_TIME: &str = "real-time priority";
@@ -38,11 +35,7 @@ pub fn clock(clock: &dyn Clock) -> Finding {
 
 /// Whether the threads from camera to lens may run before all other programs.
 pub fn real_time() -> Finding {
-    let wanted = Place::Wire as u64;
-    // Without a limit the system tells none.
-    let allowed = getrlimit(Resource::Rtprio).current.is_none_or(|most| most >= wanted);
-
-    if allowed || has(CapabilitySet::SYS_NICE) {
+    if may_run_first() {
         return Finding::well(REAL_TIME, "Other programs cannot delay the focus.");
     }
     Finding::advice(
@@ -54,7 +47,7 @@ pub fn real_time() -> Finding {
 
 /// Whether the server's memory may be kept from being swapped out.
 pub fn memory() -> Finding {
-    if getrlimit(Resource::Memlock).current.is_none() || has(CapabilitySet::IPC_LOCK) {
+    if may_lock_memory() {
         return Finding::well(MEMORY, "The server's memory stays in the machine's memory.");
     }
     Finding::advice(
@@ -73,8 +66,4 @@ pub fn videos() -> Finding {
         return Finding::well(VIDEOS, "The program ffmpeg is there.");
     }
     Finding::advice(VIDEOS, "The program ffmpeg is missing.", "Videos need it: apt-get install ffmpeg")
-}
-
-fn has(capability: CapabilitySet) -> bool {
-    capabilities(None).is_ok_and(|sets| sets.effective.contains(capability))
 }
