@@ -13,6 +13,12 @@ pub enum AccountError {
     /// The passphrase that was asked for once more is wrong.
     #[error("This is not your passphrase. Nothing was changed; try again.")]
     WrongConfirmation,
+    /// A lead set the passphrase, and the person has to choose another.
+    #[error(
+        "A lead set this passphrase. Choose one that only you know, on the page /sign-in: then only you can sign with \
+         your name."
+    )]
+    ChooseAnother,
     /// Too many attempts failed.
     #[error("Too many attempts failed. Wait {seconds} seconds, then try again.")]
     TooMany {

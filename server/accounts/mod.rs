@@ -18,10 +18,14 @@ pub use throttle::Peer;
 pub use token::Token;
 
 use crate::clock::Clock;
-use crate::store::{AccountBook, AccountEvent, FailedAttempt, PassphraseHash, Reader, Store, StoreError, StoredSignIn};
+use crate::store::{
+    AccountBook, AccountEvent, AccountLine, FailedAttempt, PassphraseHash, Reader, Store, StoreError, StoredAccount,
+    StoredSignIn,
+};
 use crate::trial::account::{
     Account, AccountChange, AccountName, AccountRole, IDLE_LIMIT, SIGN_IN_LIMIT, check_change, check_display,
 };
+use crate::trial::refusal::Refusal;
 use throttle::Throttle;
 
 /// A sign-in is noted as used at most so often: each note is a write to the disk.
@@ -75,6 +79,14 @@ impl Accounts {
     /// When the database failed.
     pub async fn all(&self) -> Result<Vec<Account>, AccountError> {
         Ok(self.reader().accounts().await?)
+    }
+
+    /// All accounts, by name, as a lead sees them.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn lines(&self) -> Result<Vec<AccountLine>, AccountError> {
+        Ok(self.reader().account_lines().await?)
     }
 
     /// Makes an account. `by`: the lead who makes it; none for the command line.
@@ -141,34 +153,63 @@ impl Accounts {
         Ok(self.book.replace_passphrase(name, &hash, by).await?)
     }
 
-    /// Signs a browser of `peer` in: its token, which is kept nowhere.
+    /// Signs a browser of `peer` in: its token, which is kept nowhere. Replaces the passphrase by `chosen` first, where
+    /// there is one.
     ///
     /// # Errors
-    /// When name and passphrase do not belong together, the account is disabled, there were too many failed attempts,
-    /// or the disk failed. The first two have the same words: nobody can find out who has an account.
-    pub async fn sign_in(&self, name: &str, passphrase: &str, peer: Peer) -> Result<(Account, Token), AccountError> {
+    /// When name and passphrase do not belong together, the account is disabled, a lead set the passphrase and the
+    /// person chose no other, there were too many failed attempts, or the disk failed. The first two have the same
+    /// words: nobody can find out who has an account.
+    pub async fn sign_in(
+        &self,
+        name: &str,
+        passphrase: &str,
+        chosen: Option<Passphrase>,
+        peer: Peer,
+    ) -> Result<(Account, Token), AccountError> {
         self.wait_for_turn(name, peer).await?;
 
         let found = match AccountName::new(name) {
             Ok(name) => self.reader().account(&name).await?,
             Err(_) => None,
         };
-        let fits = self.fits(passphrase, found.as_ref().map(|(_, hash)| hash)).await?;
+        let fits = self.fits(passphrase, found.as_ref().map(|found| &found.hash)).await?;
 
         match found {
-            Some((account, _)) if fits && !account.disabled => {
+            Some(StoredAccount { account, set_by_another, .. }) if fits && !account.disabled => {
                 self.throttle().succeeded(name, peer);
+                match chosen {
+                    Some(chosen) => self.choose_passphrase(&account.account, passphrase, chosen).await?,
+                    None if set_by_another => return Err(AccountError::ChooseAnother),
+                    None => {}
+                }
+
                 let token = Token::random()?;
                 self.book.sign_in(&account.account, &token.sha256()).await?;
                 Ok((account, token))
             }
             found => {
-                let account = found.map(|(account, _)| account);
+                let account = found.map(|found| found.account);
                 let attempt = if fits { FailedAttempt::Disabled } else { FailedAttempt::SignIn };
                 self.failed(name, account.as_ref(), attempt, peer).await?;
                 Err(AccountError::WrongPassphrase)
             }
         }
+    }
+
+    /// Replaces the passphrase `before` of whoever is signing in.
+    async fn choose_passphrase(
+        &self,
+        name: &AccountName,
+        before: &str,
+        chosen: Passphrase,
+    ) -> Result<(), AccountError> {
+        if chosen.is(before) {
+            let text = "the new passphrase is the one before; choose another".to_owned();
+            return Err(AccountError::Refused(Refusal::Invalid(text)));
+        }
+        let hash = self.hash(chosen).await?;
+        Ok(self.book.replace_passphrase(name, &hash, Some(name)).await?)
     }
 
     /// Checks the passphrase of whoever is signed in once more, before something that cannot be undone.
@@ -180,7 +221,7 @@ impl Accounts {
         self.wait_for_turn(name, peer).await?;
 
         let found = self.reader().account(&account.account).await?;
-        if self.fits(passphrase, found.as_ref().map(|(_, hash)| hash)).await? {
+        if self.fits(passphrase, found.as_ref().map(|found| &found.hash)).await? {
             self.throttle().succeeded(name, peer);
             return Ok(());
         }

@@ -50,6 +50,11 @@ impl Passphrase {
         )))
     }
 
+    /// Whether this is the passphrase `text`.
+    pub(super) fn is(&self, text: &str) -> bool {
+        text.nfc().eq(self.0.chars())
+    }
+
     pub(super) fn hash(&self, cost: Cost) -> Result<PassphraseHash, AccountError> {
         let mut salt = vec![0; SALT_BYTES];
         getrandom::fill(&mut salt).map_err(|error| AccountError::Storage(format!("no random numbers: {error}")))?;

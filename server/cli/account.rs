@@ -198,8 +198,9 @@ fn line(prompt: &str) -> Result<String, Failure> {
     let stdin = std::io::stdin();
     let mut line = String::new();
     if stdin.is_terminal() {
-        tell(format_args!("{prompt}"));
+        // Hidden before it is asked for: whoever types ahead is not shown either.
         let hidden = Hidden::begin()?;
+        tell(format_args!("{prompt}"));
         let read = stdin.lock().read_line(&mut line);
         drop(hidden);
         read?;

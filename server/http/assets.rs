@@ -26,6 +26,7 @@ macro_rules! assets {
 
 /// Every file of `web/static/`, by folder and name. A test compares this table with the folder.
 static ASSETS: &[Asset] = &assets![
+    "accounts/people.js",
     "accounts/sign_in.js",
     "operator/camera_card.js",
     "operator/camera_settings.js",

@@ -149,7 +149,7 @@ impl From<AccountError> for Error {
         match error {
             AccountError::WrongPassphrase | AccountError::WrongConfirmation => Self::Forbidden(text),
             AccountError::TooMany { .. } => Self::TooMany(text),
-            AccountError::Taken(_) => Self::Conflict(text),
+            AccountError::Taken(_) | AccountError::ChooseAnother => Self::Conflict(text),
             AccountError::Unknown(_) => Self::NotFound(text),
             AccountError::Refused(refusal) => ConductError::from(refusal).into(),
             AccountError::Storage(_) => Self::Storage(text),

@@ -1,5 +1,6 @@
 //! HTTP: routes, pages, streams, roles. Holds no trial rule.
 
+mod accounts;
 mod analysis;
 pub mod assets;
 mod camera;
@@ -70,6 +71,7 @@ pub fn router(app: AppState) -> Router {
     let (router, api) = OpenApiRouter::with_openapi(openapi::Document::openapi())
         .merge(roles::routes())
         .merge(sign_in::routes())
+        .merge(accounts::routes())
         .merge(surgeon::routes())
         .merge(voice::routes())
         .merge(operator::routes())

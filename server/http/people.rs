@@ -97,22 +97,27 @@ pub(super) trait Acting {
     }
 }
 
-/// The account of a lead who gave the passphrase once more, before something that cannot be undone.
+/// The account of a lead who is signed in.
+pub(super) fn lead(by: &impl Acting) -> Result<&Account, Error> {
+    let account = by.personally()?;
+    if account.role.leads() {
+        return Ok(account);
+    }
+    Err(Error::Forbidden(format!(
+        "Only a lead may do this; you are signed in as {}, {}. Ask a lead of the study.",
+        account.display, account.role
+    )))
+}
+
+/// The account of a lead who gave the passphrase once more, before something that matters to all others.
 pub(super) async fn confirmed_lead<'a>(
     app: &App,
     by: &'a impl Acting,
     passphrase: Option<&str>,
     peer: IpAddr,
 ) -> Result<&'a Account, Error> {
-    let account = by.personally()?;
-    if !account.role.leads() {
-        return Err(Error::Forbidden(format!(
-            "Only a lead locks and unblinds; you are signed in as {}, {}. Ask a lead of the study.",
-            account.display, account.role
-        )));
-    }
-
-    let missing = || Error::Invalid("Give your passphrase once more (passphrase): this cannot be undone.".to_owned());
+    let account = lead(by)?;
+    let missing = || Error::Invalid("Give your own passphrase once more (passphrase).".to_owned());
     let passphrase = passphrase.filter(|passphrase| !passphrase.is_empty()).ok_or_else(missing)?;
     app.accounts.confirm(account, passphrase, peer).await?;
     Ok(account)

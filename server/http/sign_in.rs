@@ -17,6 +17,7 @@ use super::json::JsonBody;
 use super::people::{From, SignedIn};
 use super::roles::home;
 use super::security::Nonce;
+use crate::accounts::{AccountError, Passphrase};
 use crate::trial::account::{Account, AccountRole, SIGN_IN_LIMIT};
 use crate::trial::role::Role;
 
@@ -62,6 +63,9 @@ struct SignIn {
     name: String,
     /// Its passphrase.
     passphrase: String,
+    /// The passphrase that replaces it from now on: needed where a lead set the present one.
+    #[serde(default)]
+    new_passphrase: Option<String>,
     /// Whether the answer is to hold the token, for a program, instead of setting a cookie.
     #[serde(default)]
     as_bearer: bool,
@@ -84,6 +88,8 @@ struct SignedInAs {
     (status = 200, description = "Signed in: a cookie, or a token where it was asked for", body = SignedInAs),
     (status = 403, description = "Name and passphrase do not belong together, the account is disabled, or another \
                                   site made the request", body = ErrorBody),
+    (status = 409, description = "A lead set this passphrase; the person has to choose another", body = ErrorBody),
+    (status = 422, description = "The new passphrase is too short, or the one before", body = ErrorBody),
     (status = 429, description = "Too many attempts failed", body = ErrorBody),
     (status = 507, description = "The disk failed", body = ErrorBody)))]
 async fn sign_in(
@@ -91,7 +97,8 @@ async fn sign_in(
     From(peer): From,
     JsonBody(wanted): JsonBody<SignIn>,
 ) -> Result<Response, Error> {
-    let (account, token) = app.accounts.sign_in(&wanted.name, &wanted.passphrase, peer).await?;
+    let chosen = wanted.new_passphrase.as_deref().map(Passphrase::new).transpose().map_err(AccountError::from)?;
+    let (account, token) = app.accounts.sign_in(&wanted.name, &wanted.passphrase, chosen, peer).await?;
     tracing::info!(account = %account.account, "signed in");
 
     let home = home(page_role(account.role));

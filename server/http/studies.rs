@@ -34,6 +34,13 @@ struct ListPage {
     studies: Vec<StudyLine>,
 }
 
+impl ListPage {
+    /// Whether whoever looks may make accounts.
+    fn leads(&self) -> bool {
+        self.person.as_ref().is_some_and(|account| account.role.leads())
+    }
+}
+
 /// The list of studies, and a form to plan one.
 #[utoipa::path(get, path = "/researcher/studies", tag = "researcher",
     responses((status = 200, description = "The page", content_type = "text/html")))]

@@ -36,7 +36,9 @@ mod voice;
 mod withdrawals;
 
 pub use accesses::{Access, Recorder};
-pub use accounts::{AccountBook, AccountEvent, FailedAttempt, PassphraseHash, StoredSignIn};
+pub use accounts::{
+    AccountBook, AccountEvent, AccountLine, FailedAttempt, PassphraseHash, StoredAccount, StoredSignIn,
+};
 pub use chain::Head;
 pub use consents::StoredConsent;
 pub use corrections::{Correction, Latest, StoredCorrection};

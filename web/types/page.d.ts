@@ -10,6 +10,8 @@ declare global {
   namespace Api {
     type Schemas = components["schemas"];
 
+    type AccountAction = Schemas["AccountAction"];
+    type AccountRole = Schemas["AccountRole"];
     type Action = Schemas["Action"];
     type Adjustable = Schemas["Adjustable"];
     type AnswerValue = Schemas["AnswerValue"];

@@ -4,6 +4,8 @@ mod book;
 mod reading;
 
 use jiff::Timestamp;
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::trial::account::{Account, AccountChange, AccountName, AccountRole};
 
@@ -20,6 +22,30 @@ pub struct PassphraseHash {
     pub salt: Vec<u8>,
     /// The hash.
     pub hash: Vec<u8>,
+}
+
+/// An account with what it signs in by.
+#[derive(Clone, PartialEq, Eq)]
+pub struct StoredAccount {
+    /// The account.
+    pub account: Account,
+    /// The hash of its passphrase.
+    pub hash: PassphraseHash,
+    /// Whether the account of somebody else set this passphrase.
+    pub set_by_another: bool,
+}
+
+/// An account as a lead sees it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct AccountLine {
+    /// The account.
+    #[serde(flatten)]
+    pub account: Account,
+    /// Whether a lead set its passphrase: the person then has to choose another to sign in.
+    pub set_by_another: bool,
+    /// When the person last signed in.
+    #[schema(value_type = Option<String>)]
+    pub last_signed_in: Option<Timestamp>,
 }
 
 /// A browser that is signed in.

@@ -1,12 +1,23 @@
 //! Accounts and sign-ins read back.
 
-use sqlx::Row;
+use std::collections::HashMap;
+
+use jiff::Timestamp;
+use sqlx::{AssertSqlSafe, Row};
 use sqlx::sqlite::SqliteRow;
 
-use super::{PassphraseHash, StoredSignIn};
+use super::{AccountLine, PassphraseHash, StoredAccount, StoredSignIn};
 use crate::store::values::parsed;
 use crate::store::{Reader, StoreError};
 use crate::trial::account::{Account, AccountName, AccountRole};
+
+/// Every column of an account, and whether somebody else's account set its passphrase: whoever made or replaced it last.
+/// The command line, where the person may have typed it, has no account.
+const ACCOUNT: &str = "SELECT accounts.*, (
+        SELECT done_by IS NOT NULL AND done_by <> account FROM account_events
+        WHERE account_events.account = accounts.account AND kind IN ('added', 'passphrase-replaced')
+        ORDER BY number DESC LIMIT 1
+    ) AS set_by_another FROM accounts";
 
 impl Reader {
     /// All accounts, by name.
@@ -18,6 +29,28 @@ impl Reader {
         rows.iter().map(account).collect()
     }
 
+    /// All accounts, by name, as a lead sees them.
+    ///
+    /// # Errors
+    /// When the database failed or holds what this version cannot read.
+    pub async fn account_lines(&self) -> Result<Vec<AccountLine>, StoreError> {
+        let signed_in = sqlx::query(
+            "SELECT account, max(wall) AS last_signed_in FROM account_events WHERE kind = 'signed-in' GROUP BY account",
+        );
+        let mut last: HashMap<String, Timestamp> = HashMap::new();
+        for row in signed_in.fetch_all(self.pool()).await? {
+            last.insert(row.try_get("account")?, parsed(&row, "last_signed_in")?);
+        }
+
+        let rows = sqlx::query(AssertSqlSafe(format!("{ACCOUNT} ORDER BY account"))).fetch_all(self.pool()).await?;
+        let line = |row: &SqliteRow| {
+            let account = account(row)?;
+            let last_signed_in = last.get(account.account.as_str()).copied();
+            Ok(AccountLine { account, set_by_another: set_by_another(row)?, last_signed_in })
+        };
+        rows.iter().map(line).collect()
+    }
+
     /// Whether somebody can sign in.
     ///
     /// # Errors
@@ -27,12 +60,12 @@ impl Reader {
         Ok(found.fetch_one(self.pool()).await?)
     }
 
-    /// The account of this name, with the hash of its passphrase.
+    /// The account of this name, with what it signs in by.
     ///
     /// # Errors
     /// When the database failed or holds what this version cannot read.
-    pub async fn account(&self, name: &AccountName) -> Result<Option<(Account, PassphraseHash)>, StoreError> {
-        let row = sqlx::query("SELECT * FROM accounts WHERE account = ?").bind(name.as_str());
+    pub async fn account(&self, name: &AccountName) -> Result<Option<StoredAccount>, StoreError> {
+        let row = sqlx::query(AssertSqlSafe(format!("{ACCOUNT} WHERE account = ?"))).bind(name.as_str());
         let Some(row) = row.fetch_optional(self.pool()).await? else { return Ok(None) };
 
         let bytes = |column: &str| -> Result<Vec<u8>, StoreError> {
@@ -45,7 +78,7 @@ impl Reader {
             salt: bytes("salt")?,
             hash: bytes("hash")?,
         };
-        Ok(Some((account(&row)?, hash)))
+        Ok(Some(StoredAccount { account: account(&row)?, hash, set_by_another: set_by_another(&row)? }))
     }
 
     /// The sign-in whose token has this SHA-256, if it was not ended. Whether it has expired is not looked at.
@@ -63,6 +96,10 @@ impl Reader {
         };
         row.as_ref().map(sign_in).transpose()
     }
+}
+
+fn set_by_another(row: &SqliteRow) -> Result<bool, StoreError> {
+    Ok(row.try_get::<Option<bool>, _>("set_by_another")?.unwrap_or(false))
 }
 
 fn account(row: &SqliteRow) -> Result<Account, StoreError> {

@@ -2,6 +2,7 @@
 //! do it; what reached the surgeon's browser; and a server killed again and again.
 
 mod aftermath;
+mod bad_day;
 mod blinding;
 mod by_hand;
 #[cfg(feature = "aravis")]
@@ -13,6 +14,7 @@ mod instruments;
 mod killed;
 mod lens_troubles;
 mod outbox;
+mod people_page;
 mod playback;
 mod proxy;
 mod recording_card;

@@ -1,10 +1,14 @@
 //! People on a real server: signing in and out, what a study asks of whom, and the surgeon's link to one session.
 
-use std::process::Command;
+use std::io::{Read, Write};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
 
 use reqwest::header::{COOKIE, SET_COOKIE};
 use reqwest::{Method, Response, StatusCode};
+use rustix::process::Signal;
 use serde_json::{Value, json};
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::{connect_async, tungstenite};
@@ -188,7 +192,7 @@ async fn a_study_opens_only_to_people_and_to_each_what_the_role_may() {
     let (code, said) =
         self::refused(&server, "researcher", &format!("/api/researcher/sessions/{session}/unblind"), unblind).await;
     assert!(
-        code == 403 && said.contains("Only a lead locks and unblinds; you are signed in as Dr Search, researcher"),
+        code == 403 && said.contains("Only a lead may do this; you are signed in as Dr Search, researcher"),
         "{said}"
     );
 
@@ -288,4 +292,196 @@ async fn closed(page: &mut Page) -> CloseCode {
             return frame.code;
         }
     }
+}
+
+/// A change of account `name` by the lead, whose passphrase is `passphrase`.
+async fn change(server: &Server, name: &str, mut change: Value, passphrase: &str) -> (u16, Value) {
+    change["passphrase"] = json!(passphrase);
+    let path = format!("/api/researcher/accounts/{name}/changes");
+    let (status, said) = ask(server, "researcher", Method::POST, &path, &change).await;
+    (status.as_u16(), serde_json::from_str(&said).unwrap())
+}
+
+#[tokio::test]
+async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
+    let mut server = Server::start();
+    sign_in_as_lead(&mut server).await;
+    let accounts = "/api/researcher/accounts";
+    let new = json!({"account": "n.op", "display": "Nurse Op", "role": "operator",
+                     "first_passphrase": "given by the lead", "passphrase": PASSPHRASE});
+
+    // Every field wrong in turn: a sentence, and no account.
+    for (field, wrong, code, expected) in [
+        ("account", "Nurse Op", 422, "lower-case letters"),
+        ("account", "lead", 409, "there is an account 'lead' already"),
+        ("display", " ", 422, "give the person's name"),
+        ("display", "Dr Lead", 409, "has the display name 'Dr Lead' already"),
+        ("role", "boss", 422, "boss"),
+        ("first_passphrase", "short", 422, "10 to 256 characters"),
+        ("passphrase", "not my passphrase", 403, "This is not your passphrase"),
+        ("passphrase", "", 422, "Give your own passphrase once more"),
+    ] {
+        let mut bad = new.clone();
+        bad[field] = json!(wrong);
+        let (status, said) = refused(&server, "researcher", accounts, bad).await;
+        assert_eq!(status, code, "{field}: {said}");
+        assert!(said.contains(expected), "{field}: {said}");
+    }
+    post(&server, "researcher", accounts, new).await;
+
+    // What the lead set opens nothing until the person has chosen another.
+    let given = json!({"name": "n.op", "passphrase": "given by the lead", "as_bearer": true});
+    let sign_in_with = async |chosen: Value| {
+        let mut body = given.clone();
+        body["new_passphrase"] = chosen;
+        let response = client().post(server.url("/api/sign-in")).json(&body).send().await.unwrap();
+        (response.status().as_u16(), response.json::<Value>().await.unwrap())
+    };
+    let (status, said) = sign_in_with(Value::Null).await;
+    assert!(status == 409 && said["error"].as_str().unwrap().contains("Choose one that only you know"), "{said}");
+    let (status, said) = sign_in_with(json!("given by the lead")).await;
+    assert!(status == 422 && said["error"].as_str().unwrap().contains("the one before"), "{said}");
+    let (status, said) = sign_in_with(json!("only I know this")).await;
+    assert!(status == 200 && said["token"].is_string(), "{said}");
+    assert_eq!(sign_in(&server, "n.op", "given by the lead").await.status(), StatusCode::FORBIDDEN);
+    assert_eq!(sign_in(&server, "n.op", "only I know this").await.status(), StatusCode::OK);
+
+    let (_, said) = ask(&server, "researcher", Method::GET, accounts, &Value::Null).await;
+    let lines: Value = serde_json::from_str(&said).unwrap();
+    assert!(!said.contains("hash") && !said.contains("salt"), "{said}");
+    assert_eq!((lines[1]["account"].as_str(), lines[1]["set_by_another"].as_bool()), (Some("n.op"), Some(false)));
+    assert!(lines[1]["last_signed_in"].is_string(), "{said}");
+
+    // The chain names who made the account, and who chose the passphrase.
+    let file = SqliteConnectOptions::new().filename(server.data.path().join("parfocal.db")).read_only(true);
+    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let sql = "SELECT kind, done_by FROM account_events WHERE account = 'n.op' ORDER BY number LIMIT 2";
+    let events: Vec<(String, String)> = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();
+    pool.close().await;
+    assert_eq!(events, [("added".to_owned(), "lead".to_owned()), ("passphrase-replaced".to_owned(), "n.op".to_owned())]);
+}
+
+#[tokio::test]
+async fn a_lead_changes_accounts_and_nobody_else_does() {
+    let mut server = Server::start();
+    let link = server.key("researcher").to_owned();
+    sign_in_as_lead(&mut server).await;
+    server.add_account("m", "monitor", "Monitor");
+    let token = server.sign_in("m").await;
+    let as_monitor = async |path: &str| server.get(path).bearer_auth(&token).send().await.unwrap().status().as_u16();
+    assert_eq!(as_monitor("/researcher").await, 200);
+
+    let (status, lines) = change(&server, "m", json!({"change": "role", "role": "operator"}), PASSPHRASE).await;
+    assert_eq!((status, lines[1]["role"].as_str()), (200, Some("operator")));
+    assert_eq!((as_monitor("/researcher").await, as_monitor("/operator").await), (403, 200), "at once");
+    assert_eq!(change(&server, "m", json!({"change": "sign-out"}), PASSPHRASE).await.0, 200);
+    assert_eq!(as_monitor("/operator").await, 403);
+
+    let reset = json!({"change": "passphrase", "first_passphrase": "for one sign-in"});
+    let (status, lines) = change(&server, "m", reset, PASSPHRASE).await;
+    assert_eq!((status, lines[1]["set_by_another"].as_bool()), (200, Some(true)));
+    assert_eq!(sign_in(&server, "m", "for one sign-in").await.status(), StatusCode::CONFLICT);
+    assert_eq!(change(&server, "m", json!({"change": "disable"}), PASSPHRASE).await.1[1]["disabled"], true);
+    assert_eq!(sign_in(&server, "m", "for one sign-in").await.status(), StatusCode::FORBIDDEN);
+    assert_eq!(change(&server, "m", json!({"change": "enable"}), PASSPHRASE).await.1[1]["disabled"], false);
+
+    for (name, wanted, passphrase, code, expected) in [
+        ("lead", json!({"change": "disable"}), PASSPHRASE, 409, "the last account that leads"),
+        ("nobody", json!({"change": "disable"}), PASSPHRASE, 404, "there is no account 'nobody'"),
+        ("No Body", json!({"change": "disable"}), PASSPHRASE, 404, "there is no account 'No Body'"),
+        ("m", json!({"change": "remove"}), PASSPHRASE, 422, "remove"),
+        ("m", json!({"change": "disable"}), "not my passphrase", 403, "This is not your passphrase"),
+    ] {
+        let (status, said) = change(&server, name, wanted, passphrase).await;
+        assert!(status == code && said["error"].as_str().unwrap().contains(expected), "{name}: {status} {said}");
+    }
+
+    // Neither the link nor a researcher's account opens the page or changes anything.
+    server.add_account("researcher", "researcher", "Dr Search");
+    let researcher = server.sign_in("researcher").await;
+    for (key, expected) in [(link, "acts under a personal account"), (researcher, "Only a lead may do this")] {
+        server.use_key("researcher", &key);
+        for path in ["/researcher/accounts", "/api/researcher/accounts"] {
+            let (status, said) = ask(&server, "researcher", Method::GET, path, &Value::Null).await;
+            assert!(status == StatusCode::FORBIDDEN && said.contains(expected), "{path}: {said}");
+        }
+        let (status, said) = change(&server, "m", json!({"change": "disable"}), PASSPHRASE).await;
+        assert!(status == 403 && said["error"].as_str().unwrap().contains(expected), "{said}");
+    }
+}
+
+#[tokio::test]
+async fn a_live_view_ends_when_its_account_is_disabled() {
+    let (_protocols, mut server) = server();
+    sign_in_as_lead(&mut server).await;
+    server.add_account("operator", "operator", "Nurse Op");
+    let token = server.sign_in("operator").await;
+    server.use_key("operator", &token);
+    let mut page = Page::open(&server, "operator").await;
+    page.watch(2).await;
+
+    assert_eq!(change(&server, "operator", json!({"change": "disable"}), PASSPHRASE).await.0, 200);
+    assert_eq!(closed(&mut page).await, CloseCode::from(4403));
+}
+
+/// Runs `parfocal account` with these arguments in a terminal of its own, typing `lines`, each once it is asked for.
+/// What the terminal showed.
+fn at_a_terminal(server: &Server, arguments: &str, lines: &[(&str, &str)]) -> String {
+    let program = env!("CARGO_BIN_EXE_parfocal");
+    let command = format!("{program} account {arguments} --data-dir {}", server.data.path().display());
+    let mut terminal = Command::new("script")
+        .args(["--quiet", "--return", "--flush", "--command", &command, "/dev/null"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut typed = terminal.stdin.take().unwrap();
+    let mut screen = terminal.stdout.take().unwrap();
+    let mut shown = String::new();
+    let mut bytes = [0; 256];
+
+    for (asked, line) in lines {
+        while !shown.contains(asked) {
+            let length = screen.read(&mut bytes).unwrap();
+            assert!(length > 0, "the command ended without asking for '{asked}': {shown}");
+            shown.push_str(&String::from_utf8_lossy(&bytes[..length]));
+        }
+        writeln!(typed, "{line}").unwrap();
+    }
+
+    screen.read_to_string(&mut shown).unwrap();
+    assert!(terminal.wait().unwrap().success(), "{shown}");
+    shown
+}
+
+#[test]
+fn a_terminal_shows_nothing_of_a_passphrase() {
+    let server = Server::start();
+    let typed = [("passphrase (10", "battery staple"), ("the same again", "battery staple")];
+    let shown = at_a_terminal(&server, "add lead --role lead", &typed);
+    assert!(shown.contains("account lead (lead): lead"), "{shown}");
+    assert!(!shown.contains("battery") && !shown.contains("staple"), "{shown}");
+}
+
+#[tokio::test]
+async fn a_restored_database_signs_nobody_in() {
+    let mut server = Server::start();
+    sign_in_as_lead(&mut server).await;
+    let token = server.key("researcher").to_owned();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let backup = elsewhere.path().join("backup.db");
+    let run = |arguments: &[&str]| {
+        let program = Command::new(env!("CARGO_BIN_EXE_parfocal")).args(arguments).output().unwrap();
+        assert!(program.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&program.stderr));
+    };
+
+    let (backup, folder) = (backup.to_str().unwrap(), server.data.path().to_str().unwrap().to_owned());
+    run(&["backup", "--out", backup, "--data-dir", &folder]);
+    assert!(server.end(Signal::TERM));
+    run(&["restore", backup, "--data-dir", &folder]);
+
+    let server = Server::on(Arc::clone(&server.data), &["--bind", "127.0.0.1:0"]);
+    let status = server.get("/researcher").bearer_auth(&token).send().await.unwrap().status();
+    assert_eq!(status, StatusCode::FORBIDDEN, "a stolen backup's sign-ins open nothing");
+    assert_eq!(sign_in(&server, "lead", PASSPHRASE).await.status(), StatusCode::OK);
 }

@@ -8,18 +8,23 @@ use std::sync::Arc;
 
 use tempfile::TempDir;
 
-/// A disk of a few megabytes, in memory; gone when dropped.
+/// A small disk in memory; gone when dropped.
 pub struct SmallDisk {
     /// Where it is mounted.
     pub folder: Arc<TempDir>,
 }
 
 impl SmallDisk {
-    /// A disk, or (said on standard error) none where this user may not mount one.
+    /// A disk of 4 megabytes, or (said on standard error) none where this user may not mount one.
     pub fn mount() -> Option<Self> {
+        Self::of_megabytes(4)
+    }
+
+    /// The same of `size` megabytes.
+    pub fn of_megabytes(size: u32) -> Option<Self> {
         let folder = Arc::new(tempfile::tempdir().unwrap());
-        let mounted =
-            Command::new("mount").args(["-t", "tmpfs", "-o", "size=4m,mode=777", "tmpfs"]).arg(folder.path()).output();
+        let options = format!("size={size}m,mode=777");
+        let mounted = Command::new("mount").args(["-t", "tmpfs", "-o", &options, "tmpfs"]).arg(folder.path()).output();
         match mounted {
             Ok(output) if output.status.success() => Some(Self { folder }),
             _ => {
