@@ -35,6 +35,7 @@ static ASSETS: &[Asset] = &assets![
     "operator/device_words.js",
     "operator/devices.js",
     "operator/focus_card.js",
+    "operator/now.js",
     "operator/orders.js",
     "operator/page.css",
     "operator/page.js",
@@ -44,6 +45,7 @@ static ASSETS: &[Asset] = &assets![
     "operator/session_words.js",
     "operator/surgeon_link.js",
     "operator/traces.js",
+    "offline/worker.js",
     "researcher/analysis.css",
     "researcher/correction_words.js",
     "researcher/corrections.js",
@@ -64,6 +66,7 @@ static ASSETS: &[Asset] = &assets![
     "researcher/voice.js",
     "shared/api.js",
     "shared/canvas.js",
+    "shared/contact.js",
     "shared/dialogs.js",
     "shared/dom.js",
     "shared/fit.js",
@@ -86,6 +89,7 @@ static ASSETS: &[Asset] = &assets![
     "shared/viewer.js",
     "shared/zooming.js",
     "surgeon/answers.js",
+    "surgeon/awake.js",
     "surgeon/choices.js",
     "surgeon/comment_box.js",
     "surgeon/comments.js",
@@ -95,9 +99,12 @@ static ASSETS: &[Asset] = &assets![
     "surgeon/drafts.js",
     "surgeon/holding.js",
     "surgeon/instrument_form.js",
+    "surgeon/last_view.js",
     "surgeon/microphone.js",
     "surgeon/notice.js",
     "surgeon/notice_dialog.js",
+    "surgeon/now.js",
+    "surgeon/offline.js",
     "surgeon/origin.js",
     "surgeon/outbox.js",
     "surgeon/over.js",
@@ -107,6 +114,7 @@ static ASSETS: &[Asset] = &assets![
     "surgeon/question_form.js",
     "surgeon/question_panel.js",
     "surgeon/questions.js",
+    "surgeon/storage_words.js",
     "surgeon/talk.js",
     "surgeon/talk_button.js",
     "surgeon/talk_keys.js",
@@ -136,6 +144,23 @@ pub fn url(name: &str) -> String {
     format!("/static/{}/{name}", *VERSION)
 }
 
+/// Hash of all files, as in their addresses.
+#[must_use]
+pub fn version() -> &'static str {
+    &VERSION
+}
+
+/// Addresses of all static files in `folder`.
+pub fn urls_in(folder: &str) -> impl Iterator<Item = String> {
+    ASSETS.iter().filter(move |asset| asset.name.split('/').next() == Some(folder)).map(|asset| url(asset.name))
+}
+
+/// What static file `name` holds; nothing where there is no such file.
+#[must_use]
+pub fn body(name: &str) -> Option<&'static [u8]> {
+    ASSETS.iter().find(|asset| asset.name == name).map(|asset| asset.body)
+}
+
 /// A static file: a script, a style sheet, an icon.
 #[utoipa::path(
     get,
@@ -157,10 +182,7 @@ async fn asset(
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     let name = format!("{folder}/{name}");
-    let asset = ASSETS
-        .iter()
-        .find(|asset| asset.name == name)
-        .ok_or_else(|| Error::NotFound(format!("There is no file {name}.")))?;
+    let body = body(&name).ok_or_else(|| Error::NotFound(format!("There is no file {name}.")))?;
 
     // A page of an older program asks by the older hash. It gets the present file, and must not keep it.
     let cache = if version == *VERSION { "public, max-age=31536000, immutable" } else { "no-cache" };
@@ -169,7 +191,7 @@ async fn asset(
     if headers.get(IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == etag.as_bytes()) {
         return Ok((StatusCode::NOT_MODIFIED, common).into_response());
     }
-    Ok((common, [(CONTENT_TYPE, content_type(&name))], asset.body).into_response())
+    Ok((common, [(CONTENT_TYPE, content_type(&name))], body).into_response())
 }
 
 fn content_type(name: &str) -> &'static str {

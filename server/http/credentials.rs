@@ -2,6 +2,7 @@
 
 use axum::http::HeaderMap;
 use axum::http::header::{AUTHORIZATION, COOKIE};
+use sha2::{Digest, Sha256};
 
 use super::keys::Keys;
 use crate::ids::SessionId;
@@ -39,6 +40,16 @@ pub(super) fn pass(headers: &HeaderMap, keys: &Keys) -> Option<Pass> {
         let shared = (keys.role_of(key) == Some(Role::Surgeon)).then_some(Pass::Shared);
         shared.or_else(|| keys.session_of(key).map(Pass::Session))
     })
+}
+
+/// A name of the link that gave `pass`: it opens nothing, and tells one link from another.
+pub(super) fn link_name(pass: Pass, keys: &Keys) -> String {
+    let token = match pass {
+        Pass::Shared => keys.token(Role::Surgeon),
+        Pass::Session(session) => keys.session_token(session),
+    };
+    let digest = Sha256::new().chain_update(b"parfocal link 1:").chain_update(token).finalize();
+    hex::encode(&digest[..8])
 }
 
 /// The cookie that shows `role`.

@@ -16,6 +16,8 @@ mod links;
 mod live;
 mod metrics;
 mod mjpeg;
+mod now;
+mod offline;
 mod openapi;
 mod operator;
 mod people;
@@ -73,6 +75,7 @@ pub fn router(app: AppState) -> Router {
         .merge(sign_in::routes())
         .merge(accounts::routes())
         .merge(surgeon::routes())
+        .merge(offline::routes())
         .merge(voice::routes())
         .merge(operator::routes())
         .merge(camera::routes())

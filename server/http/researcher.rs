@@ -13,12 +13,12 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::people::{Acting, From, SignedIn, confirmed_lead};
 use super::roles::{Researcher, Roles};
 use super::security::Nonce;
+use super::{AppState, now};
 use crate::autofocus::PolicyName;
 use crate::conductor::{AnswerLine, ConductError, SessionDetail, Timeline};
 use crate::ids::SessionId;
@@ -66,6 +66,13 @@ struct ListPage {
     chain: String,
     sessions: Vec<SessionLine>,
     practice: Vec<SessionLine>,
+}
+
+impl ListPage {
+    fn now(&self) -> &'static str {
+        let under_way = self.sessions.iter().any(|line| line.status == SessionStatus::UnderWay);
+        now::on_sessions(!self.sessions.is_empty(), under_way)
+    }
 }
 
 /// The list of sessions, practice apart.
@@ -133,6 +140,16 @@ impl SessionPage {
     /// The policy of `setting`, once the session was unblinded.
     fn policy(&self, setting: usize) -> Option<&PolicyName> {
         self.detail.unblinding.as_ref()?.policies.get(setting.wrapping_sub(1))
+    }
+
+    fn now(&self) -> &'static str {
+        let line = &self.detail.line;
+        now::on_session(now::Session {
+            status: line.status,
+            withdrawn: line.withdrawn,
+            unblinded: line.unblinded,
+            in_study: line.study.is_some(),
+        })
     }
 
     fn ended(&self) -> bool {

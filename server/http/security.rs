@@ -48,10 +48,11 @@ pub async fn headers(mut request: Request, next: Next) -> Response {
     let nonce = hex::encode(bytes);
     request.extensions_mut().insert(Nonce(nonce.clone()));
     let plays_sound = request.uri().path().starts_with(PLAYS_SOUND);
+    let opens_offline = request.uri().path() == OPENS_OFFLINE;
     let mut response = next.run(request).await;
 
     let headers = response.headers_mut();
-    if let Ok(policy) = HeaderValue::from_str(&content_security_policy(&nonce, plays_sound)) {
+    if let Ok(policy) = HeaderValue::from_str(&content_security_policy(&nonce, plays_sound, opens_offline)) {
         headers.insert(CONTENT_SECURITY_POLICY, policy);
     }
 
@@ -69,16 +70,20 @@ pub async fn headers(mut request: Request, next: Next) -> Response {
 /// Where the researcher's page of a session is, the only one that plays sound.
 const PLAYS_SOUND: &str = "/researcher/sessions/";
 
+/// The surgeon's page, the only one that a service worker keeps.
+const OPENS_OFFLINE: &str = "/surgeon";
+
 /// What a page may not use of the device. The surgeon's page takes the microphone back where the protocol asks for
 /// voice.
 const PERMISSIONS: &str = "camera=(), display-capture=(), geolocation=(), microphone=()";
 
-fn content_security_policy(nonce: &str, plays_sound: bool) -> String {
+fn content_security_policy(nonce: &str, plays_sound: bool, opens_offline: bool) -> String {
     let media = if plays_sound { "media-src 'self'; " } else { "" };
+    let worker = if opens_offline { "'self'" } else { "'none'" };
     format!(
         "default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'nonce-{nonce}'; \
-         img-src 'self' blob: data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; {media}form-action 'self'; \
-         base-uri 'none'; frame-ancestors 'none'"
+         img-src 'self' blob: data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; {media}worker-src {worker}; \
+         form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
     )
 }
 

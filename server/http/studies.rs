@@ -8,12 +8,12 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::people::{Acting, From, SignedIn, confirmed_lead};
 use super::roles::Researcher;
 use super::security::Nonce;
+use super::{AppState, now};
 use crate::conductor::{ConductError, StudyDetail, StudyLine, StudySession};
 use crate::trial::account::Account;
 use crate::trial::allocation::Order;
@@ -38,6 +38,10 @@ impl ListPage {
     /// Whether whoever looks may make accounts.
     fn leads(&self) -> bool {
         self.person.as_ref().is_some_and(|account| account.role.leads())
+    }
+
+    const fn now(&self) -> &'static str {
+        now::on_studies(self.has_accounts, self.person.is_some())
     }
 }
 
@@ -75,6 +79,10 @@ impl StudyPage {
     /// Whether whoever looks may change the study.
     fn may_change(&self) -> bool {
         self.person.as_ref().is_some_and(|account| account.role.may_act_as(Role::Researcher, true))
+    }
+
+    fn now(&self) -> &'static str {
+        now::on_study(self.detail.line.stage, self.leads())
     }
 
     /// The stage's name, for the page's script.

@@ -5,17 +5,19 @@ use std::sync::Arc;
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{Html, IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::AppState;
+use super::credentials::{link_name, pass};
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
+use super::offline::PAGE_VERSION;
 use super::roles::{Surgeon, SurgeonsTablet};
 use super::security::{Nonce, PERMISSIONS_POLICY, WITH_MICROPHONE};
+use super::{AppState, assets};
 use crate::ids::SessionId;
 use crate::trial::action::Action;
 use crate::trial::remark::{Holding, NewAnswer, NewComment};
@@ -28,6 +30,8 @@ struct Page {
     nonce: String,
     /// Whether the page may ask for the microphone.
     microphone: bool,
+    /// Which link let the tablet in: what the browser keeps of one is not shown under another.
+    link: String,
 }
 
 #[derive(Template)]
@@ -45,6 +49,7 @@ async fn page(
     surgeon: Result<Surgeon, Error>,
     State(app): State<AppState>,
     Nonce(nonce): Nonce,
+    headers: HeaderMap,
 ) -> Result<Response, Error> {
     // A tablet that is not let in any more still hands over what it holds.
     if let Err(error) = surgeon {
@@ -54,8 +59,10 @@ async fn page(
     }
 
     let microphone = app.surgeon_view.borrow().as_ref().is_some_and(|view| view.voice);
-    let html = Page { nonce, microphone }.render().map_err(|_| Error::Internal)?;
+    let link = pass(&headers, &app.keys).map(|pass| link_name(pass, &app.keys)).unwrap_or_default();
+    let html = Page { nonce, microphone, link }.render().map_err(|_| Error::Internal)?;
     let mut response = Html(html).into_response();
+    response.headers_mut().insert(PAGE_VERSION, HeaderValue::from_static(assets::version()));
     if microphone {
         response.headers_mut().insert(PERMISSIONS_POLICY, WITH_MICROPHONE);
     }

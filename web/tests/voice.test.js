@@ -91,7 +91,7 @@ test("without a network everything stays on the device and lands in order, over 
   await settle();
   assert.equal(page.store.kept.size, 2);
   assert.equal(outbox.waiting, 1, "one recording, however many pieces");
-  assert.match(outbox.status.text, /1 recording is not saved yet\. Kept on this device\. No connection/);
+  assert.match(outbox.status.text, /Saved here, not sent yet: 1 recording\. No connection/);
 
   // The page is loaded again, and the network is back.
   page.answers.length = 0;
@@ -130,7 +130,7 @@ test("a device without room says so, and sends all the same", async () => {
   const comment = outbox.begin(PLACE, page.origins.stamp());
   await settle();
   assert.equal(outbox.durable, false);
-  assert.match(outbox.status.text, /Kept on this page only: do not close it/);
+  assert.match(outbox.status.text, /Kept on this page only, so do not close it/);
 
   add(outbox, comment, 1);
   await settle();

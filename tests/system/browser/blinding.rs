@@ -125,6 +125,21 @@ pub fn check(connections: &[Connection]) -> Seen {
         }
     }
 
+    finish(seen)
+}
+
+/// Checks what a browser keeps to open a page without a network: each with its address and headers. The one entry that
+/// is no answer of the server's is the session as it was last told, JSON.
+pub fn check_kept(kept: &[(String, String, Vec<u8>)], last_told: &Value) -> Seen {
+    let mut seen = Seen::default();
+    for (path, head, body) in kept {
+        answer(&mut seen, path, head, body);
+    }
+    json(&mut seen, &last_told.to_string());
+    finish(seen)
+}
+
+fn finish(seen: Seen) -> Seen {
     let ids: Vec<_> = seen.segments.values().flatten().collect();
     assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), ids.len(), "two settings share an id: {:?}", seen.segments);
     assert!(seen.segments.values().all(|ids| ids.len() == 1), "a setting changed its id: {:?}", seen.segments);

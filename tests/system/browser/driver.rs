@@ -7,7 +7,7 @@ use std::net::{Ipv4Addr, TcpStream};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
-use fantoccini::actions::{InputSource, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
+use fantoccini::actions::{InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
 use fantoccini::elements::Element;
 use fantoccini::error::CmdError;
 use fantoccini::key::Key;
@@ -67,12 +67,21 @@ impl Driver {
 
     /// The same, with these options of Chromium.
     pub async fn browser_with(&self, options: &[String]) -> Browser {
+        self.browser_as(options, json!({})).await
+    }
+
+    /// A browser of somebody who has set text to twice its usual size.
+    pub async fn browser_with_large_text(&self) -> Browser {
+        self.browser_as(&[], json!({ "webkit.webprefs.default_font_size": 32 })).await
+    }
+
+    async fn browser_as(&self, options: &[String], preferences: Value) -> Browser {
         let profile = tempfile::tempdir().unwrap();
         let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
         arguments.extend_from_slice(options);
         arguments.push(format!("--user-data-dir={}", profile.path().display()));
         let wanted = json!({
-            "goog:chromeOptions": { "args": arguments },
+            "goog:chromeOptions": { "args": arguments, "prefs": preferences },
             "goog:loggingPrefs": { "browser": "ALL" },
         });
 
@@ -261,6 +270,13 @@ impl Browser {
             element.send_keys(text).await.is_ok()
         })
         .await;
+    }
+
+    /// Presses and lets go `key`, wherever the focus is.
+    pub async fn press(&self, key: char) {
+        let keys = KeyActions::new("keyboard".to_owned());
+        let keys = keys.then(KeyAction::Down { value: key }).then(KeyAction::Up { value: key });
+        self.client.perform_actions(keys).await.unwrap();
     }
 
     /// Empties the field.

@@ -31,16 +31,16 @@ async fn what_a_full_disk_refuses_stays_on_the_tablet_and_is_saved_later() {
             surgeon.paste("#comment", &text).await;
             surgeon.click("#send").await;
             until("an answer", || async { surgeon.text("#comment-state").await != "Saving…" }).await;
-            surgeon.text("#comment-state").await.contains("kept on this device")
+            surgeon.text("#comment-state").await.contains("Saved here")
         }
     })
     .await;
 
-    surgeon.sees("#comment-state", "1 comment is not saved yet").await;
+    surgeon.sees("#comment-state", "Saved here, not sent yet: 1 comment").await;
     surgeon.sees("#comment-state", "the disk is full").await;
     shoot(surgeon, "surgeon-13-full-disk").await;
     surgeon.reload().await;
-    surgeon.sees("#comment-state", "kept on this device").await;
+    surgeon.sees("#comment-state", "Saved here").await;
     disk.empty();
     theatre.sees_saved(said.len()).await;
 

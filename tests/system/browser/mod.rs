@@ -1,6 +1,7 @@
 //! A whole blinded trial in real browsers on the real server, as surgeon, operator and researcher
 //! do it; what reached the surgeon's browser; and a server killed again and again.
 
+mod accessible;
 mod aftermath;
 mod bad_day;
 mod blinding;
@@ -11,8 +12,11 @@ mod course;
 pub mod driver;
 mod full_disk;
 mod instruments;
+mod keyboard;
 mod killed;
+mod large_text;
 mod lens_troubles;
+mod offline;
 mod outbox;
 mod people_page;
 mod playback;

@@ -25,6 +25,8 @@ pub struct Proxy {
     recordings: Arc<Mutex<Vec<Recording>>>,
     /// Connections from before the number was raised pass nothing on.
     broken: watch::Sender<u64>,
+    /// Whether the network swallows everything.
+    dark: watch::Sender<bool>,
 }
 
 impl Proxy {
@@ -35,24 +37,34 @@ impl Proxy {
         let recordings = Arc::<Mutex<Vec<Recording>>>::default();
         let all = Arc::clone(&recordings);
         let (broken, breaks) = watch::channel(0);
+        let (dark, darkness) = watch::channel(false);
         tokio::spawn(async move {
             while let Ok((browser, _)) = listener.accept().await {
                 let recording = Recording::default();
                 all.lock().unwrap().push(Arc::clone(&recording));
                 let mut breaks = breaks.clone();
                 breaks.mark_unchanged();
+                let mut darkness = darkness.clone();
                 tokio::spawn(async move {
+                    if *darkness.borrow() {
+                        until_dark_is(false, &mut darkness).await;
+                        return;
+                    }
+
                     let mut link = std::pin::pin!(pass(browser, server, recording));
                     tokio::select! {
-                        () = &mut link => {}
+                        () = &mut link => return,
                         // Neither end is told, and neither hears anything more.
                         _ = breaks.changed() => std::future::pending().await,
+                        () = until_dark_is(true, &mut darkness) => {}
                     }
+                    // Nor does either hear anything here, until there is light again: then the connection is lost.
+                    until_dark_is(false, &mut darkness).await;
                 });
             }
         });
 
-        Self { address, recordings, broken }
+        Self { address, recordings, broken, dark }
     }
 
     /// Breaks every connection there is, as walking out of the network's reach does: without a word.
@@ -60,9 +72,25 @@ impl Proxy {
         self.broken.send_modify(|count| *count += 1);
     }
 
+    /// From now on swallows everything, on connections there are and on new ones: the tablet is out of reach.
+    pub fn go_dark(&self) {
+        self.dark.send_replace(true);
+    }
+
+    /// The tablet is in reach again. Connections from the time out of reach are lost.
+    pub fn come_back(&self) {
+        self.dark.send_replace(false);
+    }
+
     /// Everything so far, a connection each.
     pub fn recorded(&self) -> Vec<Connection> {
         self.recordings.lock().unwrap().iter().map(|recording| recording.lock().unwrap().clone()).collect()
+    }
+}
+
+async fn until_dark_is(dark: bool, darkness: &mut watch::Receiver<bool>) {
+    if darkness.wait_for(|is_dark| *is_dark == dark).await.is_err() {
+        std::future::pending::<()>().await;
     }
 }
 

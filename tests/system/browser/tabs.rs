@@ -60,7 +60,7 @@ async fn an_answer_that_a_tablet_held_does_not_replace_a_newer_one_of_another() 
     surgeon.sees("#panel h2", "a few questions").await;
     surgeon.cut("/answers").await;
     theatre.choose("sharpness", 3).await;
-    surgeon.sees("[data-question=sharpness] > .state", "Kept on this device").await;
+    surgeon.sees("[data-question=sharpness] > .state", "Saved here").await;
     other.click("input[name=sharpness][value='5']").await;
     other.sees("[data-question=sharpness] > .state", "Saved").await;
 

@@ -82,6 +82,12 @@ impl Theatre {
 
     /// The operator prepares a session of `participant`, who is new, by `protocol`, and starts it.
     pub async fn begin(&self, participant: &str, protocol: &str) {
+        self.prepare(participant, protocol).await;
+        self.operator.click("#session-actions .primary").await;
+    }
+
+    /// The operator prepares a session of `participant`, who is new, by `protocol`.
+    pub async fn prepare(&self, participant: &str, protocol: &str) {
         let operator = &self.operator;
         // The page may still be growing above the button, so that a click meets something else.
         until("the dialog for a new participant", || async {
@@ -97,7 +103,6 @@ impl Theatre {
         operator.select("#protocol", protocol).await;
         operator.click("#new-session [type=submit]").await;
         operator.sees("#phase", "Ready to start").await;
-        operator.click("#session-actions .primary").await;
     }
 
     /// The operator gives `reason` in the dialog that asks for one, and goes on.

@@ -180,7 +180,7 @@ async fn fifth_setting_killed_server(theatre: &mut Theatre) {
     kill(&mut theatre.server);
     theatre.write("Said while it was away").await;
     theatre.surgeon.click("#send").await;
-    theatre.surgeon.sees("#comment-state", "kept on this device").await;
+    theatre.surgeon.sees("#comment-state", "Saved here").await;
 
     theatre.surgeon.click("#finish").await;
     until("the server not to answer", || async {

@@ -247,7 +247,7 @@ async fn what_is_said_while_the_server_is_dead_is_kept_here_and_lands_once() {
     hold(&theatre.surgeon).await;
     theatre.surgeon.sees("#talk-label", "Recording 0:02").await;
     kill(&mut theatre.server);
-    theatre.surgeon.sees("#voice-state", "1 recording is not saved yet. Kept on this device.").await;
+    theatre.surgeon.sees("#voice-state", "Saved here, not sent yet: 1 recording.").await;
     theatre.surgeon.sees("#talk-label", "Recording 0:0").await;
     shoot(&theatre.surgeon, "surgeon-voice-3-no-server").await;
 
@@ -259,6 +259,30 @@ async fn what_is_said_while_the_server_is_dead_is_kept_here_and_lands_once() {
     theatre.sees_saved(1).await;
     let kept = recorded(&theatre).await;
     assert!(kept[0].1 >= 4, "{kept:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_loaded_again_while_the_server_is_dead_still_holds_what_was_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let driver = Driver::start();
+    let mut theatre = speaking(&driver, &folder).await;
+    theatre.surgeon.keeps_page().await;
+    hold(&theatre.surgeon).await;
+    theatre.surgeon.sees("#talk-label", "Recording 0:02").await;
+    kill(&mut theatre.server);
+    theatre.surgeon.sees("#talk-label", "Recording 0:04").await;
+    let_go(&theatre.surgeon).await;
+    theatre.surgeon.sees("#voice-state", "Saved here, not sent yet: 1 recording.").await;
+
+    theatre.surgeon.reload().await;
+    theatre.surgeon.sees("#now", "No server since").await;
+    theatre.surgeon.sees("#voice-state", "Saved here, not sent yet: 1 recording.").await;
+    assert!(!theatre.surgeon.is("#talk", "disabled").await, "the page may still use the microphone");
+
+    start_again(&mut theatre.server);
+    until_recorded(&theatre, 1).await;
+    all_pieces(&theatre).await;
+    theatre.sees_saved(1).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,7 +1,8 @@
 // The operator's page: the devices, and the session from preparing it to its end.
 
 import { get } from "../shared/api.js";
-import { byId } from "../shared/dom.js";
+import { Contact } from "../shared/contact.js";
+import { byId, setText } from "../shared/dom.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
 import "../shared/sign_in.js";
@@ -11,6 +12,7 @@ import { drawCamera } from "./camera_card.js";
 import { followChoices } from "./choices.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
+import { nowWords } from "./now.js";
 import { followRecording } from "./recording_card.js";
 import { SessionCard } from "./session_card.js";
 import { followLink, offerLink } from "./surgeon_link.js";
@@ -30,6 +32,9 @@ let session = null;
 let status = null;
 let framesWithoutBelief = BELIEF_FRAMES;
 
+/** Whether the server has said what is under way. */
+let known = false;
+const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
 const viewer = new Viewer(byId("view"), "operator");
 const traces = new Traces(byId("traces"));
 const followAnswer = unlessOvertaken(viewer.live, followSession);
@@ -40,9 +45,22 @@ const refreshChoices = followChoices(redrawFocus, followAnswer);
 function followSession(next) {
   if (session && !next) refreshChoices();
   session = next;
+  known = true;
   sessionCard.follow(session);
   followLink(session);
   redrawFocus();
+  drawNow();
+}
+
+function drawNow() {
+  const facts = {
+    view: session,
+    known,
+    missed: contact.isMissed,
+    heardAt: contact.heardAt,
+    working: status === null || (status.camera.working && status.lens.working),
+  };
+  setText(byId("now"), nowWords(facts));
 }
 
 /** @param {Stream.OperatorStatus} next */
@@ -67,15 +85,18 @@ function followFrame({ header, receivedAt }) {
 }
 
 viewer.live.listen({
+  heard: () => contact.heard(),
   frame: followFrame,
   session: followSession,
   status: followStatus,
   connection: (open) => {
     if (!open) {
+      contact.lost();
       // Where the sign-in has ended, the answer to this asks for it; a connection cannot.
       get("/api/operator/session").catch(() => {});
       return;
     }
+    contact.heard();
     serverAnswered();
     refreshChoices();
   },
@@ -89,5 +110,8 @@ followOverlayBoxes((name, on) => {
 offerLink();
 document.addEventListener("signed-in", () => followLink(session));
 followRecording();
-setInterval(() => sessionCard.drawTime(), TICK_MS);
+setInterval(() => {
+  sessionCard.drawTime();
+  drawNow();
+}, TICK_MS);
 refreshChoices();

@@ -18,6 +18,7 @@ const SCREEN_MS = 150;
  * @property {(frame: Stream.Frame) => void} [frame]
  * @property {(view: any) => void} [session] the session's view, or null
  * @property {(status: any) => void} [status] the devices' state
+ * @property {() => void} [heard] the server said something, whatever it was
  * @property {(open: boolean) => void} [connection]
  * @property {() => void} [over] the page's link opens nothing any more; no connection is tried again
  */
@@ -107,6 +108,7 @@ export class Live {
     socket.onmessage = ({ data }) => {
       if (socket !== this.#socket) return;
       this.#reconnection.heard(performance.now());
+      for (const listener of this.#listeners) listener.heard?.();
       if (typeof data === "string") this.#hear(JSON.parse(data));
       else this.#show(socket, data);
     };

@@ -12,6 +12,15 @@ export function clockText(seconds, round = Math.floor) {
 }
 
 /**
+ * The time of day as `14:02`.
+ *
+ * @param {number} millis since 1970
+ */
+export function minuteText(millis) {
+  return new Date(millis).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
+}
+
+/**
  * `1 comment`, `2 comments`.
  *
  * @param {number} count

@@ -3,6 +3,7 @@
 // another tab is offered, not shown.
 
 import { counted } from "../shared/text.js";
+import { heldWords } from "./words.js";
 
 export const PATH = "/api/surgeon/comments";
 
@@ -251,12 +252,7 @@ export class Comments {
 
     const { trouble, durable } = this.#outbox;
     if (trouble === null) return { kind: "saving", text: "Saving…" };
-    const unsaved =
-      waiting === 1
-        ? "1 comment is not saved yet. It is kept on this"
-        : `${waiting} comments are not saved yet. They are kept on this`;
-    const kept = durable ? "device." : "page: do not close it.";
-    return { kind: "unsaved", text: `${unsaved} ${kept} ${trouble}` };
+    return { kind: "unsaved", text: `${heldWords(counted(waiting, "comment"), durable)} ${trouble}` };
   }
 }
 

@@ -4,8 +4,10 @@ import { keep, keepAudio } from "../shared/api.js";
 import { storeOn } from "../shared/storage.js";
 import { uuid } from "../shared/uuid.js";
 import { Drafts } from "./drafts.js";
+import { LastView } from "./last_view.js";
 import { Origins } from "./origin.js";
 import { Outbox } from "./outbox.js";
+import { storageAdvice } from "./storage_words.js";
 import { VoiceOutbox } from "./voice_outbox.js";
 import { voiceStoreOn } from "./voice_store.js";
 
@@ -13,11 +15,15 @@ const TAB = "parfocal.tab";
 
 const store = storeOn(() => localStorage);
 const tabStore = storeOn(() => sessionStorage);
-const clock = { page: () => performance.now(), wall: () => Date.now() };
+export const clock = { page: () => performance.now(), wall: () => Date.now() };
 const tab = tabStore.read(TAB) ?? uuid();
 
 export const origins = new Origins(store, clock, uuid);
 export const drafts = new Drafts(store, origins, uuid, tab);
+export const lastView = new LastView(store, document.body.dataset.link ?? "", clock.wall);
+
+/** What to do where this browser keeps nothing; empty where it keeps things. */
+export const storage = storageAdvice(store);
 
 /**
  * Runs `run` after `ms`; returns what cancels that.

@@ -2,22 +2,37 @@
 // whatever is being tried.
 
 import { get, post, Refused } from "../shared/api.js";
+import { Contact } from "../shared/contact.js";
 import { byId, make, setText } from "../shared/dom.js";
 import { unlessOvertaken } from "../shared/live.js";
 import { followOverlayBoxes } from "../shared/overlay_boxes.js";
 import { serverAnswered, tell, tellTrouble } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
 import { PATH as ANSWERS, placeOf, sendLeftAnswers, slotOf } from "./answers.js";
+import { Awake, screenLock } from "./awake.js";
 import { commentBox } from "./comment_box.js";
 import { Comments } from "./comments.js";
 import { askForSecondPress } from "./confirm_button.js";
-import { drafts, later, openOutbox, openVoiceOutbox, origins, reloadForMicrophone } from "./device.js";
+import {
+  clock,
+  drafts,
+  lastView,
+  later,
+  openOutbox,
+  openVoiceOutbox,
+  origins,
+  reloadForMicrophone,
+  storage,
+} from "./device.js";
 import { Holding } from "./holding.js";
 import { record } from "./microphone.js";
 import { noticeDialog } from "./notice_dialog.js";
+import { nowWords } from "./now.js";
+import { forgetPage, keepPage } from "./offline.js";
 import { card, showPanel } from "./panel.js";
 import { QuestionPanel } from "./question_panel.js";
 import { onTopOf } from "./questions.js";
+import { keepStorage } from "./storage_words.js";
 import { Talk } from "./talk.js";
 import { talkButton } from "./talk_button.js";
 import { headline, isEnded, readyWords, savedWords, simulatedWords, steps, timeLeft } from "./words.js";
@@ -28,7 +43,7 @@ const TICK_MS = 250;
 
 /** @type {View | null} */
 let state = null;
-/** Whether the server has said what is under way. */
+/** Whether it is known what is under way: the server has said it, or an earlier load of this page has kept it. */
 let known = false;
 /** When the setting's time ends, by the page's clock. @type {number | null} */
 let endsAt = null;
@@ -37,6 +52,7 @@ let questionPanel = null;
 let panelDrawn = "";
 
 const outbox = openOutbox();
+const contact = new Contact(clock, lastView.read()?.heardAt ?? null);
 const viewer = new Viewer(byId("view"), "surgeon");
 const comments = new Comments(outbox, drafts, here);
 const box = commentBox(comments, outbox);
@@ -64,6 +80,11 @@ const holding = new Holding({
 const notice = noticeDialog(byId("comment", HTMLTextAreaElement), (segment) =>
   act({ action: "acknowledge", segment }),
 );
+const awake = new Awake({
+  request: screenLock(),
+  isVisible: () => !document.hidden,
+  changed: () => drawPanel(),
+});
 const forgetFirstPress = askForSecondPress(byId("finish"), byId("finish-heard"), () => {
   if (state?.segment) act({ action: "finish-segment", segment: state.segment });
 });
@@ -77,14 +98,30 @@ function here() {
 
 /* State in */
 
+/**
+ * The server told what is under way.
+ *
+ * @param {View | null} next
+ */
+function followServer(next) {
+  lastView.keep(next);
+  if (next && !state) keepStorage();
+  if (next?.voice && !mayRecord && !comments.unsent && reloadForMicrophone(next.session)) return;
+  follow(next);
+}
+
+/** The page was loaded while the server is not heard: it shows the session as it was last told. */
+function followLastView() {
+  const last = known ? null : lastView.read();
+  if (last) follow(last.view);
+}
+
 /** @param {View | null} next */
 function follow(next) {
   known = true;
   state = next;
   const seconds = next?.remaining_seconds;
   endsAt = seconds == null ? null : performance.now() + seconds * 1000;
-
-  if (state?.voice && !mayRecord && !comments.unsent && reloadForMicrophone(state.session)) return;
 
   drawBar();
   box.follow(state);
@@ -94,18 +131,21 @@ function follow(next) {
   sendLeftAnswers(outbox, drafts, state);
   if (state) questionPanel?.takeAnswers(state);
   holding.follow(state);
+  awake.follow(state);
+  drawNow();
 
   if (state?.phase === "notice" && !state.paused) notice.show(state);
   else notice.hide();
 }
 
-const followAnswer = unlessOvertaken(viewer.live, follow);
+const followAnswer = unlessOvertaken(viewer.live, followServer);
 
 async function refresh() {
   try {
     await followAnswer(get("/api/surgeon/session"));
   } catch (error) {
-    tellTrouble(byId("trouble"), error);
+    // A server that does not answer is told of at the top, and asked again by the connection.
+    if (error instanceof Refused) tell(byId("trouble"), error.message);
   }
 }
 
@@ -166,6 +206,18 @@ function drawTime() {
   setText(byId("remaining"), timeLeft(state, left));
 }
 
+function drawNow() {
+  const facts = {
+    view: state,
+    known,
+    missed: contact.isMissed,
+    heardAt: contact.heardAt,
+    unsent: comments.unsent,
+    unsaved: outbox.waiting.length + voice.waiting > 0,
+  };
+  setText(byId("now"), nowWords(facts));
+}
+
 /** @param {Stream.SurgeonStatus} status */
 function followStatus(status) {
   const simulated = simulatedWords(status);
@@ -179,7 +231,7 @@ function followStatus(status) {
 function drawPanel() {
   const { session, phase, paused, segment, questions, may_resume: mayResume } = state ?? {};
   const words = isEnded(state) ? kept() : mayResume ? saved() : "";
-  const key = JSON.stringify([known, session, phase, paused, segment, questions, mayResume, words]);
+  const key = JSON.stringify([known, session, phase, paused, segment, questions, mayResume, words, advice()]);
   if (key === panelDrawn) return;
   panelDrawn = key;
   questionPanel = null;
@@ -196,7 +248,7 @@ function panelContent() {
 
   switch (state.phase) {
     case "ready":
-      return card("aside", state.title, readyWords(state));
+      return card("aside", state.title, [readyWords(state), ...advice()].join(" "));
     case "questions":
       return questions(state, `Setting ${state.setting}: a few questions`);
     case "closing":
@@ -208,6 +260,11 @@ function panelContent() {
     default:
       return null;
   }
+}
+
+/** What to see to before the trial starts, where the browser does not see to it. */
+function advice() {
+  return [awake.advice, storage].filter((words) => words !== "");
 }
 
 function kept() {
@@ -271,15 +328,21 @@ byId("comment").addEventListener("input", () => {
 });
 
 viewer.live.listen({
-  session: follow,
+  heard: () => contact.heard(),
+  session: followServer,
   status: followStatus,
   // The session is over for this tablet. What it holds is still sent, and the server says the rest.
   over: () => {
-    follow(null);
+    forgetPage();
+    followServer(null);
     refresh();
   },
   connection: (open) => {
-    if (!open) return;
+    if (!open) {
+      contact.lost();
+      return;
+    }
+    contact.heard();
     outbox.nudge();
     voice.nudge();
     holding.tell();
@@ -296,5 +359,18 @@ document.addEventListener("pointerdown", (event) => {
   if (!(event.target instanceof Node && menu.contains(event.target))) menu.open = false;
 });
 
-setInterval(drawTime, TICK_MS);
+function tick() {
+  drawTime();
+  if (contact.isMissed) followLastView();
+  drawNow();
+}
+
+document.addEventListener("visibilitychange", () => awake.ask());
+// The next load of the page is to know since when the server was not heard.
+addEventListener("pagehide", () => {
+  if (contact.heardAt !== null) lastView.touch(contact.heardAt);
+});
+
+setInterval(tick, TICK_MS);
+keepPage();
 refresh();

@@ -31,6 +31,10 @@ export class QuestionPanel {
     this.#place = placeOf(state);
 
     const answers = state.questions.map((question) => this.#answer(question, state));
+    for (const answer of answers) {
+      // Given before the page was loaded again, and not on the server yet.
+      if (this.#isPending(answer.question.id)) answer.show("waiting");
+    }
     this.#questionnaire = new Questionnaire(answers);
     this.#boxes = answers.map((answer) => questionBox(answer, () => this.#settled()));
   }
@@ -82,7 +86,7 @@ export class QuestionPanel {
 
     tell(this.#missing, "Saving…");
     if (!(await this.#outbox.settled(PATH))) {
-      tellUntilAnswered(this.#missing, `${this.#outbox.trouble} Your answers are kept on this device.`);
+      tellUntilAnswered(this.#missing, `${this.#outbox.trouble} Your answers are saved here.`);
       return;
     }
     if (this.#questionnaire.refused) {
@@ -113,6 +117,15 @@ export class QuestionPanel {
   }
 
   /**
+   * Whether an answer to `question` waits on this device.
+   *
+   * @param {string} question
+   */
+  #isPending(question) {
+    return this.#outbox.pending(slotOf(this.#place, question)).length > 0;
+  }
+
+  /**
    * Shows what was answered on another device meanwhile.
    *
    * @param {View} state
@@ -120,7 +133,7 @@ export class QuestionPanel {
   takeAnswers(state) {
     for (const { answer, isBusy } of this.#boxes) {
       const value = state.answers[answer.question.id];
-      const isPending = this.#outbox.pending(slotOf(this.#place, answer.question.id)).length > 0;
+      const isPending = this.#isPending(answer.question.id);
       if (value !== undefined && !isPending) answer.take(value, isBusy());
     }
     this.#draw();

@@ -46,7 +46,7 @@ export const NOT_ANSWERED = "Not answered yet";
 const REACHED_WORDS = {
   saving: "Saving…",
   saved: "Saved",
-  waiting: "Kept on this device. It will be saved when the connection is back.",
+  waiting: "Saved here. It is sent when the connection is back.",
 };
 
 /**

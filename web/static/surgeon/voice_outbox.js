@@ -6,6 +6,7 @@
 import { inWords, Refused } from "../shared/api.js";
 import { counted } from "../shared/text.js";
 import { PATH as COMMENTS } from "./comments.js";
+import { heldWords } from "./words.js";
 
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
@@ -182,9 +183,8 @@ export class VoiceOutbox {
     if (waiting === 0) return { kind: "", text: "" };
     if (this.trouble === null && this.durable) return { kind: "saving", text: "Saving the recording…" };
 
-    const many = counted(waiting, "recording is", "recordings are");
-    const kept = this.durable ? "Kept on this device." : "Kept on this page only: do not close it.";
-    return { kind: "unsaved", text: `${many} not saved yet. ${kept} ${this.trouble ?? ""}`.trim() };
+    const held = heldWords(counted(waiting, "recording"), this.durable);
+    return { kind: "unsaved", text: `${held} ${this.trouble ?? ""}`.trim() };
   }
 
   #nextId() {

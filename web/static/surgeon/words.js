@@ -67,3 +67,15 @@ export function savedWords(refused, waiting) {
   if (waiting > 0) return `${kept}Please keep this page open. Some of what you said is still being saved.`;
   return kept.trim() || "Everything you said is saved.";
 }
+
+/**
+ * Where something is that the server does not have yet.
+ *
+ * @param {string} what such as `2 comments`
+ * @param {boolean} durable whether this device keeps it over a reload
+ */
+export function heldWords(what, durable) {
+  return durable
+    ? `Saved here, not sent yet: ${what}.`
+    : `Kept on this page only, so do not close it: ${what}.`;
+}

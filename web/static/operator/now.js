@@ -1,0 +1,56 @@
+// One line that says what the operator can do now. It follows from what the page shows anyway, and
+// so is the same whatever is being tried.
+
+import { minuteText } from "../shared/text.js";
+import { isOver, lacksConsent } from "./session_words.js";
+
+/** @typedef {Api.OperatorView} View */
+
+/**
+ * What the line follows from.
+ *
+ * @typedef {object} Facts
+ * @property {View | null} view
+ * @property {boolean} known whether the server has said what is under way
+ * @property {boolean} missed whether the server is not heard
+ * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
+ * @property {boolean} working whether camera and lens work, as far as is known
+ */
+
+/** @param {Facts} facts */
+export function nowWords({ view, known, missed, heardAt, working }) {
+  if (missed) {
+    const since = heardAt === null ? "" : ` since ${minuteText(heardAt)}`;
+    return `The server cannot be reached${since}. Check that it runs and that this device is on its network.`;
+  }
+  if (!known) return "Connecting to the server…";
+  if (!working) return "See to the camera or the lens first. The warning below says what is wrong.";
+  return view === null
+    ? "Choose a participant and a protocol, then prepare the session."
+    : sessionWords(view);
+}
+
+/** @param {View} view */
+function sessionWords(view) {
+  if (view.unrecorded)
+    return "Make room on the server’s disk. The session’s card says what is not recorded yet.";
+  if (view.paused && !isOver(view)) return "Press “Resume” when the surgeon is ready.";
+
+  switch (view.phase) {
+    case "ready":
+      return lacksConsent(view)
+        ? "Record the participant’s consent, then start."
+        : "Give the surgeon the tablet, then press “Start”.";
+    case "notice":
+      return `Wait for the surgeon to tap the notice of setting ${view.setting}.`;
+    case "inspecting":
+      return "Nothing to do: the surgeon is looking. Read the comments as they come.";
+    case "questions":
+      return `Wait for the surgeon’s answers about setting ${view.setting}.`;
+    case "closing":
+      return "Wait for the surgeon’s last answers.";
+    case "completed":
+    case "aborted":
+      return "Press “Close and prepare the next” when the surgeon’s tablet says that everything is saved.";
+  }
+}

@@ -1,0 +1,52 @@
+// Whether the server is heard, and since when it is not.
+
+/** A connection that is lost and back this soon was never missed. */
+const BACK_SOON_MS = 2000;
+
+/** The server says something at least every 5 s. One that says nothing for longer is missed. */
+const SILENCE_MS = 7000;
+
+/** @typedef {{ page: () => number, wall: () => number }} Clock both in milliseconds; anybody may set `wall` */
+
+export class Contact {
+  #clock;
+  /** When the server was last heard, by the wall clock: this is shown to people. @type {number | null} */
+  #heardAt;
+  /** The same by the page's clock, which nobody can set; at first when the page was opened. */
+  #heard;
+  /** Whether there is no connection. A page begins without one. */
+  #isLost = true;
+
+  /**
+   * @param {Clock} clock
+   * @param {number | null} heardAt when an earlier load of the page last heard the server, by the wall clock
+   */
+  constructor(clock, heardAt) {
+    this.#clock = clock;
+    this.#heardAt = heardAt;
+    this.#heard = clock.page();
+  }
+
+  /** The server said something. */
+  heard() {
+    this.#heardAt = this.#clock.wall();
+    this.#heard = this.#clock.page();
+    this.#isLost = false;
+  }
+
+  /** The connection is gone. */
+  lost() {
+    this.#isLost = true;
+  }
+
+  /** When the server was last heard, in milliseconds since 1970; null if it never was. */
+  get heardAt() {
+    return this.#heardAt;
+  }
+
+  /** Whether the server has not been heard for long enough to tell somebody. */
+  get isMissed() {
+    const silent = this.#clock.page() - this.#heard;
+    return silent > (this.#isLost ? BACK_SOON_MS : SILENCE_MS);
+  }
+}

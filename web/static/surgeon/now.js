@@ -1,0 +1,65 @@
+// One line that says what the surgeon can do now. It follows from where the session stands and from
+// what is not saved yet, and so is the same whatever is being tried.
+
+import { minuteText } from "../shared/text.js";
+
+/** @typedef {Api.SurgeonView} View */
+
+/**
+ * What the line follows from.
+ *
+ * @typedef {object} Facts
+ * @property {View | null} view
+ * @property {boolean} known whether it is known what is under way
+ * @property {boolean} missed whether the server is not heard
+ * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
+ * @property {boolean} unsent whether a comment stands in the box
+ * @property {boolean} unsaved whether anything said is not saved yet
+ */
+
+/** @param {Facts} facts */
+export function nowWords({ view, known, missed, heardAt, unsent, unsaved }) {
+  if (missed) return unreachableWords(view, heardAt);
+  if (!known) return "Connecting to the server…";
+  if (view === null) return "Nothing to do yet: wait for the operator to start a trial.";
+  if (view.phase === "completed" || view.phase === "aborted") return endWords(unsent, unsaved);
+  if (view.paused) {
+    return view.may_resume
+      ? "Press “Continue” when you are ready."
+      : "Wait for the operator. You can still comment.";
+  }
+
+  switch (view.phase) {
+    case "ready":
+      return "Wait for the operator to start the trial.";
+    case "notice":
+      return `Tap to begin setting ${view.setting}.`;
+    case "inspecting":
+      return "Look around and say what you notice. Then finish the setting.";
+    case "questions":
+      return "Answer the questions, then press “Continue”.";
+    case "closing":
+      return "Answer the last questions, then press “Finish”.";
+  }
+}
+
+/**
+ * @param {boolean} unsent
+ * @param {boolean} unsaved
+ */
+function endWords(unsent, unsaved) {
+  if (unsent) return "Save or delete the comment in the box.";
+  return unsaved ? "Keep this page open until everything is saved." : "You are done. Give the tablet back.";
+}
+
+/**
+ * @param {View | null} view
+ * @param {number | null} heardAt
+ */
+function unreachableWords(view, heardAt) {
+  const since =
+    heardAt === null ? "The server cannot be reached." : `No server since ${minuteText(heardAt)}.`;
+  return view === null
+    ? `${since} This page keeps trying.`
+    : `${since} You can go on commenting: it is saved here and sent later.`;
+}

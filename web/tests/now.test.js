@@ -1,0 +1,121 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { nowWords as operatorWords } from "../static/operator/now.js";
+import { Contact } from "../static/shared/contact.js";
+import { nowWords as surgeonWords } from "../static/surgeon/now.js";
+import { FakeTime } from "./around.js";
+
+/** @type {Api.SurgeonView} */
+const VIEW = {
+  session: "s",
+  phase: "inspecting",
+  paused: false,
+  may_resume: false,
+  unrecorded: false,
+  practice: false,
+  title: "Trial",
+  segment: "a",
+  setting: 2,
+  settings: 6,
+  quick_comments: [],
+  voice: false,
+  questions: [],
+  answers: {},
+  comments: 0,
+};
+
+const PHASES = /** @type {const} */ ([
+  "ready",
+  "notice",
+  "inspecting",
+  "questions",
+  "closing",
+  "completed",
+  "aborted",
+]);
+
+/** A minute past two, wherever the test runs. */
+const HEARD_AT = new Date(2026, 0, 5, 14, 1).getTime();
+
+const SURGEON = { known: true, missed: false, heardAt: HEARD_AT, unsent: false, unsaved: false };
+const OPERATOR = { known: true, missed: false, heardAt: HEARD_AT, working: true };
+
+/** @param {Partial<Api.OperatorView>} told @returns {Api.OperatorView} */
+function operatorView(told) {
+  return {
+    ...VIEW,
+    participant: "S-01",
+    protocol: "short",
+    withdrawn: false,
+    latest_comments: [],
+    log: [],
+    ...told,
+  };
+}
+
+test("each phase has a line of its own, which fits on a tablet’s screen", () => {
+  const surgeon = PHASES.map((phase) => surgeonWords({ ...SURGEON, view: { ...VIEW, phase } }));
+  const operator = PHASES.map((phase) => operatorWords({ ...OPERATOR, view: operatorView({ phase }) }));
+
+  // However a session has ended, there is the same to do.
+  assert.equal(new Set(surgeon).size, PHASES.length - 1);
+  assert.equal(new Set(operator).size, PHASES.length - 1);
+  for (const line of surgeon) assert.ok(line.length > 0 && line.length <= 85, line);
+});
+
+test("the surgeon is told what to do about a pause, and nothing about who made it", () => {
+  const paused = { ...VIEW, paused: true };
+  assert.match(surgeonWords({ ...SURGEON, view: paused }), /^Wait for the operator/);
+  assert.match(surgeonWords({ ...SURGEON, view: { ...paused, may_resume: true } }), /“Continue”/);
+});
+
+test("a tablet that holds something is not given back", () => {
+  const ended = { ...SURGEON, view: { ...VIEW, phase: /** @type {const} */ ("completed") } };
+  assert.match(surgeonWords(ended), /Give the tablet back/);
+  assert.match(surgeonWords({ ...ended, unsaved: true }), /Keep this page open/);
+  assert.match(surgeonWords({ ...ended, unsaved: true, unsent: true }), /comment in the box/);
+});
+
+test("a server that is not heard is told with the time since when", () => {
+  const lost = { ...SURGEON, missed: true };
+  assert.match(surgeonWords({ ...lost, view: VIEW }), /^No server since 14:01\. You can go on commenting/);
+  assert.equal(surgeonWords({ ...lost, view: null }), "No server since 14:01. This page keeps trying.");
+  assert.match(surgeonWords({ ...lost, heardAt: null, view: null }), /^The server cannot be reached\./);
+  assert.match(operatorWords({ ...OPERATOR, missed: true, view: null }), /since 14:01/);
+});
+
+test("before the server has said what is under way, nothing is asked of anybody", () => {
+  assert.match(surgeonWords({ ...SURGEON, known: false, view: null }), /^Connecting/);
+  assert.match(operatorWords({ ...OPERATOR, known: false, view: null }), /^Connecting/);
+});
+
+test("the operator sees to devices, consent and the disk first", () => {
+  assert.match(operatorWords({ ...OPERATOR, working: false, view: null }), /camera or the lens/);
+  const ready = operatorView({ phase: "ready", consent_required: "3" });
+  assert.match(operatorWords({ ...OPERATOR, view: ready }), /consent/);
+  assert.match(operatorWords({ ...OPERATOR, view: operatorView({ unrecorded: true }) }), /disk/);
+});
+
+test("a server counts as missed 2 s after its connection was lost, or after 7 s of silence", () => {
+  const time = new FakeTime();
+  const contact = new Contact(time, null);
+  assert.equal(contact.isMissed, false, "a page that was just opened");
+  assert.equal(contact.heardAt, null);
+
+  contact.heard();
+  assert.equal(contact.heardAt, time.wall());
+  time.pageMillis += 6_900;
+  assert.equal(contact.isMissed, false);
+  time.pageMillis += 200;
+  assert.equal(contact.isMissed, true, "silent");
+
+  contact.heard();
+  contact.lost();
+  time.pageMillis += 1_900;
+  assert.equal(contact.isMissed, false, "a connection that comes back at once was not missed");
+  time.pageMillis += 200;
+  assert.equal(contact.isMissed, true);
+  contact.heard();
+  assert.equal(contact.isMissed, false);
+});

@@ -1,0 +1,349 @@
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import vm from "node:vm";
+
+import { Awake } from "../static/surgeon/awake.js";
+import { LastView } from "../static/surgeon/last_view.js";
+import { storageAdvice } from "../static/surgeon/storage_words.js";
+import { FakeTime, fakeStore, settle } from "./around.js";
+
+/** @type {Api.SurgeonView} */
+const VIEW = {
+  session: "s",
+  phase: "inspecting",
+  paused: false,
+  may_resume: false,
+  unrecorded: false,
+  practice: false,
+  title: "Trial",
+  segment: "a",
+  setting: 2,
+  settings: 6,
+  remaining_seconds: 31.5,
+  prompt: "How does it feel now?",
+  quick_comments: [],
+  voice: false,
+  questions: [],
+  answers: {},
+  comments: 3,
+};
+
+const HOUR_MS = 3_600_000;
+
+test("the last view comes back as it was told, without what time has overtaken", () => {
+  const time = new FakeTime();
+  const store = fakeStore();
+  new LastView(store, "link", time.wall).keep(VIEW);
+  const told = time.wall();
+
+  time.wallMillis += HOUR_MS;
+  const kept = new LastView(store, "link", time.wall).read();
+  assert.deepEqual(kept?.view, { ...VIEW, remaining_seconds: null, prompt: null });
+  assert.equal(kept?.heardAt, told);
+
+  new LastView(store, "link", time.wall).touch(told + 5_000);
+  assert.equal(new LastView(store, "link", time.wall).read()?.heardAt, told + 5_000);
+});
+
+test("the last view is gone under another link, after the session’s end, and after two hours", () => {
+  const time = new FakeTime();
+  /** @param {(last: LastView) => void} happens */
+  const left = (happens, link = "link") => {
+    const store = fakeStore();
+    const last = new LastView(store, "link", time.wall);
+    last.keep(VIEW);
+    happens(last);
+    return [new LastView(store, link, time.wall).read(), store.kept.size];
+  };
+
+  assert.deepEqual(
+    left(() => {}, "other"),
+    [null, 0],
+  );
+  assert.deepEqual(
+    left((last) => last.keep({ ...VIEW, phase: "completed" })),
+    [null, 0],
+  );
+  assert.deepEqual(
+    left((last) => last.keep({ ...VIEW, phase: "aborted" })),
+    [null, 0],
+  );
+  assert.deepEqual(
+    left((last) => last.keep(null)),
+    [null, 0],
+  );
+  assert.deepEqual(
+    left(() => {
+      time.wallMillis += 2 * HOUR_MS;
+    }),
+    [null, 0],
+  );
+});
+
+test("a store that is full or holds something else gives no last view", () => {
+  const time = new FakeTime();
+  const full = fakeStore();
+  full.full = true;
+  const last = new LastView(full, "link", time.wall);
+  last.keep(VIEW);
+  assert.equal(last.read(), null);
+  assert.match(storageAdvice(full), /do not close or reload the page/);
+
+  const store = fakeStore();
+  store.write("parfocal.last-view", "{not json");
+  assert.equal(new LastView(store, "link", time.wall).read(), null);
+  assert.equal(storageAdvice(fakeStore()), "");
+});
+
+/** A browser that gives locks, and takes them back whenever the page is hidden. */
+function screen() {
+  const around = { visible: true, willing: true, given: 0, released: 0, changes: 0 };
+  /** @type {(() => void)[]} */
+  const onRelease = [];
+  const awake = new Awake({
+    request: async () => {
+      if (!around.willing) throw new Error("the battery is low");
+      around.given += 1;
+      return {
+        release: async () => {
+          around.released += 1;
+        },
+        addEventListener: (_, run) => void onRelease.push(run),
+      };
+    },
+    isVisible: () => around.visible,
+    changed: () => {
+      around.changes += 1;
+    },
+  });
+  const hide = () => {
+    around.visible = false;
+    for (const run of onRelease.splice(0)) run();
+  };
+  return { around, awake, hide };
+}
+
+test("the screen stays on from a session’s first view to its end, also after the page was hidden", async () => {
+  const { around, awake, hide } = screen();
+  awake.follow(null);
+  await settle();
+  assert.equal(around.given, 0);
+
+  awake.follow({ ...VIEW, phase: "ready" });
+  await settle();
+  awake.follow(VIEW);
+  await settle();
+  assert.equal(around.given, 1, "asked for once");
+
+  hide();
+  await awake.ask();
+  assert.equal(around.given, 1, "a hidden page is refused, so it does not ask");
+  around.visible = true;
+  await awake.ask();
+  assert.equal(around.given, 2);
+
+  awake.follow({ ...VIEW, phase: "completed" });
+  await settle();
+  assert.equal(around.released, 1);
+  assert.equal(awake.advice, "");
+});
+
+test("a browser that does not keep the screen on is told of, and asked again", async () => {
+  const { around, awake } = screen();
+  around.willing = false;
+  awake.follow(VIEW);
+  await settle();
+  assert.match(awake.advice, /Set the tablet/);
+  around.willing = true;
+  await awake.ask();
+  assert.equal(awake.advice, "");
+  assert.equal(around.changes, 2);
+
+  const cannot = new Awake({ request: null, isVisible: () => true, changed: () => {} });
+  assert.match(cannot.advice, /Set the tablet/);
+});
+
+const SCRIPT = readFileSync(new URL("../static/offline/worker.js", import.meta.url), "utf8");
+const ORIGIN = "https://theatre.local";
+
+/** @param {string | Request} what */
+const pathOf = (what) => new URL(typeof what === "string" ? what : what.url, ORIGIN).pathname;
+
+/** The caches of one browser, in which each worker that it runs finds what the one before kept. */
+function fakeCaches() {
+  /** @type {Map<string, Map<string, Response>>} */
+  const all = new Map();
+  return {
+    all,
+    keys: async () => [...all.keys()],
+    delete: async (/** @type {string} */ name) => all.delete(name),
+    open: async (/** @type {string} */ name) => {
+      const kept = all.get(name) ?? new Map();
+      all.set(name, kept);
+      return {
+        kept,
+        match: async (/** @type {string | Request} */ what) => kept.get(pathOf(what))?.clone(),
+        put: async (/** @type {string} */ what, /** @type {Response} */ answer) =>
+          kept.set(pathOf(what), answer),
+        delete: async (/** @type {string} */ what) => kept.delete(pathOf(what)),
+        addAll: async (/** @type {string[]} */ paths) => {
+          const answers = await Promise.all(paths.map((path) => network.fetch(path)));
+          paths.forEach((path, index) => {
+            kept.set(path, answers[index]);
+          });
+        },
+      };
+    },
+  };
+}
+
+/** What the network answers; a test changes it. */
+const network = {
+  /** @type {(what: string | Request) => Promise<Response>} */
+  fetch: () => Promise.reject(new TypeError("Failed to fetch")),
+};
+
+const down = () => Promise.reject(new TypeError("Failed to fetch"));
+
+/** A server with files and pages of `version`. @param {string} version */
+const server = (version) => async (/** @type {string | Request} */ what) => {
+  const path = pathOf(what);
+  const headers = { "parfocal-page-version": version };
+  if (path === "/surgeon") return new Response(`page of ${version}`, { headers });
+  return new Response(`${path} from the network`);
+};
+
+/**
+ * A worker of `version`, with the files that the server tells it.
+ *
+ * @param {string} version
+ * @param {ReturnType<typeof fakeCaches>} caches
+ */
+function worker(version, caches) {
+  /** @type {Record<string, (event: any) => void>} */
+  const on = {};
+  const self = {
+    offline: { version, files: [`/static/${version}/surgeon/page.js`] },
+    location: { origin: ORIGIN },
+    skipWaiting: async () => {},
+    addEventListener: (/** @type {string} */ name, /** @type {(event: any) => void} */ run) => {
+      on[name] = run;
+    },
+  };
+  const fetch = (/** @type {string | Request} */ what) => network.fetch(what);
+  vm.runInNewContext(SCRIPT, { self, caches, fetch, URL, Response, AbortSignal });
+
+  const lives = async (/** @type {string} */ name) => {
+    /** @type {Promise<unknown>} */
+    let done = Promise.resolve();
+    on[name]?.({
+      waitUntil: (/** @type {Promise<unknown>} */ promise) => {
+        done = promise;
+      },
+    });
+    await done;
+  };
+
+  /** What a page gets; null where the worker leaves it to the browser. */
+  const get = async (/** @type {string} */ path, { mode = "navigate", method = "GET" } = {}) => {
+    /** @type {Promise<Response> | null} */
+    let answer = null;
+    const request = { url: ORIGIN + path, mode, method };
+    on.fetch?.({
+      request,
+      respondWith: (/** @type {Promise<Response>} */ promise) => {
+        answer = promise;
+      },
+    });
+    const response = /** @type {Response | null} */ (await answer);
+    if (response === null) return null;
+    return response.type === "error" ? "no page" : response.text();
+  };
+
+  return {
+    get,
+    start: async () => {
+      await lives("install");
+      await lives("activate");
+    },
+  };
+}
+
+test("the page and its files open without a network, and nothing else is kept", async () => {
+  const caches = fakeCaches();
+  const one = worker("one", caches);
+  network.fetch = server("one");
+  await one.start();
+
+  network.fetch = down;
+  assert.equal(await one.get("/surgeon"), "page of one");
+  const file = "/static/one/surgeon/page.js";
+  assert.equal(await one.get(file, { mode: "cors" }), `${file} from the network`);
+
+  for (const path of ["/operator", "/researcher", "/api/surgeon/session", "/static/one/operator/page.js"]) {
+    assert.equal(await one.get(path), null, path);
+  }
+  assert.equal(await one.get("/surgeon", { method: "POST" }), null);
+  assert.deepEqual([...(caches.all.get("parfocal-surgeon-one")?.keys() ?? [])].sort(), [file, "/surgeon"]);
+});
+
+test("the server’s page comes first; a proxy’s error does not replace the one that is kept", async () => {
+  const one = worker("one", fakeCaches());
+  network.fetch = server("one");
+  await one.start();
+
+  network.fetch = async () => new Response("newer", { headers: { "parfocal-page-version": "one" } });
+  assert.equal(await one.get("/surgeon"), "newer");
+  network.fetch = async () => new Response("Bad gateway", { status: 502 });
+  assert.equal(await one.get("/surgeon"), "newer");
+  network.fetch = down;
+  assert.equal(await one.get("/surgeon"), "newer");
+});
+
+test("a tablet that is not let in any more opens nothing without a network", async () => {
+  for (const refusal of [new Response("Forbidden", { status: 403 }), new Response("The session is over")]) {
+    const one = worker("one", fakeCaches());
+    network.fetch = server("one");
+    await one.start();
+
+    const words = await refusal.clone().text();
+    network.fetch = async () => refusal;
+    assert.equal(await one.get("/surgeon"), words);
+    network.fetch = down;
+    assert.equal(await one.get("/surgeon"), "no page");
+  }
+});
+
+test("a newer server replaces everything at once, and a page never gets files of another version", async () => {
+  const caches = fakeCaches();
+  const one = worker("one", caches);
+  network.fetch = server("one");
+  await one.start();
+
+  // The older worker sees the newer server's page first: it must not keep it beside the older files.
+  network.fetch = server("two");
+  assert.equal(await one.get("/surgeon"), "page of two");
+  network.fetch = down;
+  assert.equal(await one.get("/surgeon"), "page of one");
+
+  const two = worker("two", caches);
+  network.fetch = server("two");
+  await two.start();
+  assert.deepEqual([...caches.all.keys()], ["parfocal-surgeon-two"]);
+  network.fetch = down;
+  assert.equal(await two.get("/surgeon"), "page of two");
+});
+
+test("a browser that could not fetch all files keeps the version that it has", async () => {
+  const caches = fakeCaches();
+  const one = worker("one", caches);
+  network.fetch = server("one");
+  await one.start();
+
+  const two = worker("two", caches);
+  network.fetch = async (what) => (pathOf(what).startsWith("/static/") ? down() : server("two")(what));
+  await assert.rejects(two.start());
+  network.fetch = down;
+  assert.equal(await one.get("/surgeon"), "page of one");
+});
