@@ -14,7 +14,7 @@ package:
 	@cargo build --release --locked $(FEATURES)
 	@deploy/debian/build
 
-.PHONY: run test package check lint web web-types unit interface readme packaged bench fuzz
+.PHONY: run test package check lint web web-types unit interface readme packaged bench fuzz endurance
 
 run:
 	@.ci/setup build
@@ -61,6 +61,16 @@ packaged:
 bench:
 	cargo bench $(FEATURES)
 
-# A minute on each parser of bytes from outside (needs a nightly toolchain and cargo-fuzz).
+# A million mutated inputs for each parser of bytes from outside; fewer, or one parser, on request:
+#   make fuzz ONLY=protocol INPUTS=10000
+INPUTS ?= 1000000
+ONLY ?=
 fuzz:
-	cd fuzz && for target in $$(cargo +nightly fuzz list); do cargo +nightly fuzz run $$target -- -max_total_time=60 || exit 1; done
+	PARFOCAL_FUZZ_INPUTS=$(INPUTS) $(if $(ONLY),PARFOCAL_FUZZ=$(ONLY)) \
+		cargo test --release --locked $(FEATURES) --test fuzz -- --ignored --nocapture
+
+# A long day, and a working week faster than time: docs/operations.md. `make endurance SECONDS=180` is a short day.
+SECONDS_OF_DAY := $(if $(SECONDS),$(SECONDS),3600)
+endurance:
+	PARFOCAL_ENDURANCE_SECONDS=$(SECONDS_OF_DAY) \
+		cargo test --release --locked $(FEATURES) --test system endurance:: -- --ignored --nocapture --test-threads 1

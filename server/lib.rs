@@ -21,8 +21,8 @@ pub mod simulation;
 pub mod accounts;
 pub mod autofocus;
 pub mod camera;
-pub mod doctor;
 
+pub mod doctor;
 pub mod scans;
 
 pub mod control;
@@ -36,6 +36,7 @@ pub mod store;
 
 pub mod analysis;
 pub mod conductor;
+pub mod health;
 pub mod package;
 
 pub mod playback;

@@ -1,12 +1,16 @@
 //! `parfocal doctor`: whether this machine is ready for a trial.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use jiff::tz::TimeZone;
+
 use super::output::{Failure, print};
-use crate::clock::SystemClock;
-use crate::doctor::{Finding, Verdict, lens, machine};
+use crate::camera::calibration::read;
+use crate::clock::{Clock, SystemClock};
+use crate::doctor::{Finding, Verdict, calibration, lens, machine, unreadable_calibration};
+use crate::imaging::SENSOR_SIZE;
 use crate::lens::open;
 
 /// Arguments of `parfocal doctor`.
@@ -18,6 +22,9 @@ pub struct Arguments {
     /// Ask this lens too, which no server may be using: optotune:auto or optotune:DEVICE.
     #[arg(long, value_name = "SPEC")]
     lens: Option<String>,
+    /// Look at this calibration too: a TOML file, or a folder of `parfocal calibrate`.
+    #[arg(long, value_name = "PATH")]
+    calibration: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -34,6 +41,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let asked = open(spec, Arc::new(SystemClock)).and_then(|mut opened| opened.info());
         findings.push(lens(asked));
     }
+    if let Some(path) = &arguments.calibration {
+        findings.push(calibration_in(path));
+    }
 
     let text = if arguments.json { serde_json::to_string_pretty(&findings)? + "\n" } else { written(&findings) };
     print(&text)?;
@@ -43,6 +53,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         0 => Ok(()),
         1 => Err("put one thing right before a trial".into()),
         _ => Err(format!("put {wrong} things right before a trial").into()),
+    }
+}
+
+/// The calibration at `path`, for a camera of the size of its references.
+fn calibration_in(path: &Path) -> Finding {
+    let today = SystemClock.wall().to_zoned(TimeZone::system()).date();
+    match read(path) {
+        Ok(read) => calibration(&read, Some(read.size().unwrap_or(SENSOR_SIZE)), false, today),
+        Err(fault) => unreadable_calibration(&fault),
     }
 }
 

@@ -27,10 +27,11 @@ use crate::camera::{self, CameraSettings, calibration};
 use crate::clock::{Clock, SystemClock};
 use crate::conductor::{Conductor, Parts};
 use crate::control::{self, Command, ControlLoop, Drive, Rig, Settings};
+use crate::health::HealthWatch;
 use crate::http::keys::Keys;
-use crate::http::{self, App, Reach};
+use crate::http::{self, App, Equipment, OpenTablets, Reach};
 use crate::imaging::{Calibration, Developer, Reconstructor, Size};
-use crate::lens::{Lens, LensDynamics, MeasuredDynamics};
+use crate::lens::{Lens, LensDynamics, LensInfo, MeasuredDynamics};
 use crate::playback::Player;
 use crate::recorder::{self, Recordings};
 use crate::store::{self, Store, device_log, telemetry};
@@ -147,7 +148,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let address = listener.local_addr()?;
 
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
-    let calibration = calibration_of(arguments)?;
+    let calibration = Arc::new(calibration_of(arguments)?);
     let registry = registry(arguments)?;
 
     let store = open_store(arguments, &calibration, &registry, clock.as_ref()).await?;
@@ -162,6 +163,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let mut rig = rig(arguments, &clock, developer.reconstructor().clone(), registry.clone(), seeded.random())?;
     let mosaics = rig.camera.mosaic_size();
     calibration::check_camera(&calibration, mosaics)?;
+    // Before the loop has the lens: it is not asked again.
+    let lens_info = described(rig.lens.as_mut());
     let dynamics = arguments.lens_dynamics.as_deref().map(|path| dynamics(path, rig.lens.as_mut())).transpose()?;
     let frame_period = Duration::from_secs(1) / arguments.fps;
 
@@ -173,7 +176,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     // A colour picture has one size.
     let largest = if mosaics.is_some() { Size::Full } else { Size::Cell };
-    let (live, imaging) = live::start(control.clone(), &developer, largest)?;
+    let (live, imaging) = live::start(control.clone(), &developer, largest, &clock)?;
 
     let conductor = Conductor::open(Parts {
         store: store.clone(),
@@ -197,9 +200,12 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         live: live.clone(),
         conductor: conductor.clone(),
         folder,
-        calibration: calibration.clone(),
+        calibration: Calibration::clone(&calibration),
         size: mosaics,
     });
+
+    let health = HealthWatch::new(Arc::clone(&clock), control.status.clone(), conductor.operator_view(), store.clone());
+    let watching = tokio::spawn(health.clone().run());
 
     let conducting = tokio::spawn(conductor.clone().run());
     let recording = tokio::spawn(recordings.clone().run());
@@ -213,6 +219,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         accounts,
         live,
         store: store.clone(),
+        health,
         recordings: recordings.clone(),
         player,
         surgeon_view: conductor.surgeon_view(),
@@ -221,6 +228,8 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
         registry,
         keys: keys.clone(),
         reach: reach.clone(),
+        equipment: Equipment::new(lens_info, Arc::clone(&calibration), mosaics),
+        tablets: OpenTablets::default(),
         metrics: http::Metrics::default(),
         shutdown,
         control: control.observer(),
@@ -244,17 +253,32 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     conducting.abort();
     recording.abort();
+    watching.abort();
+    end_recording_and_devices(&recordings, control_loop, imaging).await;
+    let _ = timeout(GRACE, store_the_rest(&store, &ending, writer)).await;
+
+    Ok(())
+}
+
+/// What `lens` says of itself, if it does.
+fn described(lens: &mut dyn Lens) -> Option<LensInfo> {
+    lens.info().inspect_err(|error| tracing::warn!(%error, "the lens did not describe itself")).ok()
+}
+
+/// Ends what is recorded, and then puts camera and lens to rest.
+async fn end_recording_and_devices(
+    recordings: &Recordings,
+    control_loop: ControlLoop,
+    imaging: std::thread::JoinHandle<()>,
+) {
     if timeout(RECORDING, recordings.stop()).await.is_err() {
         tracing::error!("the disk does not take the rest of the recording; exiting without it");
     }
+
     let stopping = tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join()));
     if timeout(DEVICES, stopping).await.is_err() {
         tracing::error!("the control loop does not stop; exiting without it");
     }
-
-    let _ = timeout(GRACE, store_the_rest(&store, &ending, writer)).await;
-
-    Ok(())
 }
 
 /// How others reach a server that listens on `address`.

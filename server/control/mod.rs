@@ -159,6 +159,8 @@ pub struct ControlledFrame {
 /// of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlStatus {
+    /// When the loop said so. One that says nothing for seconds has stalled.
+    pub at: Moment,
     /// The camera.
     pub camera: CameraHealth,
     /// What can be changed on it while it runs.

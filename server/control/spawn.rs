@@ -154,6 +154,7 @@ impl Worker {
     ) -> Self {
         let now = clock.now();
         let first = ControlStatus {
+            at: now,
             camera: source.health(),
             camera_offer: CameraOffer::default(),
             lens: stepper.lens_health(),
@@ -271,6 +272,7 @@ impl Worker {
         camera.working &= held != Some(Hold::CameraFailed);
 
         self.status.send_replace(Arc::new(ControlStatus {
+            at: now,
             camera,
             camera_offer: self.controls.as_ref().map(Controls::offered).unwrap_or_default(),
             lens: self.stepper.lens_health(),

@@ -8,7 +8,7 @@ use super::finding::Finding;
 use crate::recording::room;
 
 /// Room below which a trial should not begin, bytes: a day of sessions takes some 100 MB.
-const LEAST_ROOM: u64 = 1 << 30;
+pub const LEAST_ROOM: u64 = 1 << 30;
 /// Room below which recordings soon end, bytes.
 const AMPLE_ROOM: u64 = 20 << 30;
 /// Bytes a second of a mosaic recording at 25 frames a second, as docs/recordings.md measures it.

@@ -1,17 +1,24 @@
 //! Whether a machine is ready for a trial: what is well, what could be better, and what must be put
 //! right first, each with what to do.
 
+mod calibration;
+mod devices;
 mod finding;
 mod folder;
 mod lens;
 mod network;
 mod system;
+mod tablet;
 
 use std::path::Path;
 
+pub use calibration::{calibration, unreadable_calibration};
+pub use devices::{camera_in_use, lens_in_use};
 pub use finding::{Finding, Verdict};
+pub use folder::LEAST_ROOM;
 pub use lens::lens;
 pub use network::outward;
+pub use tablet::{Tablet, tablets};
 
 use crate::clock::Clock;
 

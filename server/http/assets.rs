@@ -30,6 +30,8 @@ static ASSETS: &[Asset] = &assets![
     "accounts/sign_in.js",
     "operator/camera_card.js",
     "operator/camera_settings.js",
+    "operator/checks_card.js",
+    "operator/checks_words.js",
     "operator/choices.js",
     "operator/consent.js",
     "operator/device_words.js",

@@ -178,6 +178,10 @@ struct ErrorPage<'a> {
     sign_in: Option<String>,
 }
 
+/// Marks a failed response that keeps the body that its handler gave it.
+#[derive(Debug, Clone, Copy)]
+pub struct OwnBody;
+
 /// Gives every failed response its body: a page for a browser on its way to a page, JSON for everyone else.
 pub async fn render(request: Request, next: Next) -> Response {
     let page = wants_page(request.headers());
@@ -188,6 +192,9 @@ pub async fn render(request: Request, next: Next) -> Response {
 
     let status = response.status();
     if !status.is_client_error() && !status.is_server_error() {
+        return response;
+    }
+    if response.extensions().get::<OwnBody>().is_some() {
         return response;
     }
 

@@ -1,6 +1,6 @@
-//! `/metrics`: counters for Prometheus, for operator and researcher. No counter tells policies apart,
-//! and the loop's latency, from which a policy may be guessed, is left out while a session is under
-//! way.
+//! `/metrics`: counters for Prometheus, for operator and researcher. No counter tells policies apart. Times, from
+//! which a policy may be guessed, are left out while a session is under way, and those of the loop and of pictures
+//! are not kept of a setting at all.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -92,8 +92,7 @@ fn collect(app: &App) -> Registry {
     registry.register("viewers", "Viewers that want pictures now", viewers);
 
     if !app.blinded() {
-        let latency = counts.latency().clone();
-        registry.register_with_unit("latency", "Time from exposure to lens command", Unit::Seconds, latency);
+        register_times(&mut registry, app);
     }
 
     let gauges = [
@@ -112,6 +111,22 @@ fn collect(app: &App) -> Registry {
         registry.register(name, help, ConstGauge::new(value));
     }
     registry
+}
+
+/// How long things take.
+fn register_times(registry: &mut Registry, app: &App) {
+    let counts = app.live.counts();
+    let latency = counts.latency().clone();
+    registry.register_with_unit("latency", "Time from exposure to lens command", Unit::Seconds, latency);
+
+    let steps = counts.steps().clone();
+    registry.register_with_unit("step", "Time to compute a step's focal power", Unit::Seconds, steps);
+
+    let making = counts.making().clone();
+    registry.register_with_unit("picture", "Time to develop and encode a picture", Unit::Seconds, making);
+
+    let writes = app.store.writes().times().clone();
+    registry.register_with_unit("database_write", "Time of a write to the database", Unit::Seconds, writes);
 }
 
 /// The routes of this file.

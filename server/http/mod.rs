@@ -4,9 +4,11 @@ mod accounts;
 mod analysis;
 pub mod assets;
 mod camera;
+mod checks;
 mod connections;
 mod credentials;
 mod door;
+mod equipment;
 pub mod error;
 mod export;
 mod health;
@@ -40,6 +42,8 @@ mod tablets;
 mod trust;
 mod voice;
 
+pub use equipment::Equipment;
+pub use live::OpenTablets;
 pub use reach::Reach;
 pub use state::{App, AppState, Metrics};
 
@@ -79,6 +83,7 @@ pub fn router(app: AppState) -> Router {
         .merge(voice::routes())
         .merge(operator::routes())
         .merge(camera::routes())
+        .merge(checks::routes())
         .merge(recording::routes())
         .merge(researcher::routes())
         .merge(playback::routes())

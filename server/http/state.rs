@@ -6,13 +6,16 @@ use std::sync::atomic::AtomicU64;
 use prometheus_client::metrics::counter::Counter;
 use tokio::sync::watch;
 
+use super::equipment::Equipment;
 use super::keys::Keys;
+use super::live::OpenTablets;
 use super::reach::Reach;
 use crate::accounts::Accounts;
 use crate::autofocus::Registry;
 use crate::clock::Clock;
 use crate::conductor::Conductor;
 use crate::control::ControlObserver;
+use crate::health::HealthWatch;
 use crate::ids::SessionId;
 use crate::live::LiveHandle;
 use crate::playback::Player;
@@ -32,6 +35,8 @@ pub struct App {
     pub live: LiveHandle,
     /// The database.
     pub store: Store,
+    /// How the server is.
+    pub health: HealthWatch,
     /// Trial sessions.
     pub conductor: Conductor,
     /// What is being recorded.
@@ -50,6 +55,10 @@ pub struct App {
     pub keys: Keys,
     /// How others reach the server.
     pub reach: Reach,
+    /// The devices as they were found.
+    pub equipment: Equipment,
+    /// The surgeon's pages that are open.
+    pub tablets: OpenTablets,
     /// Counters for Prometheus.
     pub metrics: Metrics,
     /// Turns true when the server is to end; streams then close by themselves.

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::outlet::Outlet;
 use super::studio::Studio;
-use crate::clock::Moment;
+use crate::clock::{Clock, Moment};
 use crate::control::{ControlledFrame, LatestSlot};
 use crate::imaging::{Developer, Size};
 
@@ -32,10 +32,15 @@ impl Larger {
     ///
     /// # Errors
     /// When the system cannot make a thread or an encoder.
-    pub(super) fn start(developer: Developer, size: Size, outlet: Outlet) -> std::io::Result<Self> {
+    pub(super) fn start(
+        developer: Developer,
+        size: Size,
+        outlet: Outlet,
+        clock: Arc<dyn Clock>,
+    ) -> std::io::Result<Self> {
         let slot = Arc::<LatestSlot<ControlledFrame>>::default();
         let studio = Studio::new(developer, size).map_err(std::io::Error::other)?;
-        let worker = Worker { slot: Arc::clone(&slot), outlet: outlet.clone(), studio, last: None };
+        let worker = Worker { slot: Arc::clone(&slot), outlet: outlet.clone(), clock, studio, last: None };
 
         let name = format!("imaging-{}", size.name());
         let thread = std::thread::Builder::new().name(name).spawn(move || worker.run())?;
@@ -60,6 +65,7 @@ impl Drop for Larger {
 struct Worker {
     slot: Arc<LatestSlot<ControlledFrame>>,
     outlet: Outlet,
+    clock: Arc<dyn Clock>,
     studio: Studio,
     /// Exposure of the last frame made.
     last: Option<Moment>,
@@ -90,10 +96,14 @@ impl Worker {
 
     fn make(&mut self, frame: ControlledFrame) {
         self.last = Some(frame.frame.exposed_at);
+        let began = self.clock.now();
+        let step = frame.record.clone();
+
         self.studio.develop(&frame.frame.image);
         match self.studio.encode(frame) {
             Ok(frame) => self.outlet.publish(frame),
             Err(error) => tracing::error!(%error, "a larger picture could not be encoded"),
         }
+        self.outlet.note_time(&step, self.clock.now().since(began));
     }
 }

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use tokio::sync::watch;
 
 use super::{Counts, EncodedFrame};
+use crate::control::StepRecord;
 use crate::imaging::Size;
 
 /// The sending end of a size's pictures.
@@ -25,6 +27,11 @@ impl Outlet {
     /// Whether someone looks at this size.
     pub(super) fn is_watched(&self) -> bool {
         self.counts.of(self.size).viewers.load(Ordering::Relaxed) > 0
+    }
+
+    /// Keeps the time that the picture of `step`'s frame `took`.
+    pub(super) fn note_time(&self, step: &StepRecord, took: Duration) {
+        self.counts.note_picture(self.size, step, took);
     }
 
     /// Hands `frame` to all viewers.

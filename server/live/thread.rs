@@ -13,6 +13,7 @@ use super::larger::Larger;
 use super::outlet::Outlet;
 use super::studio::Studio;
 use super::{Counts, LiveHandle};
+use crate::clock::Clock;
 use crate::control::{Command, ControlHandle, ControlledFrame};
 use crate::imaging::{Developer, Size, content_area};
 
@@ -31,6 +32,7 @@ pub fn start(
     control: ControlHandle,
     developer: &Developer,
     largest: Size,
+    clock: &Arc<dyn Clock>,
 ) -> std::io::Result<(LiveHandle, JoinHandle<()>)> {
     let counts = Arc::new(Counts::default());
     let outlet = |size| {
@@ -44,12 +46,21 @@ pub fn start(
     for size in Size::ALL.into_iter().filter(|size| (Size::Half..=largest).contains(size)) {
         let (outlet, latest) = outlet(size);
         frames.push(latest);
-        larger.push(Larger::start(developer.clone(), size, outlet)?);
+        larger.push(Larger::start(developer.clone(), size, outlet, Arc::clone(clock))?);
     }
 
     let studio = Studio::new(developer.clone(), Size::Cell).map_err(std::io::Error::other)?;
     let handle = LiveHandle { frames: frames.into(), counts: Arc::clone(&counts), leaders: watch::Sender::default() };
-    let worker = Worker { control, outlet: cells, counts, studio, larger, areas: AreaWatch::default(), looked: None };
+    let worker = Worker {
+        control,
+        outlet: cells,
+        counts,
+        clock: Arc::clone(clock),
+        studio,
+        larger,
+        areas: AreaWatch::default(),
+        looked: None,
+    };
     let thread = std::thread::Builder::new().name("imaging".into()).spawn(move || worker.run())?;
 
     Ok((handle, thread))
@@ -59,6 +70,7 @@ struct Worker {
     control: ControlHandle,
     outlet: Outlet,
     counts: Arc<Counts>,
+    clock: Arc<dyn Clock>,
     studio: Studio,
     larger: Vec<Larger>,
     areas: AreaWatch,
@@ -80,7 +92,7 @@ impl Worker {
     }
 
     fn turn(&mut self, frame: &ControlledFrame) {
-        self.counts.latency().observe(f64::from(frame.record.latency_micros) / 1e6);
+        self.counts.note_step(&frame.record);
         let watched = self.outlet.is_watched();
 
         // By distance: where frames come faster than they are shown, those of a round number may never be
@@ -88,6 +100,7 @@ impl Worker {
         let number = frame.frame.number;
         let detect = self.looked.is_none_or(|looked| number.abs_diff(looked) >= DETECT_EVERY);
 
+        let began = self.clock.now();
         let image = frame.frame.image.clone();
         if watched || detect {
             self.studio.develop(&image);
@@ -99,6 +112,7 @@ impl Worker {
                 Ok(frame) => self.outlet.publish(frame),
                 Err(error) => tracing::error!(%error, "a picture could not be encoded"),
             }
+            self.counts.note_picture(Size::Cell, &frame.record, self.clock.now().since(began));
         }
         for larger in &self.larger {
             larger.offer(frame);

@@ -4,7 +4,7 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
-use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
+use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use crate::ids::SessionId;
 use crate::trial::account::Actor;
@@ -38,10 +38,10 @@ impl Store {
         by: &Actor,
         stamp: Stamp,
     ) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let kept = insert_consent(&mut connection, self.inner.run, session, consent, by, stamp).await;
-        drop_if_failed(connection, &kept);
+        turn.end(connection, &kept);
         kept
     }
 }

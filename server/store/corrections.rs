@@ -6,7 +6,7 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
-use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
+use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use crate::ids::{IdempotencyKey, SessionId};
 use crate::trial::account::AccountName;
@@ -91,10 +91,10 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn correct(&self, correction: &Correction, account: Option<&AccountName>) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let corrected = insert_correction(&mut connection, self.inner.run, correction, account).await;
-        drop_if_failed(connection, &corrected);
+        turn.end(connection, &corrected);
         corrected
     }
 }

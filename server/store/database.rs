@@ -12,7 +12,7 @@ use jiff::Timestamp;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
-use tokio::sync::{Mutex, MutexGuard};
+use tokio::sync::Mutex;
 
 use crate::autofocus::{BlurRate, PolicyName};
 use crate::clock::Moment;
@@ -21,7 +21,8 @@ use crate::files::make_private;
 use super::counts::Counts;
 use super::schema::{DATABASE, MIGRATOR};
 use super::scrub::scrub;
-use super::values::{begin, drop_if_failed, nanoseconds};
+use super::values::{begin, nanoseconds};
+use super::writes::{Turn, Writes, Written};
 use super::{DeviceEvent, Reader, Stamp, StoreError, chain};
 
 /// Name of the lock in the data folder.
@@ -68,6 +69,7 @@ pub(super) struct Inner {
     /// When this run began.
     pub(super) started: Stamp,
     pub(super) telemetry_counts: Counts,
+    pub(super) writes: Writes,
     /// Released when dropped, or by the kernel when the process ends in whatever way.
     _lock: File,
 }
@@ -123,6 +125,7 @@ impl Store {
             run,
             started,
             telemetry_counts: Counts::default(),
+            writes: Writes::default(),
             _lock: lock,
         };
 
@@ -155,8 +158,26 @@ impl Store {
         self.inner.trial.close().await;
     }
 
-    pub(super) async fn turn(&self) -> MutexGuard<'_, ()> {
-        self.inner.turn.lock().await
+    /// How writing went since the start.
+    #[must_use]
+    pub fn writes(&self) -> &Writes {
+        &self.inner.writes
+    }
+
+    /// The data folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.inner.folder
+    }
+
+    /// Waits for the turn to write records.
+    pub(super) async fn turn(&self) -> Turn<'_> {
+        self.inner.writes.begin(self.inner.turn.lock().await, Written::Records)
+    }
+
+    /// Waits for the turn to write telemetry.
+    pub(super) async fn telemetry_turn(&self) -> Turn<'_> {
+        self.inner.writes.begin(self.inner.turn.lock().await, Written::Telemetry)
     }
 
     /// Records that a device began or ceased to work.
@@ -164,10 +185,10 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn device_event(&self, event: &DeviceEvent) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let recorded = insert_device_event(&mut connection, self.inner.run, event).await;
-        drop_if_failed(connection, &recorded);
+        turn.end(connection, &recorded);
         recorded
     }
 
@@ -176,10 +197,10 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn add_participant(&self, code: &str, wall: Timestamp) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let added = insert_participant(&mut connection, code, &wall.to_string()).await;
-        drop_if_failed(connection, &added);
+        turn.end(connection, &added);
         added
     }
 

@@ -6,7 +6,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::actors::name_actor;
 use super::scrub::scrub;
-use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
+use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use crate::ids::SessionId;
 use crate::trial::account::AccountName;
@@ -49,10 +49,10 @@ impl Store {
     /// When the disk or database failed, or another program has the database open; then the words may still stand in
     /// free pages of the file or in its log, until the same is asked again or the server starts again.
     pub async fn erase(&self, erasures: &[Erasure], account: Option<&AccountName>) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let erased = insert_erasures(&mut connection, self.inner.run, erasures, account).await;
-        drop_if_failed(connection, &erased);
+        turn.end(connection, &erased);
         erased?;
         scrub(&self.inner.trial).await
     }

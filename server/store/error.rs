@@ -75,6 +75,21 @@ pub enum StoreError {
 }
 
 impl StoreError {
+    /// Whether the disk or the database failed, rather than refused what was asked of it.
+    #[must_use]
+    pub const fn is_of_the_disk(&self) -> bool {
+        match self {
+            Self::Full | Self::ReadOnly | Self::Disk(_) | Self::Damaged(_) | Self::Shut | Self::Locked => true,
+            Self::Database(error) => matches!(error, sqlx::Error::Io(_) | sqlx::Error::PoolTimedOut),
+            Self::InUse { .. }
+            | Self::Newer { .. }
+            | Self::Outdated
+            | Self::Folder { .. }
+            | Self::Missing(_)
+            | Self::ErasureUnfinished => false,
+        }
+    }
+
     pub(super) fn folder(folder: &Path, error: &std::io::Error) -> Self {
         let reason = match error.kind() {
             std::io::ErrorKind::PermissionDenied => {

@@ -34,6 +34,7 @@ mod values;
 mod verify;
 mod voice;
 mod withdrawals;
+mod writes;
 
 pub use accesses::{Access, Recorder};
 pub use accounts::{
@@ -56,3 +57,4 @@ pub use studies::{Enrolment, NewStudy, StoredStudy, StudyBook, StudyChange};
 pub use verify::verify_database;
 pub use voice::{KeptVoice, PieceKept, Recorded, StoredPiece, VoicePiece};
 pub use withdrawals::Withdrawal;
+pub use writes::{WriteTimes, Writes};

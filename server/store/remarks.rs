@@ -4,7 +4,7 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::chain;
-use super::values::{begin, drop_if_failed, moment, nanoseconds, parsed, stamp};
+use super::values::{begin, moment, nanoseconds, parsed, stamp};
 use super::{Answer, Comment, DeviceReport, Reader, Stamp, Store, StoreError};
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::trial::question::AnswerValue;
@@ -27,10 +27,10 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn keep_comment(&self, comment: &Comment) -> Result<Kept, StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let kept = insert_comment(&mut connection, self.inner.run, comment).await;
-        drop_if_failed(connection, &kept);
+        turn.end(connection, &kept);
         kept
     }
 
@@ -39,10 +39,10 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn keep_answer(&self, answer: &Answer) -> Result<Kept, StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let kept = insert_answer(&mut connection, self.inner.run, answer).await;
-        drop_if_failed(connection, &kept);
+        turn.end(connection, &kept);
         kept
     }
 

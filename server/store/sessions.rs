@@ -9,7 +9,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use super::chain;
 use super::session_events::insert_event;
 use super::studies::{Enrolment, enrol};
-use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
+use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, RunClocks, Stamp, Store, StoreError};
 use crate::autofocus::PolicyName;
 use crate::ids::{SegmentId, SessionId};
@@ -103,10 +103,10 @@ impl Store {
         created: &Event,
         enrolment: Option<&Enrolment>,
     ) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let made = insert_session(&mut connection, self.inner.run, new, created, enrolment).await;
-        drop_if_failed(connection, &made);
+        turn.end(connection, &made);
         made
     }
 
@@ -115,10 +115,10 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn append_events(&self, session: SessionId, events: &[Event]) -> Result<(), StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let appended = insert_events(&mut connection, self.inner.run, session, events).await;
-        drop_if_failed(connection, &appended);
+        turn.end(connection, &appended);
         appended
     }
 

@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use sqlx::sqlite::SqliteConnection;
 use tokio::sync::mpsc::Receiver;
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, timeout, timeout_at};
 
 use super::chain;
-use super::values::{begin, drop_if_failed, nanoseconds};
+use super::values::{begin, nanoseconds};
 use super::{Store, StoreError};
 use crate::autofocus::PolicyName;
 use crate::clock::Moment;
@@ -24,6 +24,8 @@ const BATCH_TIME: Duration = Duration::from_millis(250);
 const BATCH_RECORDS: usize = 256;
 /// Records kept for another try while the disk fails: some three minutes at 50 a second.
 const MOST_WAITING: usize = 9_000;
+/// What could not be written is tried again after this time where no further record comes.
+const RETRY: Duration = Duration::from_secs(1);
 /// Batches between two checkpoints: about every 16 s.
 const CHECKPOINT_BATCHES: u32 = 64;
 
@@ -71,9 +73,18 @@ struct Writer {
 }
 
 impl Writer {
-    /// Gathers the next batch; `false` once the sender is gone.
+    /// Gathers the next batch; `false` once the sender is gone. What could not be written is tried again also where
+    /// nothing more comes, because the camera is silent.
     async fn collect(&mut self, receiver: &mut Receiver<StepRecord>) -> bool {
-        let Some(first) = receiver.recv().await else { return false };
+        let first = if self.waiting.is_empty() {
+            receiver.recv().await
+        } else {
+            match timeout(RETRY, receiver.recv()).await {
+                Ok(first) => first,
+                Err(_) => return true,
+            }
+        };
+        let Some(first) = first else { return false };
         self.waiting.push(first);
 
         let end = Instant::now() + BATCH_TIME;
@@ -92,7 +103,9 @@ impl Writer {
 
     async fn flush(&mut self, store: &Store) {
         let counts = store.telemetry_counts();
-        match self.write(store).await {
+        let written = self.write(store).await;
+        store.writes().note(&written);
+        match written {
             Ok(()) => {
                 counts.written.fetch_add(self.waiting.len() as u64, Ordering::Relaxed);
                 self.unsealed.extend(self.waiting.iter().filter_map(|record| record.segment));
@@ -133,10 +146,10 @@ impl Writer {
             return Ok(());
         }
 
-        let _turn = store.turn().await;
+        let turn = store.telemetry_turn().await;
         let mut connection = store.inner.telemetry.acquire().await?;
         let written = self.write_on(&mut connection, store.run()).await;
-        drop_if_failed(connection, &written);
+        turn.end(connection, &written);
         written
     }
 
@@ -158,7 +171,7 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn forget_steps_outside(&self, from: i64, count: i64, kept: i64) -> Result<i64, StoreError> {
-        let _turn = self.turn().await;
+        let _turn = self.telemetry_turn().await;
 
         let bounds = sqlx::query_as(
             "SELECT (SELECT min(number) FROM telemetry WHERE number > ?), (SELECT max(number) FROM telemetry)",
@@ -187,10 +200,10 @@ impl Store {
         let started = self.inner.started;
         let wall = started.wall.saturating_add(latest.since(started.at)).unwrap_or(started.wall).to_string();
 
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let sealed = seal(&mut connection, segments, &wall).await;
-        drop_if_failed(connection, &sealed);
+        turn.end(connection, &sealed);
         sealed
     }
 }

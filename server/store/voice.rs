@@ -10,7 +10,7 @@ use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::remarks::is_erased;
-use super::values::{begin, drop_if_failed, nanoseconds, parsed, stamp};
+use super::values::{begin, nanoseconds, parsed, stamp};
 use super::{Reader, Stamp, Store, StoreError, chain};
 use crate::ids::{IdempotencyKey, SessionId};
 use crate::trial::voice::{Ending, LARGEST_RECORDING, MediaType};
@@ -132,10 +132,10 @@ impl Store {
     /// # Errors
     /// When the disk or database failed.
     pub async fn keep_voice(&self, piece: &VoicePiece) -> Result<PieceKept, StoreError> {
-        let _turn = self.turn().await;
+        let turn = self.turn().await;
         let mut connection = self.inner.trial.acquire().await?;
         let kept = insert_piece(&mut connection, self.inner.run, piece).await;
-        drop_if_failed(connection, &kept);
+        turn.end(connection, &kept);
         kept
     }
 }

@@ -64,3 +64,21 @@ fn people_read_a_line_a_finding_and_what_to_do() {
     let lens = text.lines().position(|line| line.starts_with("WRONG  lens")).expect("a line for the lens");
     assert!(text.lines().nth(lens + 1).unwrap().contains("Check its cable and power"), "{text}");
 }
+
+#[test]
+fn a_calibrations_age_is_told_and_one_that_cannot_be_read_must_be_put_right() {
+    let data = tempfile::tempdir().unwrap();
+    let file = data.path().join("calibration.toml");
+    std::fs::write(&file, "unit = \"0815\"\nversion = \"2\"\ndate = \"2020-01-01\"\n").unwrap();
+    let (content, findings, errors) = doctor(data.path(), &["--calibration", file.to_str().unwrap()]);
+    assert!(content, "{errors} {findings:?}");
+    let calibration = about(&findings, "calibration");
+    assert_eq!(calibration["verdict"], "advice");
+    assert!(
+        calibration["found"].as_str().unwrap().contains("unit 0815") && calibration.to_string().contains("days old")
+    );
+
+    let (content, findings, errors) = doctor(data.path(), &["--calibration", "/nowhere/at/all.toml"]);
+    assert!(!content && errors.contains("put one thing right"), "{errors}");
+    assert_eq!(about(&findings, "calibration")["verdict"], "wrong");
+}

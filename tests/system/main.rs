@@ -5,6 +5,7 @@
 //! of them.
 
 mod browser;
+mod endurance;
 #[cfg(feature = "aravis")]
 mod gige;
 mod http;

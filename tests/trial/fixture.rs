@@ -233,6 +233,7 @@ impl Trial {
 /// A control loop that only listens.
 fn listener() -> (ControlHandle, mpsc::UnboundedReceiver<Command>) {
     let status = ControlStatus {
+        at: parfocal::clock::Moment::default(),
         camera: CameraHealth {
             name: "none".into(),
             simulated: true,

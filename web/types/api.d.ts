@@ -93,6 +93,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/operator/checks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Whether everything is ready for a trial.
+         * @description Looks at the machine anew. Devices are not asked, because the focus loop holds them: the server tells what it knows.
+         */
+        get: operations["operator_checks"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/operator/choices": {
         parameters: {
             query?: never;
@@ -741,7 +761,10 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Whether the server, its camera and its lens work. */
+        /**
+         * How the server is, and what is wrong.
+         * @description Answers at once, also while the disk hangs.
+         */
         get: operations["service_healthz"];
         put?: never;
         post?: never;
@@ -1328,6 +1351,13 @@ export interface components {
             /** @description Why. */
             reason: string;
         };
+        /** @description What was found. */
+        Checks: {
+            /** @description When, by the server's wall clock. */
+            at: string;
+            /** @description What was looked at, and what to do. */
+            findings: components["schemas"]["Finding"][];
+        };
         /** @description What the operator can choose from. */
         Choices: {
             /** @description Codes of the participants. */
@@ -1339,6 +1369,11 @@ export interface components {
             /** @description Studies that take sessions now. */
             studies: components["schemas"]["OpenStudy"][];
         };
+        /**
+         * @description What can be wrong. Programs may rely on these names.
+         * @enum {string}
+         */
+        Code: "camera-silent" | "lens-gone" | "lens-warns" | "disk-nearly-full" | "disk-silent" | "database-troubled" | "database-unwritable" | "events-unrecorded" | "telemetry-lost" | "loop-stalled";
         /** @description A comment for reading. */
         CommentLine: components["schemas"]["Said"] & {
             /** @description When, by the server's wall clock. */
@@ -1365,6 +1400,11 @@ export interface components {
             /** @description Each surgeon's mean of each policy. */
             surgeons: components["schemas"]["SurgeonMeans"][];
         };
+        /**
+         * @description How the server is.
+         * @enum {string}
+         */
+        Condition: "ok" | "degraded" | "failing";
         /** @description A consent. */
         Consent: {
             /**
@@ -1474,6 +1514,17 @@ export interface components {
             /** @description The key of the comment or answer. */
             record: components["schemas"]["IdempotencyKey"];
         };
+        /** @description One thing that was looked at. */
+        Finding: {
+            /** @description What to do about it; none where all is well. */
+            advice?: string | null;
+            /** @description What was found, in one sentence. */
+            found: string;
+            /** @description What was looked at, for example `disk`. */
+            subject: string;
+            /** @description What it came to. */
+            verdict: components["schemas"]["Verdict"];
+        };
         /** @description Who is to focus outside sessions. */
         Focus: {
             /**
@@ -1520,10 +1571,12 @@ export interface components {
             camera: boolean;
             /** @description Whether the lens takes commands. */
             lens: boolean;
+            /** @description What is wrong, the worst first. */
+            problems: components["schemas"]["Problem"][];
             /** @description Whether the picture or the lens is not of the real world. */
             simulated: boolean;
-            /** @description Always `ok`: a server that cannot answer does not. */
-            status: string;
+            /** @description Whether all is well. */
+            status: components["schemas"]["Condition"];
             /** @description The program's version. */
             version: string;
         };
@@ -1821,6 +1874,15 @@ export interface components {
             /** @description Sessions without a missing value. */
             sessions: number;
             trend?: components["schemas"]["Trend"] | null;
+        };
+        /** @description One thing that is wrong. */
+        Problem: {
+            /** @description What it is, for programs. */
+            code: components["schemas"]["Code"];
+            /** @description How bad it is: `degraded` or `failing`. */
+            condition: components["schemas"]["Condition"];
+            /** @description What it is, in one sentence for people. */
+            message: string;
         };
         /** @description The sessions of a protocol analysed. */
         ProtocolAnalysis: {
@@ -2576,6 +2638,11 @@ export interface components {
             reason: string;
         };
         /**
+         * @description What a check came to.
+         * @enum {string}
+         */
+        Verdict: "well" | "advice" | "wrong";
+        /**
          * @description The clock by which a page measured how long something waited.
          * @enum {string}
          */
@@ -3205,6 +3272,95 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    operator_checks: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Checks"];
+                };
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
                 };
             };
         };
@@ -7938,6 +8094,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description It does its work: `ok`, or `degraded` where something needs a person */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -7986,14 +8143,13 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description Too many pages are open at once */
+            /** @description It cannot do its work: `failing` */
             503: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                    "text/html": unknown;
+                    "application/json": components["schemas"]["Health"];
                 };
             };
         };

@@ -76,6 +76,11 @@ impl Link {
         self.carried.min(self.wanted)
     }
 
+    /// Whether it carries the size that the screen can show.
+    pub(super) fn carries_all(&self) -> bool {
+        self.carried >= self.wanted && self.mean <= LIMIT
+    }
+
     /// The whole picture, which is `cells` wide, covers `width` pixels of the screen, as the page says. Any number
     /// will do: too large a one gets the largest size, and only as far as the page's own link carries it.
     pub(super) fn screen(&mut self, width: u32, cells: usize) {

@@ -12,12 +12,17 @@ mod link;
 mod message;
 mod operator;
 mod surgeon;
+mod tablets;
+
+pub use tablets::OpenTablets;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::extract::{Query, State};
+use axum::http::HeaderMap;
+use axum::http::header::USER_AGENT;
 use axum::response::Response;
 use bytes::Bytes;
 use futures_util::FutureExt;
@@ -34,7 +39,7 @@ use super::error::Error;
 use super::people::SignedIn;
 use super::roles::Roles;
 use super::shutdown::ended;
-use super::tablets;
+use super::tablets::{admit, no_longer_admitted};
 use crate::accounts::Token;
 use crate::clock::Moment;
 use crate::control::ControlStatus;
@@ -46,6 +51,7 @@ use link::Link;
 use message::{Said, Told, close, pack, tell, tenth_millis};
 use operator::ForOperator;
 use surgeon::ForSurgeon;
+use tablets::OpenTablet;
 
 /// A page that has been silent for two of these is gone.
 const HEARTBEAT: Duration = Duration::from_secs(5);
@@ -78,15 +84,20 @@ async fn live(
     roles: Roles,
     SignedIn(person): SignedIn,
     Query(query): Query<LiveQuery>,
+    headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Result<Response, Error> {
     let role = roles.choose(query.role)?;
     let pass = roles.pass().filter(|_| role == Role::Surgeon);
     let token = person.filter(|_| roles.by_account_alone(role)).map(|person| person.token);
     let upgrade = upgrade.max_message_size(LARGEST_REQUEST).read_buffer_size(LARGEST_REQUEST * 4);
+    let browser = headers.get(USER_AGENT).and_then(|name| name.to_str().ok()).unwrap_or_default().to_owned();
     Ok(upgrade.on_upgrade(async move |socket| match role {
         Role::Operator | Role::Researcher => attend::<ForOperator>(socket, Desk::new(app, None, token)).await,
-        Role::Surgeon | Role::System => attend::<ForSurgeon>(socket, Desk::new(app, pass, None)).await,
+        Role::Surgeon | Role::System => {
+            let tablet = app.tablets.enter(&browser);
+            attend::<ForSurgeon>(socket, Desk::new(app, pass, None).of_tablet(tablet)).await;
+        }
     }))
 }
 
@@ -101,10 +112,10 @@ async fn attend<A: Audience>(mut socket: WebSocket, mut desk: Desk<A>) {
 }
 
 /// Comes when a page with `pass` may see the screens no more; never for a page without one.
-fn no_longer_admitted(app: &AppState, pass: Option<Pass>) -> BoxFuture<'static, Error> {
+fn is_over(app: &AppState, pass: Option<Pass>) -> BoxFuture<'static, Error> {
     let app = AppState::clone(app);
     match pass {
-        Some(pass) => async move { tablets::no_longer_admitted(&app, pass).await }.boxed(),
+        Some(pass) => async move { no_longer_admitted(&app, pass).await }.boxed(),
         None => std::future::pending().boxed(),
     }
 }
@@ -148,6 +159,8 @@ struct Desk<A: Audience> {
     pass: Option<Pass>,
     /// What lets a page in that shows no link.
     token: Option<Token>,
+    /// Where the operator sees a surgeon's tablet.
+    tablet: Option<OpenTablet>,
     /// Heartbeats since the page was last heard.
     silent: u32,
     /// The message that goes out next, before any other.
@@ -178,13 +191,20 @@ impl<A: Audience> Desk<A> {
             told: None,
             shutdown: app.shutdown.clone(),
             heartbeat,
-            over: no_longer_admitted(&app, pass),
+            over: is_over(&app, pass),
             pass,
             token,
+            tablet: None,
             silent: 0,
             next: None,
             app,
         }
+    }
+
+    /// The same for a surgeon's tablet.
+    fn of_tablet(mut self, tablet: OpenTablet) -> Self {
+        self.tablet = Some(tablet);
+        self
     }
 
     /// The next message for the page; `Ok(None)` never comes before one is due.
@@ -198,7 +218,11 @@ impl<A: Audience> Desk<A> {
                 _ = &mut self.over => Some(close(LINK_OVER, "the link opens this no more")),
                 () = ended(&mut self.shutdown) => Some(close(close_code::AWAY, "the server is ending")),
                 heard = socket.recv() => match heard {
-                    Some(Ok(message)) => self.hear(&message)?,
+                    Some(Ok(message)) => {
+                        let answer = self.hear(&message)?;
+                        self.note_tablet();
+                        answer
+                    }
                     _ => return Err(Left),
                 },
                 Ok(()) = self.sessions.changed() => self.session(),
@@ -245,6 +269,13 @@ impl<A: Audience> Desk<A> {
         Ok(None)
     }
 
+    /// Tells the operator how the surgeon's tablet is.
+    fn note_tablet(&self) {
+        if let Some(tablet) = &self.tablet {
+            tablet.note(self.screen, self.watcher.is_some(), self.link.carries_all());
+        }
+    }
+
     /// The page has drawn `frame`, and gets the next.
     fn drawn(&mut self, frame: u64) {
         let Some(sent) = self.in_flight.take_if(|sent| sent.number == frame) else { return };
@@ -285,7 +316,7 @@ impl<A: Audience> Desk<A> {
 
     fn session(&mut self) -> Option<Message> {
         // The page of a tablet that may not see this session is about to be closed.
-        if self.pass.is_some_and(|pass| tablets::admit(&self.app, pass).is_err()) {
+        if self.pass.is_some_and(|pass| admit(&self.app, pass).is_err()) {
             return None;
         }
 

@@ -8,6 +8,7 @@ mod blinding;
 mod by_hand;
 #[cfg(feature = "aravis")]
 mod camera_card;
+mod checks_card;
 mod course;
 pub mod driver;
 mod full_disk;

@@ -181,7 +181,16 @@ async fn during_a_session_the_operator_is_told_nothing_that_tells_policies_apart
     }
 
     page.until(|told| told["type"] == "status").await;
-    assert!(!metrics(&session).await.contains("latency"), "how long a step takes tells a network from a hill-climber");
+    let counted = metrics(&session).await;
+    for time in ["latency", "step_seconds", "picture_seconds", "database_write_seconds"] {
+        assert!(!counted.contains(time), "how long things take tells a network from a hill-climber: {time}");
+    }
+
+    for path in ["/healthz", "/api/operator/checks"] {
+        let (status, said) = session.ask("operator", Method::GET, path, &Value::Null).await;
+        let said = said.split_once("} ").unwrap().1.to_lowercase();
+        assert!(status.is_success() && TELLING.iter().all(|telling| !said.contains(telling)), "{path}: {said}");
+    }
 
     let told: Vec<_> = page.heard.iter().map(|message| format!("{message:?}")).collect();
     assert!(told.iter().all(|told| !told.contains("climber")), "{told:?}");

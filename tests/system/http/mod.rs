@@ -3,11 +3,14 @@
 mod accounts;
 mod analysis;
 mod blinding;
+mod checks;
 mod crowd;
 mod evidence;
 mod failing_disk;
 mod finality;
-mod live;
+mod health;
+pub mod live;
+mod logs;
 mod playback;
 mod privacy;
 mod real_time;

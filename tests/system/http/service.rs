@@ -228,6 +228,9 @@ async fn counters_are_told_to_prometheus_without_naming_a_policy() {
         "parfocal_frames_encoded_total",
         "parfocal_jpeg_bytes_total",
         "parfocal_latency_seconds_bucket",
+        "parfocal_step_seconds_bucket",
+        "parfocal_picture_seconds_bucket{le=\"0.0005\",size=\"half\"}",
+        "parfocal_database_write_seconds_count{what=\"records\"}",
     ] {
         assert!(text.lines().any(|line| line.starts_with(name)), "{name} in {text}");
     }

@@ -9,6 +9,7 @@ import "../shared/sign_in.js";
 import { serverAnswered } from "../shared/trouble.js";
 import { Viewer } from "../shared/viewer.js";
 import { drawCamera } from "./camera_card.js";
+import { followChecks } from "./checks_card.js";
 import { followChoices } from "./choices.js";
 import { drawDeviceWords, drawLamps, drawWarnings } from "./devices.js";
 import { drawFocus } from "./focus_card.js";
@@ -109,6 +110,7 @@ followOverlayBoxes((name, on) => {
 
 offerLink();
 document.addEventListener("signed-in", () => followLink(session));
+followChecks();
 followRecording();
 setInterval(() => {
   sessionCard.drawTime();

@@ -1,0 +1,30 @@
+//! The targets of `tests/fuzz/`, run by libFuzzer, which keeps inputs that reach new code. The variable `PARFOCAL_FUZZ`
+//! names one of them. No nightly toolchain is needed:
+//!
+//!     PARFOCAL_FUZZ=protocol cargo fuzz run --sanitizer none parser corpus/protocol
+
+#![no_main]
+
+use std::sync::LazyLock;
+
+use libfuzzer_sys::fuzz_target;
+use targets::{TARGETS, Target};
+
+#[path = "../../tests/fuzz/folders.rs"]
+mod folders;
+#[path = "../../tests/fuzz/targets.rs"]
+mod targets;
+
+/// The project's folder.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+static TARGET: LazyLock<&Target> = LazyLock::new(|| {
+    let name = std::env::var("PARFOCAL_FUZZ").unwrap_or_default();
+    let found = TARGETS.iter().find(|target| target.name == name);
+    found.unwrap_or_else(|| {
+        let names: Vec<_> = TARGETS.iter().map(|target| target.name).collect();
+        panic!("name a target in PARFOCAL_FUZZ: {}", names.join(", "))
+    })
+});
+
+fuzz_target!(|bytes: &[u8]| (TARGET.take)(bytes));

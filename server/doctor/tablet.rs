@@ -1,0 +1,107 @@
+//! The surgeon's tablet, by what its page tells the server anyway.
+
+use super::finding::Finding;
+
+const TABLET: &str = "tablet";
+
+/// A page of the surgeon that is open.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Tablet {
+    /// What its browser calls itself.
+    pub user_agent: String,
+    /// Pixels of its screen that the whole picture covers from left to right, once it has told.
+    pub picture_width: Option<u32>,
+    /// Whether it is on screen, and not behind another program or with the screen off.
+    pub visible: bool,
+    /// Whether its connection carries the size of pictures that its screen can show.
+    pub carries_all: bool,
+}
+
+/// The surgeon's pages that are open: one finding each, or that there is none.
+#[must_use]
+pub fn tablets(open: &[Tablet]) -> Vec<Finding> {
+    if open.is_empty() {
+        let advice = "Scan the code in the card \"Surgeon’s tablet\" with the tablet's camera.";
+        return vec![Finding::advice(TABLET, "No surgeon's page is open.", advice)];
+    }
+    open.iter().map(finding).collect()
+}
+
+fn finding(tablet: &Tablet) -> Finding {
+    let browser = browser(&tablet.user_agent);
+    let width = tablet.picture_width.map_or(String::new(), |width| format!(", the picture {width} pixels wide"));
+    let found = format!("The surgeon's page is open in {browser}{width}.");
+
+    if !tablet.visible {
+        let found = format!("{found} It is not on screen.");
+        return Finding::advice(TABLET, found, "Wake the tablet and bring the page to the front.");
+    }
+    if !tablet.carries_all {
+        let found = format!("{found} Its connection is slow, so it gets smaller pictures than it can show.");
+        return Finding::advice(TABLET, found, "Bring the tablet closer to the access point, or use a faster network.");
+    }
+    Finding::well(TABLET, found)
+}
+
+/// The browser and the device that `user_agent` names, for people.
+fn browser(user_agent: &str) -> String {
+    // Each names those before it too, to be taken for them.
+    const BROWSERS: [(&str, &str); 8] = [
+        ("Edg", "Edge"),
+        ("OPR/", "Opera"),
+        ("SamsungBrowser", "Samsung Internet"),
+        ("Firefox", "Firefox"),
+        ("FxiOS", "Firefox"),
+        ("CriOS", "Chrome"),
+        ("Chrome", "Chrome"),
+        ("Safari", "Safari"),
+    ];
+    // An iPad says that it is a Mac.
+    const DEVICES: [(&str, &str); 7] = [
+        ("iPad", "an iPad"),
+        ("iPhone", "an iPhone"),
+        ("Android", "Android"),
+        ("Macintosh", "an iPad or a Mac"),
+        ("Windows", "Windows"),
+        ("CrOS", "a Chromebook"),
+        ("Linux", "Linux"),
+    ];
+
+    let named = |names: &[(&str, &'static str)]| {
+        names.iter().find(|(mark, _)| user_agent.contains(mark)).map(|&(_, name)| name)
+    };
+    let browser = named(&BROWSERS).unwrap_or("a browser");
+    named(&DEVICES).map_or_else(|| browser.to_owned(), |device| format!("{browser} on {device}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::doctor::Verdict;
+
+    /// As Safari on an iPad says by default, and Chrome on an Android tablet.
+    const IPAD: &str = "Mozilla/5.0 (Macintosh; Intel Mac OS X 10_15_7) AppleWebKit/605.1.15 (KHTML, like Gecko) \
+                        Version/18.1 Safari/605.1.15";
+    const ANDROID: &str = "Mozilla/5.0 (Linux; Android 10; K) AppleWebKit/537.36 (KHTML, like Gecko) \
+                           Chrome/131.0.0.0 Safari/537.36";
+
+    fn tablet(visible: bool, carries_all: bool) -> Tablet {
+        Tablet { user_agent: ANDROID.into(), picture_width: Some(1180), visible, carries_all }
+    }
+
+    #[test]
+    fn browsers_are_told_by_name() {
+        assert_eq!(browser(IPAD), "Safari on an iPad or a Mac");
+        assert_eq!(browser(ANDROID), "Chrome on Android");
+        assert_eq!(browser("curl/8.5.0"), "a browser");
+    }
+
+    #[test]
+    fn a_tablet_that_is_away_asleep_or_slow_is_told() {
+        let of = |open: &[Tablet]| tablets(open).into_iter().map(|finding| finding.verdict).collect::<Vec<_>>();
+        assert_eq!(of(&[]), [Verdict::Advice]);
+        assert_eq!(of(&[tablet(true, true)]), [Verdict::Well]);
+        assert_eq!(of(&[tablet(true, true), tablet(false, true)]), [Verdict::Well, Verdict::Advice]);
+        assert_eq!(of(&[tablet(true, false)]), [Verdict::Advice]);
+    }
+}

@@ -1,0 +1,186 @@
+//! Parsers that read files and folders: a thread has a folder of its own, in which one file at a time is replaced by
+//! the input. The first byte of an input for a folder of several files says which.
+
+use std::cell::LazyCell;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use parfocal::camera::calibration::tables;
+use parfocal::clock::Moment;
+use parfocal::http::keys::Keys;
+use parfocal::imaging::{Calibration, MosaicFrame};
+use parfocal::lens::FocalPower;
+use parfocal::recording::{FORMAT, Header, Recorder, Recording, Shot, VERSION, Writer};
+use parfocal::store::export::verify::verify;
+use parfocal::tls::Certificates;
+use tempfile::TempDir;
+
+use super::ROOT;
+
+/// A folder with files of which one at a time is replaced.
+struct Folder {
+    root: TempDir,
+    /// The files below it, in order, and what they hold.
+    files: Vec<(PathBuf, Vec<u8>)>,
+}
+
+impl Folder {
+    /// A folder as `fill` makes it.
+    fn made_by(fill: impl FnOnce(&Path)) -> Self {
+        let root = tempfile::tempdir().unwrap();
+        fill(root.path());
+        let mut files = Vec::new();
+        collect(root.path(), &mut files);
+        files.sort();
+        Self { root, files }
+    }
+
+    /// Looks at the folder with `input` in the place of one file.
+    fn with(&self, input: &[u8], look: impl FnOnce(&Path)) {
+        let Some((&which, content)) = input.split_first() else { return };
+        let (file, before) = &self.files[usize::from(which) % self.files.len()];
+        fs::write(file, content).unwrap();
+        look(self.root.path());
+        fs::write(file, before).unwrap();
+    }
+
+    /// Each file as an input.
+    fn seeds(&self) -> Vec<Vec<u8>> {
+        let numbered = self.files.iter().enumerate();
+        numbered.map(|(number, (_, content))| [&[number as u8], content.as_slice()].concat()).collect()
+    }
+}
+
+fn collect(folder: &Path, files: &mut Vec<(PathBuf, Vec<u8>)>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            collect(&path, files);
+        } else {
+            let content = fs::read(&path).unwrap();
+            files.push((path, content));
+        }
+    }
+}
+
+thread_local! {
+    static EXPORT: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(|folder| {
+        let template = Path::new(ROOT).join("tests/trial/export-of-format-1");
+        for entry in fs::read_dir(template).unwrap() {
+            let file = entry.unwrap().path();
+            fs::copy(&file, folder.join(file.file_name().unwrap())).unwrap();
+        }
+    }));
+    static RECORDING: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(make_recording));
+    static CERTIFICATE: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(make_certificate));
+    static ALONE: LazyCell<TempDir> = LazyCell::new(|| tempfile::tempdir().unwrap());
+}
+
+/// An export that is verified, with one of its files replaced.
+pub fn export(bytes: &[u8]) {
+    EXPORT.with(|export| export.with(bytes, |folder| assert!(!verify(folder, None).is_empty())));
+}
+
+/// The files of an export.
+pub fn export_files() -> Vec<Vec<u8>> {
+    EXPORT.with(|export| export.seeds())
+}
+
+/// A recording that is opened and read, with one of its files replaced.
+pub fn recording(bytes: &[u8]) {
+    RECORDING.with(|recording| {
+        recording.with(bytes, |folder| {
+            let Ok(recording) = Recording::open(&folder.join("recording")) else { return };
+            let _ = (recording.rate(), recording.seconds(), recording.missing(), recording.bytes());
+            for frame in 0..recording.rows().len().min(3) {
+                let _ = recording.frame(frame);
+            }
+        });
+    });
+}
+
+/// The files of a recording.
+pub fn recording_files() -> Vec<Vec<u8>> {
+    RECORDING.with(|recording| recording.seeds())
+}
+
+/// A certificate and its key, one of them replaced.
+pub fn certificate(bytes: &[u8]) {
+    let now = "2026-06-01T00:00:00Z".parse().unwrap();
+    CERTIFICATE.with(|certificate| {
+        certificate.with(bytes, |folder| {
+            let _ = Certificates::given(folder.join("certificate.pem"), folder.join("key.pem"), now);
+        });
+    });
+}
+
+/// The two files.
+pub fn certificates() -> Vec<Vec<u8>> {
+    CERTIFICATE.with(|certificate| certificate.seeds())
+}
+
+/// The file of the roles' keys.
+pub fn keys(bytes: &[u8]) {
+    ALONE.with(|folder| {
+        fs::write(folder.path().join("keys.toml"), bytes).unwrap();
+        let _ = Keys::load_or_create(folder.path());
+    });
+}
+
+/// A maker's tables of a sensor.
+pub fn calibration_table(bytes: &[u8]) {
+    ALONE.with(|folder| {
+        let file = folder.path().join("table.csv");
+        fs::write(&file, bytes).unwrap();
+        let _ = tables::bands(&file);
+        let _ = tables::correction(&file);
+    });
+}
+
+/// A recording of three frames of 8 x 8 samples.
+fn make_recording(folder: &Path) {
+    const SIZE: usize = 8;
+    let calibration = Calibration::default();
+    let header = Header {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        software: "a test".to_owned(),
+        started: "2026-03-01T12:00:00Z".parse().unwrap(),
+        camera: "a test's".to_owned(),
+        lens: "a test's".to_owned(),
+        simulated: true,
+        calibration: calibration.title(),
+        camera_settings: [("gain".to_owned(), 2.5)].into(),
+        session: None,
+        run: None,
+        monotonic_ns: None,
+        frames_lost: 0,
+        ended: None,
+    };
+
+    let writer = Writer::create(&folder.join("recording"), header, (SIZE, SIZE), &calibration).unwrap();
+    let recorder = Recorder::start(writer, Moment::default()).unwrap();
+    for number in 0..3 {
+        recorder.intake().offer(Shot {
+            number,
+            exposed_at: Moment::from_nanos(number * 20_000_000),
+            exposure: Duration::from_millis(2),
+            asked: FocalPower::MIDDLE,
+            measured: None,
+            optimal: None,
+            mosaic: Arc::new(MosaicFrame::new(SIZE, SIZE, vec![number as u16; SIZE * SIZE]).unwrap()),
+        });
+    }
+    assert_eq!(recorder.stop().lost, 0);
+}
+
+/// A certificate that it signed itself, and its key.
+fn make_certificate(folder: &Path) {
+    let key = rcgen::KeyPair::generate().unwrap();
+    let certificate =
+        rcgen::CertificateParams::new(["parfocal.example".to_owned()]).unwrap().self_signed(&key).unwrap();
+    fs::write(folder.join("certificate.pem"), certificate.pem()).unwrap();
+    fs::write(folder.join("key.pem"), key.serialize_pem()).unwrap();
+}

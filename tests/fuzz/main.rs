@@ -1,0 +1,95 @@
+//! Every parser of bytes from outside takes whatever comes: it reads it or refuses it, and never panics.
+//!
+//! The inputs are the seeds of `fuzz/corpus/`, mutated. Each run takes some of them. A million each:
+//! `make fuzz`, or `cargo test --release --test fuzz -- --ignored --nocapture`.
+//!
+//! The same targets can be run by libFuzzer, which follows the code that an input reaches: see `fuzz/`.
+
+mod folders;
+mod mutation;
+mod targets;
+
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use mutation::Mutator;
+use rayon::prelude::*;
+use targets::{TARGETS, Target};
+
+/// The project's folder.
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+/// Inputs of each target in an ordinary run of the tests.
+const FEW: u64 = 200;
+/// Inputs of each target in a full run.
+const MANY: u64 = 1_000_000;
+/// Inputs that one thread makes at a time.
+const PART: u64 = 1000;
+
+/// The seeds of `target`, oldest name first.
+fn seeds(target: &Target) -> Vec<Vec<u8>> {
+    let folder = Path::new(ROOT).join("fuzz/corpus").join(target.name);
+    let mut files: Vec<_> = fs::read_dir(&folder).into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+
+    let mut seeds: Vec<_> = files.iter().map(|file| fs::read(file).unwrap()).collect();
+    seeds.extend((target.more_seeds)());
+    assert!(!seeds.is_empty(), "{} has no seed in {}", target.name, folder.display());
+    seeds
+}
+
+/// Gives `target` the seeds themselves and `count` mutated ones; each input that it panics on, first come first.
+fn run(target: &Target, count: u64) -> Vec<String> {
+    let seeds = seeds(target);
+    let mut failures: Vec<_> = seeds.iter().filter_map(|seed| failure(target, seed)).collect();
+
+    let parts = 0..count.div_ceil(PART);
+    let found = parts.into_par_iter().flat_map_iter(|part| {
+        let mut mutator = Mutator::new(part, &seeds);
+        let inputs = PART.min(count - part * PART);
+        (0..inputs).filter_map(|_| failure(target, &mutator.next_input())).collect::<Vec<_>>()
+    });
+    failures.extend(found.collect::<Vec<_>>());
+    failures
+}
+
+/// What is wrong where `target` panics on `input`.
+fn failure(target: &Target, input: &[u8]) -> Option<String> {
+    let panic = catch_unwind(AssertUnwindSafe(|| (target.take)(input))).err()?;
+    let words = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+    Some(format!("{}: {} on {}", target.name, words.unwrap_or("a panic"), input.escape_ascii()))
+}
+
+fn run_all(count: u64) {
+    // One target, or all: the name stands in the variable.
+    let only = std::env::var("PARFOCAL_FUZZ").ok();
+    let mut failures = Vec::new();
+    for target in TARGETS.iter().filter(|target| only.as_deref().is_none_or(|only| only == target.name)) {
+        let found = run(target, count);
+        println!("{:20} {count} inputs, {} panics", target.name, found.len());
+        failures.extend(found.into_iter().take(3));
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+#[test]
+fn every_parser_takes_some_mutated_inputs() {
+    run_all(FEW);
+}
+
+#[test]
+#[ignore = "takes minutes to hours: a million inputs each"]
+fn every_parser_takes_a_million_mutated_inputs() {
+    let told = std::env::var("PARFOCAL_FUZZ_INPUTS").ok().map(|count| count.parse().expect("a number of inputs"));
+    run_all(told.unwrap_or(MANY));
+}
+
+#[test]
+fn the_harness_sees_a_panic() {
+    fn take(input: &[u8]) {
+        assert!(!input.contains(&b'!'), "an exclamation mark");
+    }
+    let target = Target { name: "made up", take, more_seeds: || vec![b"hello".to_vec()] };
+    let found = run(&target, 20_000);
+    assert!(!found.is_empty() && found[0].contains("an exclamation mark"), "{found:?}");
+}

@@ -1,0 +1,195 @@
+//! What takes bytes from outside, each as a function of them. The fuzzers of `fuzz/targets/` call the same ones.
+
+use std::path::Path;
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use parfocal::autofocus::{PolicyName, Registry};
+use parfocal::imaging::{
+    Calibration, GrayImage, MosaicFrame, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode, decode_raw,
+};
+use parfocal::lens::MeasuredDynamics;
+use parfocal::lens::optotune::codec::{Request, error_reply};
+use parfocal::options::Options;
+use parfocal::training::recipe::Recipe;
+use parfocal::trial::action::{Action, Focus};
+use parfocal::trial::consent::NewConsent;
+use parfocal::trial::correction::NewCorrection;
+use parfocal::trial::protocol::Protocol;
+use parfocal::trial::remark::{Holding, NewAnswer, NewComment};
+use parfocal::trial::study::definition::Definition;
+
+use super::{ROOT, folders};
+
+/// Something that takes bytes from outside.
+pub struct Target {
+    /// Its name, and that of its folder of seeds.
+    pub name: &'static str,
+    /// Takes an input. Panics where something is wrong.
+    pub take: fn(&[u8]),
+    /// Seeds beside those of its folder.
+    pub more_seeds: fn() -> Vec<Vec<u8>>,
+}
+
+/// All of them.
+pub static TARGETS: [Target; 14] = [
+    Target { name: "calibration", take: calibration, more_seeds: Vec::new },
+    Target { name: "calibration-table", take: folders::calibration_table, more_seeds: Vec::new },
+    Target { name: "certificate", take: folders::certificate, more_seeds: folders::certificates },
+    Target { name: "export", take: folders::export, more_seeds: folders::export_files },
+    Target { name: "json", take: json, more_seeds: Vec::new },
+    Target { name: "keys", take: folders::keys, more_seeds: Vec::new },
+    Target { name: "lens-dynamics", take: lens_dynamics, more_seeds: Vec::new },
+    Target { name: "options", take: options, more_seeds: Vec::new },
+    Target { name: "optotune", take: optotune, more_seeds: Vec::new },
+    Target { name: "picture", take: picture, more_seeds: Vec::new },
+    Target { name: "protocol", take: protocol, more_seeds: shipped_protocols },
+    Target { name: "recipe", take: recipe, more_seeds: shipped_recipes },
+    Target { name: "recording", take: folders::recording, more_seeds: folders::recording_files },
+    Target { name: "study", take: study, more_seeds: Vec::new },
+];
+
+static KNOWN: LazyLock<Vec<PolicyName>> =
+    LazyLock::new(|| Registry::standard().entries().into_iter().map(|entry| entry.name).collect());
+
+const REQUESTS: [Request; 14] = [
+    Request::FirmwareType,
+    Request::FirmwareVersion,
+    Request::Serial,
+    Request::MaxCurrent,
+    Request::SetCurrent(0),
+    Request::Current,
+    Request::CurrentMode,
+    Request::FocalPowerMode,
+    Request::Mode,
+    Request::TemperatureLimits { high: 640, low: 320 },
+    Request::SetFocalPower(0),
+    Request::FocalPower,
+    Request::Temperature,
+    Request::Status,
+];
+
+/// A calibration from any text is read or refused, and what is read can be worked with.
+pub fn calibration(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok(calibration) = Calibration::from_toml(text) else { return };
+    let Ok(mosaic) = MosaicFrame::new(128, 128, vec![500; 128 * 128]) else { return };
+    let Ok(area) = PatchArea::central(32, 32, None) else { return };
+    let patch = Reconstructor::new(&calibration).gray_patch(&mosaic, area);
+    assert!(patch.0.iter().all(|value| (0.0..=255.0).contains(value)), "gray is on its scale");
+}
+
+/// Any bytes from a lens driver's line are a reply, an error or too few; and a reply stays what it is, whatever
+/// follows.
+pub fn optotune(bytes: &[u8]) {
+    let _ = error_reply(bytes);
+    for request in REQUESTS {
+        let mut reply = None;
+        // As it comes: byte by byte.
+        for received in 0..=bytes.len() {
+            let now = request.reply(&bytes[..received]).ok().flatten();
+            assert!(reply.is_none() || reply == now, "{request:?} was answered {reply:?} and then {now:?}");
+            reply = now;
+        }
+    }
+}
+
+/// A picture or mosaic from any bytes is read or refused, and its content area looked for.
+pub fn picture(bytes: &[u8]) {
+    let _ = decode_raw(bytes);
+    for mosaic in [false, true] {
+        let gray = match decode(bytes, mosaic) {
+            Ok(Picture::Rgb(_, gray) | Picture::Gray(gray)) => gray,
+            Ok(Picture::Mosaic(frame)) => {
+                let mut rgb = RgbImage::default();
+                let mut gray = GrayImage::default();
+                Reconstructor::new(&Calibration::default()).reconstruct(&frame, &mut rgb, &mut gray);
+                gray
+            }
+            Err(_) => continue,
+        };
+        assert_eq!(gray.data.len(), gray.width * gray.height);
+        let _ = content_area::detect(&gray);
+    }
+}
+
+/// A trial protocol from any text is read or refused, and what is read is within the limits that docs/trial.md states.
+pub fn protocol(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    match Protocol::parse(text, "fuzzed.toml", &KNOWN) {
+        Ok(protocol) => {
+            assert!((1..=24).contains(&protocol.settings()));
+            assert!((Duration::from_secs(5)..=Duration::from_hours(1)).contains(&protocol.segment_limit));
+            assert!(protocol.policies.iter().all(|policy| KNOWN.contains(policy)));
+        }
+        Err(error) => assert!(error.to_string().contains("fuzzed.toml"), "{error}"),
+    }
+    let _ = Protocol::parse_kept(text, "fuzzed.toml");
+}
+
+/// A study's definition from any text.
+pub fn study(bytes: &[u8]) {
+    static PROTOCOLS: LazyLock<Vec<Protocol>> = LazyLock::new(|| {
+        let texts = shipped_protocols();
+        let texts = texts.iter().filter_map(|text| std::str::from_utf8(text).ok());
+        texts.filter_map(|text| Protocol::parse(text, "shipped.toml", &KNOWN).ok()).collect()
+    });
+
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    if let Err(error) = Definition::parse(text, "fuzzed.toml", &PROTOCOLS) {
+        assert!(error.to_string().contains("fuzzed.toml"), "{error}");
+    }
+}
+
+/// A training recipe from any text.
+pub fn recipe(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    if let Ok(recipe) = Recipe::parse(text) {
+        let _ = recipe.design();
+    }
+}
+
+/// How a lens was measured to move, from any text.
+pub fn lens_dynamics(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    if let Ok(measured) = MeasuredDynamics::from_toml(text) {
+        let _ = measured.dynamics();
+    }
+}
+
+/// The options of a camera or a lens.
+pub fn options(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok((_, mut options)) = Options::split(text) else { return };
+    let _ = options.take::<f64>("exposure");
+    let _ = options.take::<u32>("packet");
+    let _ = options.finish();
+}
+
+/// The bodies that pages send.
+pub fn json(bytes: &[u8]) {
+    let _ = serde_json::from_slice::<Action>(bytes);
+    let _ = serde_json::from_slice::<Focus>(bytes);
+    let _ = serde_json::from_slice::<Holding>(bytes);
+    let _ = serde_json::from_slice::<NewAnswer>(bytes);
+    let _ = serde_json::from_slice::<NewComment>(bytes);
+    let _ = serde_json::from_slice::<NewConsent>(bytes);
+    let _ = serde_json::from_slice::<NewCorrection>(bytes);
+}
+
+fn shipped_protocols() -> Vec<Vec<u8>> {
+    shipped("trial-protocols")
+}
+
+fn shipped_recipes() -> Vec<Vec<u8>> {
+    shipped("policies")
+}
+
+/// The TOML files of a folder that ships.
+fn shipped(folder: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(ROOT).join(folder);
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+    files.sort();
+    files.iter().map(|file| std::fs::read(file).unwrap()).collect()
+}

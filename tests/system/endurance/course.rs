@@ -1,0 +1,123 @@
+//! Sessions, as their operator and their surgeon conduct them over HTTP.
+
+use std::time::Duration;
+
+use reqwest::{Client, Method, StatusCode};
+use serde_json::{Value, json};
+
+use crate::support::{Server, client};
+
+/// Whoever conducts sessions on a server, one after another.
+pub struct Conductor<'a> {
+    server: &'a Server,
+    client: Client,
+    /// Sessions conducted so far.
+    pub sessions: usize,
+    /// Comments that the server acknowledged.
+    pub comments: usize,
+    keys: u32,
+}
+
+/// How long the surgeon looks at a setting, and how often they say something meanwhile.
+#[derive(Debug, Clone, Copy)]
+pub struct Pace {
+    /// Time in each setting.
+    pub setting: Duration,
+    /// Comments in each setting, evenly spread.
+    pub comments: u32,
+}
+
+impl<'a> Conductor<'a> {
+    /// Conducts sessions on `server`, whose participant it adds.
+    pub async fn new(server: &'a Server) -> Self {
+        let conductor = Self { server, client: client(), sessions: 0, comments: 0, keys: 0 };
+        conductor.post("operator", "participants", json!({"code": "S-07"})).await;
+        conductor
+    }
+
+    /// Conducts one session from its preparation until it is closed. Every fourth is aborted in its first setting.
+    pub async fn conduct(&mut self, pace: Pace) {
+        let made = json!({"participant": "S-07", "protocol": "long-day"});
+        let view = self.post("operator", "sessions", made).await;
+        let session = view["session"].clone();
+        self.post("operator", "actions", json!({"session": session, "action": "start"})).await;
+
+        let aborted = self.sessions % 4 == 3;
+        let settings = if aborted { 1 } else { view["settings"].as_u64().unwrap() };
+        for _ in 0..settings {
+            self.inspect(&session, pace).await;
+        }
+
+        if aborted {
+            let abort = json!({"session": session, "action": "abort", "reason": "every fourth session is"});
+            self.post("operator", "actions", abort).await;
+        } else {
+            self.answer(&session).await;
+            assert_eq!(self.view().await["phase"], "completed");
+        }
+        self.post("operator", "dismissals", json!({"session": session})).await;
+        self.sessions += 1;
+    }
+
+    /// One setting: seen, commented on, paused for a moment, and its questions answered.
+    async fn inspect(&mut self, session: &Value, pace: Pace) {
+        let segment = self.view().await["segment"].clone();
+        let act = |action: &str| json!({"session": session, "action": action, "segment": segment});
+        self.post("surgeon", "actions", act("acknowledge")).await;
+
+        for _ in 0..pace.comments {
+            tokio::time::sleep(pace.setting / pace.comments).await;
+            let comment = json!({"key": self.key(), "session": session, "segment": segment, "frame": 1,
+                "client_millis": 0, "kind": "text", "text": "as sharp as before, at the edge of the picture too"});
+            self.post("surgeon", "comments", comment).await;
+            self.comments += 1;
+        }
+
+        let pause = json!({"session": session, "action": "pause", "reason": "a question"});
+        self.post("operator", "actions", pause).await;
+        self.post("operator", "actions", json!({"session": session, "action": "resume"})).await;
+        self.post("surgeon", "actions", act("finish-segment")).await;
+        if self.view().await["phase"] == "questions" {
+            self.answer(session).await;
+        }
+    }
+
+    /// Answers what is asked now.
+    async fn answer(&mut self, session: &Value) {
+        let view = self.view().await;
+        let segment = if view["phase"] == "questions" { view["segment"].clone() } else { Value::Null };
+        for question in view["questions"].as_array().unwrap() {
+            let value = if question["kind"] == "sus" { json!(vec![3; 10]) } else { json!(4) };
+            let answer = json!({"key": self.key(), "session": session, "segment": segment,
+                "question": question["id"], "value": value});
+            self.post("surgeon", "answers", answer).await;
+        }
+
+        let done = json!({"session": session, "action": "finish-questions", "segment": segment});
+        self.post("surgeon", "actions", done).await;
+    }
+
+    /// A key that no other record has.
+    fn key(&mut self) -> String {
+        self.keys += 1;
+        format!("00000000-0000-4000-8000-{:012}", self.keys)
+    }
+
+    /// The session as the surgeon sees it.
+    async fn view(&self) -> Value {
+        self.ask(Method::GET, "surgeon", "session", &Value::Null).await
+    }
+
+    async fn post(&self, role: &str, what: &str, body: Value) -> Value {
+        self.ask(Method::POST, role, what, &body).await
+    }
+
+    async fn ask(&self, method: Method, role: &str, what: &str, body: &Value) -> Value {
+        let request = self.client.request(method, self.server.url(&format!("/api/{role}/{what}")));
+        let response = request.bearer_auth(self.server.key(role)).json(body).send().await.unwrap();
+        let status = response.status();
+        let said = response.text().await.unwrap();
+        assert!(status.is_success(), "{role} {what} {body}: {status} {said}");
+        if status == StatusCode::NO_CONTENT { Value::Null } else { serde_json::from_str(&said).unwrap() }
+    }
+}

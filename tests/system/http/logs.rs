@@ -1,0 +1,68 @@
+//! The server's log: what was said, who said it and how they got in never stand in it.
+
+use std::fs::File;
+use std::sync::Arc;
+
+use reqwest::StatusCode;
+use rustix::process::Signal;
+use serde_json::{Value, json};
+
+use super::live::Page;
+use crate::support::{PASSPHRASE, Server, client, command};
+
+async fn post(server: &Server, role: &str, what: &str, body: Value) -> Value {
+    let request = client().post(server.url(&format!("/api/{role}/{what}"))).bearer_auth(server.key(role)).json(&body);
+    let answer = request.send().await.unwrap();
+    let status = answer.status();
+    let said = answer.text().await.unwrap();
+    assert!(status.is_success(), "{what} {body}: {status} {said}");
+    serde_json::from_str(&said).unwrap_or_default()
+}
+
+#[tokio::test]
+async fn nothing_personal_and_no_key_stands_in_the_log() {
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log");
+    let mut serve = command(data.path(), &["--bind", "127.0.0.1:0", "--fps", "10"]);
+    // Our own lines at their most talkative, and every request.
+    serve.env("RUST_LOG", "info,parfocal=debug,tower_http=debug").stderr(File::create(&log).unwrap());
+    let mut server = Server::run(data, serve);
+
+    server.add_account("ottoline", "lead", "Dr Ottoline Quill");
+    let token = server.sign_in("ottoline").await;
+    let wrong = json!({"name": "ottoline", "passphrase": "wrong battery wrong staple"});
+    let refused = client().post(server.url("/api/sign-in")).json(&wrong).send().await.unwrap();
+    assert_eq!(refused.status(), StatusCode::FORBIDDEN);
+    for key in [server.key("surgeon"), "misspelled-key"] {
+        server.get(&format!("/enter?key={key}")).send().await.unwrap();
+    }
+
+    post(&server, "operator", "participants", json!({"code": "QX-93"})).await;
+    let made = json!({"participant": "QX-93", "protocol": "practice"});
+    let session = post(&server, "operator", "sessions", made).await["session"].clone();
+    post(&server, "operator", "actions", json!({"session": session, "action": "start"})).await;
+    let mut page = Page::open(&server, "surgeon").await;
+    page.watch(2).await;
+
+    let key = "00000000-0000-4000-8000-000000000001";
+    let text = "the zebrafish swims sideways";
+    let comment = json!({"key": key, "session": session, "kind": "text", "text": text});
+    post(&server, "surgeon", "comments", comment).await;
+    let reason = "the patient Zacharias coughed";
+    post(&server, "operator", "actions", json!({"session": session, "action": "abort", "reason": reason})).await;
+    // Refused, with the words in the body.
+    let unknown = json!({"session": key, "action": "abort", "reason": reason});
+    let request = client().post(server.url("/api/operator/actions")).bearer_auth(server.key("operator"));
+    assert_eq!(request.json(&unknown).send().await.unwrap().status(), StatusCode::NOT_FOUND);
+    assert!(server.end(Signal::TERM));
+
+    let written = std::fs::read_to_string(&log).unwrap();
+    assert!(written.contains("ending") && written.contains("/api/surgeon/comments"), "it logs: {written}");
+    let keys = ["surgeon", "operator", "researcher"].map(|role| server.key(role).to_owned());
+    let secrets =
+        keys.iter().map(String::as_str).chain([token.as_str(), PASSPHRASE, "misspelled-key", "wrong battery"]);
+    for personal in secrets.chain(["QX-93", "ottoline", "Ottoline", "Quill", "zebrafish", "Zacharias"]) {
+        assert!(!written.contains(personal), "'{personal}' is in the log:\n{written}");
+    }
+}

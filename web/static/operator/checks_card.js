@@ -1,0 +1,59 @@
+// Whether everything is ready for a trial: what the server finds at this machine, its devices and the
+// surgeon's tablet.
+
+import { get } from "../shared/api.js";
+import { byId, make, redraw, setText } from "../shared/dom.js";
+import { tell, tellTrouble } from "../shared/trouble.js";
+import { heading, passed, shown, sorted, summary } from "./checks_words.js";
+
+/** @typedef {import("./checks_words.js").Finding} Finding */
+
+const button = byId("check-again", HTMLButtonElement);
+
+/** @param {Finding} finding */
+function line(finding) {
+  const { mark, words, level } = shown(finding);
+  return make(
+    "li",
+    { className: level },
+    make("span", { className: "mark", "aria-hidden": "true" }, mark),
+    make(
+      "div",
+      {},
+      make("span", { className: "visually-hidden" }, `${words}: `),
+      make("strong", {}, `${heading(finding.subject)}:`),
+      make("span", {}, ` ${finding.found}`),
+      finding.advice && make("p", { className: "muted" }, finding.advice),
+    ),
+  );
+}
+
+/** @param {Finding[]} findings */
+function draw(findings) {
+  const { open, well } = sorted(findings);
+  setText(byId("checks-summary"), summary(findings));
+  redraw(byId("checks-open"), open.map(line));
+  redraw(byId("checks-well"), well.map(line));
+  setText(byId("checks-passed"), passed(well.length));
+  byId("checks-details").hidden = well.length === 0;
+}
+
+async function check() {
+  button.disabled = true;
+  setText(byId("checks-summary"), "Checking…");
+  try {
+    draw((await get("/api/operator/checks")).findings);
+    tell(byId("checks-trouble"), "");
+  } catch (error) {
+    setText(byId("checks-summary"), "");
+    tellTrouble(byId("checks-trouble"), error);
+  } finally {
+    button.disabled = false;
+  }
+}
+
+/** Checks now, and when the operator asks for it. */
+export function followChecks() {
+  button.addEventListener("click", check);
+  check();
+}
