@@ -12,6 +12,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
+use super::now;
 use super::people::{From, SignedIn, confirmed_lead, lead};
 use super::researcher::local;
 use super::roles::Researcher;
@@ -32,6 +33,10 @@ struct Page {
 
 impl Page {
     const ROLES: [AccountRole; 4] = AccountRole::ALL;
+
+    fn now(&self) -> &'static str {
+        now::on_people(self.accounts.iter().any(|line| line.set_by_another && !line.account.disabled))
+    }
 
     /// When somebody last signed in, on the clock of the room.
     fn last_signed_in(at: Option<&Timestamp>) -> String {

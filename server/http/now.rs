@@ -38,6 +38,15 @@ pub(super) const fn on_session(session: Session) -> &'static str {
     }
 }
 
+/// On the page of accounts. `waiting`: whether somebody was given a passphrase and has not signed in with it yet.
+pub(super) const fn on_people(waiting: bool) -> &'static str {
+    if waiting {
+        "Tell each new person the passphrase for the first sign-in. Then plan the study."
+    } else {
+        "Make an account for everybody but the surgeons. Then plan the study."
+    }
+}
+
 /// On the list of studies.
 pub(super) const fn on_studies(has_accounts: bool, signed_in: bool) -> &'static str {
     match (has_accounts, signed_in) {

@@ -55,7 +55,7 @@ async fn a_sign_in_lasts_until_it_is_ended_or_expires() {
     let accounts = trial.accounts();
     trial.account("lead", AccountRole::Lead, "Dr Lead").await;
     let operator = trial.account("operator", AccountRole::Operator, "Nurse Op").await;
-    let sign_in = async || accounts.sign_in("operator", PASSPHRASE, PEER).await.unwrap().1;
+    let sign_in = async || accounts.sign_in("operator", PASSPHRASE, None, PEER).await.unwrap().1;
     let is_in = async |token: &Token| accounts.signed_in(token).await.unwrap().is_some();
 
     let token = sign_in().await;
@@ -70,14 +70,14 @@ async fn a_sign_in_lasts_until_it_is_ended_or_expires() {
         accounts.change(&operator.account, &change, None).await.unwrap();
         assert!(!is_in(&token).await, "{change:?}");
     }
-    let refused = accounts.sign_in("operator", PASSPHRASE, PEER).await.err();
+    let refused = accounts.sign_in("operator", PASSPHRASE, None, PEER).await.err();
     assert_eq!(refused, Some(AccountError::WrongPassphrase), "disabled");
     accounts.change(&operator.account, &AccountChange::Enable, None).await.unwrap();
     let token = sign_in().await;
     let another = Passphrase::new("another passphrase").unwrap();
     accounts.replace_passphrase(&operator.account, another, None).await.unwrap();
     assert!(!is_in(&token).await);
-    let token = accounts.sign_in("operator", "another passphrase", PEER).await.unwrap().1;
+    let token = accounts.sign_in("operator", "another passphrase", None, PEER).await.unwrap().1;
 
     trial.clock.advance(Duration::from_mins(59));
     assert!(is_in(&token).await);
@@ -97,10 +97,10 @@ async fn whatever_is_wrong_has_the_same_words_and_is_recorded_without_them() {
     let mut errors = Vec::new();
     for (name, passphrase) in [("lead", "a wrong secret 1"), ("nobody", PASSPHRASE), ("not a name!", "secret-as-name")]
     {
-        errors.push(accounts.sign_in(name, passphrase, PEER).await.err().unwrap());
+        errors.push(accounts.sign_in(name, passphrase, None, PEER).await.err().unwrap());
     }
     assert_eq!(errors, vec![AccountError::WrongPassphrase; 3]);
-    let (_, token) = accounts.sign_in("lead", PASSPHRASE, PEER).await.unwrap();
+    let (_, token) = accounts.sign_in("lead", PASSPHRASE, None, PEER).await.unwrap();
     let lead = accounts.signed_in(&token).await.unwrap().unwrap();
     let refused = accounts.confirm(&lead, "a wrong secret 2", PEER).await;
     assert_eq!(refused, Err(AccountError::WrongConfirmation));
@@ -139,7 +139,7 @@ async fn the_production_parameters_hash_and_a_hash_keeps_its_own() {
     let costly = parfocal::accounts::Accounts::of_server(&trial.store, trial.clock.clone(), Cost::default());
     let passphrase = Passphrase::new(PASSPHRASE).unwrap();
     costly.add(name("lead"), "Dr Lead", AccountRole::Lead, passphrase, None).await.unwrap();
-    trial.accounts().sign_in("lead", PASSPHRASE, PEER).await.unwrap();
+    trial.accounts().sign_in("lead", PASSPHRASE, None, PEER).await.unwrap();
 
     let pool = crate::storage::raw(folder.path()).await;
     let cost: (i64, i64) = sqlx::query_as("SELECT memory_kib, passes FROM accounts").fetch_one(&pool).await.unwrap();
@@ -211,8 +211,8 @@ async fn whatever_is_changed_of_accounts_in_a_database_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let mut trial = Trial::start(folder.path()).await;
     a_session(&mut trial).await;
-    trial.accounts().sign_in("operator", PASSPHRASE, PEER).await.unwrap();
-    trial.accounts().sign_in("operator", "wrong one here", PEER).await.err().unwrap();
+    trial.accounts().sign_in("operator", PASSPHRASE, None, PEER).await.unwrap();
+    trial.accounts().sign_in("operator", "wrong one here", None, PEER).await.err().unwrap();
     trial.store.close().await;
     drop(trial);
 

@@ -850,7 +850,7 @@ export interface paths {
             cookie?: never;
         };
         /** The accounts, for leads. */
-        get: operations["accounts_page"];
+        get: operations["accounts_people_page"];
         put?: never;
         post?: never;
         delete?: never;
@@ -8491,7 +8491,7 @@ export interface operations {
             };
         };
     };
-    accounts_page: {
+    accounts_people_page: {
         parameters: {
             query?: never;
             header?: never;

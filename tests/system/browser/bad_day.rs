@@ -115,7 +115,8 @@ impl Day {
     /// A study is planned and opened.
     async fn begin(driver: &Driver) -> Self {
         let disk = SmallDisk::of_megabytes(64);
-        let folder = disk.as_ref().map_or_else(|| Arc::new(tempfile::tempdir().unwrap()), |disk| Arc::clone(&disk.folder));
+        let folder =
+            disk.as_ref().map_or_else(|| Arc::new(tempfile::tempdir().unwrap()), |disk| Arc::clone(&disk.folder));
         let protocols = tempfile::tempdir().unwrap();
         std::fs::write(protocols.path().join("bad-day.toml"), PROTOCOL).unwrap();
         let lens = Emulator::start(Model::default(), Arc::new(SystemClock)).unwrap();
@@ -308,8 +309,7 @@ impl Day {
 
         // The chain is whole, and each session had the order that was drawn for its place.
         for change in ["close", "lock", "unblind"] {
-            let signed =
-                json!({"change": change, "reason": "it is over", "passphrase": PASSPHRASE, "despite_outstanding": true});
+            let signed = json!({"change": change, "reason": "it is over", "passphrase": PASSPHRASE, "despite_outstanding": true});
             post(&self.theatre.server, "researcher", "/api/researcher/studies/bad-day/changes", signed).await;
         }
         let said = succeeds(&["verify"], self.folder());

@@ -358,7 +358,10 @@ async fn a_lead_makes_accounts_whose_people_choose_their_own_passphrases() {
     let sql = "SELECT kind, done_by FROM account_events WHERE account = 'n.op' ORDER BY number LIMIT 2";
     let events: Vec<(String, String)> = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();
     pool.close().await;
-    assert_eq!(events, [("added".to_owned(), "lead".to_owned()), ("passphrase-replaced".to_owned(), "n.op".to_owned())]);
+    assert_eq!(
+        events,
+        [("added".to_owned(), "lead".to_owned()), ("passphrase-replaced".to_owned(), "n.op".to_owned())]
+    );
 }
 
 #[tokio::test]
@@ -421,7 +424,7 @@ async fn a_live_view_ends_when_its_account_is_disabled() {
     page.watch(2).await;
 
     assert_eq!(change(&server, "operator", json!({"change": "disable"}), PASSPHRASE).await.0, 200);
-    assert_eq!(closed(&mut page).await, CloseCode::from(4403));
+    assert_eq!(closed(&mut page).await, CloseCode::Policy);
 }
 
 /// Runs `parfocal account` with these arguments in a terminal of its own, typing `lines`, each once it is asked for.
