@@ -1,5 +1,26 @@
 // What the tests give the pages' logic in place of a browser.
 
+/** What the surgeon is told in the middle of a setting. @type {Api.SurgeonView} */
+export const VIEW = {
+  session: "s",
+  phase: "inspecting",
+  paused: false,
+  may_resume: false,
+  unrecorded: false,
+  practice: false,
+  title: "Trial",
+  segment: "a",
+  setting: 2,
+  settings: 6,
+  remaining_seconds: 31.5,
+  prompt: "How does it feel now?",
+  quick_comments: [],
+  voice: false,
+  questions: [],
+  answers: {},
+  comments: 3,
+};
+
 /**
  * A browser's storage; `full` makes every write fail.
  *

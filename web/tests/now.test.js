@@ -4,26 +4,7 @@ import { test } from "node:test";
 import { nowWords as operatorWords } from "../static/operator/now.js";
 import { Contact } from "../static/shared/contact.js";
 import { nowWords as surgeonWords } from "../static/surgeon/now.js";
-import { FakeTime } from "./around.js";
-
-/** @type {Api.SurgeonView} */
-const VIEW = {
-  session: "s",
-  phase: "inspecting",
-  paused: false,
-  may_resume: false,
-  unrecorded: false,
-  practice: false,
-  title: "Trial",
-  segment: "a",
-  setting: 2,
-  settings: 6,
-  quick_comments: [],
-  voice: false,
-  questions: [],
-  answers: {},
-  comments: 0,
-};
+import { FakeTime, VIEW } from "./around.js";
 
 const PHASES = /** @type {const} */ ([
   "ready",

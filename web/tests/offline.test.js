@@ -6,28 +6,7 @@ import vm from "node:vm";
 import { Awake } from "../static/surgeon/awake.js";
 import { LastView } from "../static/surgeon/last_view.js";
 import { storageAdvice } from "../static/surgeon/storage_words.js";
-import { FakeTime, fakeStore, settle } from "./around.js";
-
-/** @type {Api.SurgeonView} */
-const VIEW = {
-  session: "s",
-  phase: "inspecting",
-  paused: false,
-  may_resume: false,
-  unrecorded: false,
-  practice: false,
-  title: "Trial",
-  segment: "a",
-  setting: 2,
-  settings: 6,
-  remaining_seconds: 31.5,
-  prompt: "How does it feel now?",
-  quick_comments: [],
-  voice: false,
-  questions: [],
-  answers: {},
-  comments: 3,
-};
+import { FakeTime, fakeStore, settle, VIEW } from "./around.js";
 
 const HOUR_MS = 3_600_000;
 
