@@ -14,7 +14,7 @@ package:
 	@cargo build --release --locked $(FEATURES)
 	@deploy/debian/build
 
-.PHONY: run test package check lint web web-types unit interface readme packaged bench fuzz endurance
+.PHONY: run test package check lint web web-types unit interface readme packaged bench screenshots fuzz endurance
 
 run:
 	@.ci/setup build
@@ -56,6 +56,10 @@ readme:
 # The Debian package, unpacked.
 packaged:
 	.ci/package
+
+# Pictures of every page and state, in target/screenshots/.
+screenshots:
+	PARFOCAL_SCREENSHOTS=1 cargo test --locked $(FEATURES) --test system -- browser:: tls::trust_page
 
 # Speed: each figure that docs/speed.md states comes from here.
 bench:

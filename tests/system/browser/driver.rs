@@ -47,6 +47,12 @@ pub struct Driver {
 impl Driver {
     /// Starts chromedriver on a free port.
     pub fn start() -> Self {
+        // It looks for a port that is free with IPv4, and ends where another program has that port with IPv6.
+        let mut attempts = (0..5).filter_map(|_| Self::try_start());
+        attempts.next().expect("chromedriver finds a port and says which")
+    }
+
+    fn try_start() -> Option<Self> {
         let mut process = Command::new("chromedriver")
             .arg("--port=0")
             .stdout(Stdio::piped())
@@ -54,10 +60,14 @@ impl Driver {
             .spawn()
             .unwrap_or_else(|error| panic!("cannot start chromedriver ({error}): {NEEDED}"));
 
-        let mut said = BufReader::new(process.stdout.take().unwrap());
+        let mut said = BufReader::new(process.stdout.take()?);
         let mut lines = said.by_ref().lines().map_while(Result::ok);
         let port = lines.find_map(|line| line.split_once(STARTED)?.1.trim_end_matches('.').parse().ok());
-        Self { process, port: port.expect("chromedriver says its port"), _said: said }
+        let Some(port) = port else {
+            let _ = process.wait();
+            return None;
+        };
+        Some(Self { process, port, _said: said })
     }
 
     /// A browser with a fresh profile.
