@@ -12,6 +12,8 @@ use targets::{TARGETS, Target};
 
 #[path = "../../tests/fuzz/folders.rs"]
 mod folders;
+#[path = "../../tests/fuzz/lessons.rs"]
+mod lessons;
 #[path = "../../tests/fuzz/targets.rs"]
 mod targets;
 

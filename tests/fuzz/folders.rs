@@ -20,7 +20,7 @@ use tempfile::TempDir;
 use super::ROOT;
 
 /// A folder with files of which one at a time is replaced.
-struct Folder {
+pub struct Folder {
     root: TempDir,
     /// The files below it, in order, and what they hold.
     files: Vec<(PathBuf, Vec<u8>)>,
@@ -28,7 +28,7 @@ struct Folder {
 
 impl Folder {
     /// A folder as `fill` makes it.
-    fn made_by(fill: impl FnOnce(&Path)) -> Self {
+    pub fn made_by(fill: impl FnOnce(&Path)) -> Self {
         let root = tempfile::tempdir().unwrap();
         fill(root.path());
         let mut files = Vec::new();
@@ -38,7 +38,7 @@ impl Folder {
     }
 
     /// Looks at the folder with `input` in the place of one file.
-    fn with(&self, input: &[u8], look: impl FnOnce(&Path)) {
+    pub fn with(&self, input: &[u8], look: impl FnOnce(&Path)) {
         let Some((&which, content)) = input.split_first() else { return };
         let (file, before) = &self.files[usize::from(which) % self.files.len()];
         fs::write(file, content).unwrap();
@@ -47,7 +47,7 @@ impl Folder {
     }
 
     /// Each file as an input.
-    fn seeds(&self) -> Vec<Vec<u8>> {
+    pub fn seeds(&self) -> Vec<Vec<u8>> {
         let numbered = self.files.iter().enumerate();
         numbered.map(|(number, (_, content))| [&[number as u8], content.as_slice()].concat()).collect()
     }

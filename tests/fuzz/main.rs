@@ -6,6 +6,7 @@
 //! The same targets can be run by libFuzzer, which follows the code that an input reaches: see `fuzz/`.
 
 mod folders;
+mod lessons;
 mod mutation;
 mod targets;
 

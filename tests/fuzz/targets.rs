@@ -19,7 +19,7 @@ use parfocal::trial::protocol::Protocol;
 use parfocal::trial::remark::{Holding, NewAnswer, NewComment};
 use parfocal::trial::study::definition::Definition;
 
-use super::{ROOT, folders};
+use super::{ROOT, folders, lessons};
 
 /// Something that takes bytes from outside.
 pub struct Target {
@@ -32,7 +32,7 @@ pub struct Target {
 }
 
 /// All of them.
-pub static TARGETS: [Target; 14] = [
+pub static TARGETS: [Target; 17] = [
     Target { name: "calibration", take: calibration, more_seeds: Vec::new },
     Target { name: "calibration-table", take: folders::calibration_table, more_seeds: Vec::new },
     Target { name: "certificate", take: folders::certificate, more_seeds: folders::certificates },
@@ -46,7 +46,10 @@ pub static TARGETS: [Target; 14] = [
     Target { name: "protocol", take: protocol, more_seeds: shipped_protocols },
     Target { name: "recipe", take: recipe, more_seeds: shipped_recipes },
     Target { name: "recording", take: folders::recording, more_seeds: folders::recording_files },
+    Target { name: "scan", take: lessons::scan, more_seeds: lessons::scan_files },
+    Target { name: "stack", take: lessons::stack, more_seeds: lessons::stack_files },
     Target { name: "study", take: study, more_seeds: Vec::new },
+    Target { name: "weights", take: lessons::network_weights, more_seeds: lessons::whole_weights },
 ];
 
 static KNOWN: LazyLock<Vec<PolicyName>> =

@@ -1,0 +1,129 @@
+//! What training and evaluation read: weights of a network, recorded scans and focal stacks.
+
+use std::fs;
+use std::path::Path;
+
+use parfocal::autofocus::weights;
+use parfocal::camera::recorded::{FORMAT, Header, Order, Recording, ScanFolder, Shot, VERSION};
+use parfocal::imaging::{GrayImage, PatchArea};
+use parfocal::lens::FocalPower;
+use parfocal::scans::recorded::{RecordedScan, evenly_spread};
+use parfocal::scans::stack::{FocalStack, check};
+use tch::{Device, nn};
+
+use super::folders::Folder;
+
+/// Sides of the pictures, pixels: the least of a scan.
+const SIDE: usize = 64;
+/// Pictures of a pose and of a stack: the fewest that a stack has.
+const PICTURES: usize = 5;
+/// Positions of the stack's pictures.
+const LIST: &str = "positions.csv";
+
+thread_local! {
+    static SCAN: Folder = Folder::made_by(make_scan);
+    static STACK: Folder = Folder::made_by(make_stack);
+    static NETWORK: nn::VarStore = network();
+}
+
+/// Weights of a small network from any bytes.
+pub fn network_weights(bytes: &[u8]) {
+    NETWORK.with(|network| {
+        let _ = weights::load(network, bytes);
+        let _ = weights::load_widening(network, bytes, "layer.weight", &[2]);
+    });
+}
+
+/// Weights of the same network.
+pub fn whole_weights() -> Vec<Vec<u8>> {
+    vec![weights::save(&network(), "a test").unwrap()]
+}
+
+/// A recorded scan, with one of its files replaced, is read whole or refused.
+pub fn scan(bytes: &[u8]) {
+    SCAN.with(|scan| {
+        scan.with(bytes, |folder| {
+            let Ok(scan) = ScanFolder::open(folder) else { return };
+            let _ = scan.missing();
+            if let Ok(whole) = scan.whole() {
+                let _ = RecordedScan::read(&whole, &|| {});
+            }
+        });
+    });
+}
+
+/// The files of a scan.
+pub fn scan_files() -> Vec<Vec<u8>> {
+    SCAN.with(Folder::seeds)
+}
+
+/// A focal stack and its list of positions, one file replaced.
+pub fn stack(bytes: &[u8]) {
+    STACK.with(|stack| {
+        stack.with(bytes, |folder| {
+            for list in [None, Some(folder.join(LIST))] {
+                let Ok(stack) = FocalStack::load(&folder.join("pictures"), list.as_deref(), 1) else { continue };
+                let _ = check::check(&stack);
+                let _ = stack.even();
+            }
+        });
+    });
+}
+
+/// The files of a stack.
+pub fn stack_files() -> Vec<Vec<u8>> {
+    STACK.with(Folder::seeds)
+}
+
+fn network() -> nn::VarStore {
+    let store = nn::VarStore::new(Device::Cpu);
+    let _ = nn::linear(store.root() / "layer", 3, 2, nn::LinearConfig::default());
+    store
+}
+
+/// Stripes, the less contrast the farther `focal_power` is from the middle.
+fn picture(focal_power: FocalPower) -> GrayImage {
+    let contrast = 100.0 * (1.0 - (focal_power.get() - FocalPower::MIDDLE.get()).abs());
+    let level = |place: usize| if place / 4 % 2 == 0 { 128.0 + contrast } else { 128.0 - contrast };
+    let data = (0..SIDE * SIDE).map(|place| level(place) as f32).collect();
+    GrayImage::new(SIDE, SIDE, data).unwrap()
+}
+
+/// A scan of one pose.
+fn make_scan(folder: &Path) {
+    let focal_powers = evenly_spread(PICTURES);
+    let header = Header {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        software: "a test".to_owned(),
+        camera: "a test's".to_owned(),
+        lens: None,
+        simulated: true,
+        calibration: None,
+        seed: 1,
+        order: Order::Random,
+        poses: 1,
+        focal_powers: focal_powers.clone(),
+    };
+
+    let mut recording = Recording::open(folder, &header).unwrap();
+    let images = focal_powers.iter().map(|&power| (power, picture(power))).collect();
+    let patch = PatchArea::central(SIDE, SIDE, None).unwrap();
+    recording.store(&Shot { pose: 1, images, patch, optimum: FocalPower::MIDDLE, truth: None }).unwrap();
+}
+
+/// A stack's pictures, and a list that says where each was taken.
+fn make_stack(folder: &Path) {
+    let pictures = folder.join("pictures");
+    fs::create_dir(&pictures).unwrap();
+
+    let mut list = "file,position\n".to_owned();
+    for (number, power) in evenly_spread(PICTURES).into_iter().enumerate() {
+        let name = format!("plane{number}.png");
+        let gray = picture(power).data.into_iter().map(|level| level as u8).collect();
+        let gray = image::GrayImage::from_raw(SIDE as u32, SIDE as u32, gray).unwrap();
+        gray.save(pictures.join(&name)).unwrap();
+        list += &format!("{name},{number}\n");
+    }
+    fs::write(folder.join(LIST), list).unwrap();
+}
