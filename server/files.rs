@@ -111,6 +111,29 @@ pub fn make_private(path: &Path) -> io::Result<()> {
     fs::set_permissions(path, Permissions::from_mode(mode & !OTHERS & 0o7777))
 }
 
+/// The files in `folder` and in the folders within it, in order, each by its path from there.
+///
+/// # Errors
+/// When a folder cannot be read.
+pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(within) = folders.pop() {
+        for entry in fs::read_dir(folder.join(&within))? {
+            let entry = entry?;
+            let name = within.join(entry.file_name());
+            if entry.path().is_dir() {
+                folders.push(name);
+            } else {
+                files.push(name);
+            }
+        }
+    }
+
+    files.sort();
+    Ok(files)
+}
+
 /// Whether a process killed in [`replace`] may have left a file of this `name`.
 #[must_use]
 pub fn is_partial(name: &str) -> bool {

@@ -41,6 +41,7 @@ pub mod package;
 
 pub mod playback;
 pub mod recorder;
+pub mod study_export;
 
 pub mod http;
 

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::output::{Failure, print, steps};
+use super::output::{Failure, Steps, print};
 use crate::clock::SystemClock;
 use crate::ids::SessionId;
-use crate::package::{self, LeftOut, Source};
+use crate::package::{self, LeftOut, Sessions, Source, Summary};
 use crate::store::Recorder;
 use crate::store::export::export;
-use crate::trial::study::places::Enrolled;
+use crate::study_export::{Progress, export_study};
 
 /// Arguments of `parfocal export`.
 #[derive(Debug, Args)]
@@ -67,50 +67,36 @@ async fn write_session(recorder: &Recorder, session: SessionId, arguments: &Argu
     print(&format!("{} files ({kind}{practice}) in {folder}\nchain {}\n", summary.files.len(), summary.head))
 }
 
-/// Exports each session of `study` into a temporary folder, and joins them.
+/// Exports all of `study`, and tells how far it has come.
 async fn write_study(recorder: &Recorder, study: &str, arguments: &Arguments) -> Result<(), Failure> {
-    let out = &arguments.out;
-    let stored = recorder.reader().study(study).await?;
-    let stored = stored.ok_or_else(|| format!("there is no study '{study}'; `parfocal study show` lists all"))?;
-
-    let withdrawn = |session: &Enrolled| LeftOut {
-        session: session.session.to_string(),
-        reason: "the participant withdrew".to_owned(),
+    let steps = Arc::new(Steps::new());
+    let told = {
+        let steps = Arc::clone(&steps);
+        move |progress: Progress| match progress.steps {
+            0 => steps.tell("sessions exported", progress.exported, progress.sessions),
+            all => steps.tell("steps of joining", progress.joined, all),
+        }
     };
-    let left_out: Vec<LeftOut> = stored.sessions.iter().filter(|session| session.withdrawn).map(withdrawn).collect();
-    let sessions: Vec<&Enrolled> = stored.sessions.iter().filter(|session| !session.withdrawn).collect();
-    if sessions.is_empty() {
-        return Err(format!("study '{study}' has no session to export").into());
-    }
 
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(parent).map_err(|error| format!("cannot write {}: {error}", parent.display()))?;
-    let exports = tempfile::Builder::new().prefix(".parfocal-exports-").tempdir_in(parent)?;
-
-    let progress = steps(sessions.len(), "sessions exported");
-    let mut sources = Vec::new();
-    for session in &sessions {
-        let folder = exports.path().join(session.session.to_string());
-        export(recorder, session.session, &folder, arguments.unblinded).await?;
-        sources.push(Source::open(&folder)?);
-        progress.inc(1);
-    }
-    progress.finish_and_clear();
-
-    join(&sources, &left_out, out, arguments.json)
+    let exported = export_study(recorder, study, arguments.unblinded, &arguments.out, Arc::new(told)).await;
+    steps.end();
+    tell(&exported?, arguments.json)
 }
 
-/// Writes the package of `sources` with a progress bar, and tells what it holds.
+/// Writes the package of `sources`, and tells how far it has come and what it holds.
 pub fn join(sources: &[Source], left_out: &[LeftOut], out: &Path, json: bool) -> Result<(), Failure> {
-    let progress = steps(0, "steps of joining");
-    let summary = package::write(sources, left_out, out, &mut |done, total| {
-        progress.set_length(total as u64);
-        progress.set_position(done as u64);
-    })?;
-    progress.finish_and_clear();
+    let steps = Steps::new();
+    let joined = package::write(sources, Sessions::Copied, left_out, out, &mut |done, all| {
+        steps.tell("steps of joining", done, all);
+    });
+    steps.end();
+    tell(&joined?, json)
+}
 
+/// Tells what a package holds.
+fn tell(summary: &Summary, json: bool) -> Result<(), Failure> {
     if json {
-        return print(&(serde_json::to_string(&summary)? + "\n"));
+        return print(&(serde_json::to_string(summary)? + "\n"));
     }
     let kind = if summary.unblinded { "unblinded" } else { "blinded" };
     let left_out = match summary.left_out.len() {

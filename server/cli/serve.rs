@@ -35,6 +35,7 @@ use crate::lens::{Lens, LensDynamics, LensInfo, MeasuredDynamics};
 use crate::playback::Player;
 use crate::recorder::{self, Recordings};
 use crate::store::{self, Store, device_log, telemetry};
+use crate::study_export::StudyExports;
 use crate::tls::Certificates;
 use crate::{lens, live, priority, recording};
 
@@ -214,9 +215,11 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
 
     let reach = reach(address, certificates.as_deref());
     let accounts = Accounts::of_server(&store, Arc::clone(&clock), Cost::default());
+    let study_exports = StudyExports::new(&arguments.data_dir);
     let app = Arc::new(App {
         clock,
         accounts,
+        study_exports,
         live,
         store: store.clone(),
         health,

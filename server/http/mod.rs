@@ -37,6 +37,7 @@ mod shutdown;
 mod sign_in;
 mod state;
 mod studies;
+mod study_export;
 mod surgeon;
 mod tablets;
 mod trust;
@@ -91,6 +92,7 @@ pub fn router(app: AppState) -> Router {
         .merge(studies::routes())
         .merge(analysis::routes())
         .merge(export::routes())
+        .merge(study_export::routes())
         .merge(live::routes())
         .merge(mjpeg::routes())
         .merge(health::routes())

@@ -21,6 +21,7 @@ use crate::live::LiveHandle;
 use crate::playback::Player;
 use crate::recorder::Recordings;
 use crate::store::Store;
+use crate::study_export::StudyExports;
 use crate::trial::permission::{CurrentSession, may_see_focal_power};
 use crate::trial::role::Role;
 use crate::trial::view::{OperatorView, SurgeonView};
@@ -49,6 +50,8 @@ pub struct App {
     pub operator_view: watch::Receiver<Option<Arc<OperatorView>>>,
     /// All policies.
     pub registry: Registry,
+    /// The exports of whole studies.
+    pub study_exports: StudyExports,
     /// Personal accounts.
     pub accounts: Accounts,
     /// Keys of the three roles.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::error::PackageError;
 use super::source::{SESSIONS, Source, exports_of, left_out};
-use super::writing::{sums, write};
+use super::writing::{Sessions, sums, write};
 use crate::store::export::verify::{Check, Verdict};
 use crate::store::export::{SUMS, read_json};
 
@@ -60,7 +60,7 @@ fn tables(folder: &Path, sources: &[Source]) -> Result<Verdict, String> {
     let left_out = left_out(folder).map_err(|error| error.to_string())?;
     let again = tempfile::tempdir().map_err(|error| format!("a temporary folder: {error}"))?;
     let again = again.path().join("package");
-    write(sources, &left_out, &again, &mut |_, _| ()).map_err(|error| error.to_string())?;
+    write(sources, Sessions::Copied, &left_out, &again, &mut |_, _| ()).map_err(|error| error.to_string())?;
 
     let listed = std::fs::read_to_string(folder.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;
     let joined = std::fs::read_to_string(again.join(SUMS)).map_err(|error| format!("{SUMS}: {error}"))?;

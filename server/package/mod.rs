@@ -20,4 +20,4 @@ mod writing;
 pub use self::check::{check, is_package};
 pub use self::error::PackageError;
 pub use self::source::{LeftOut, Source, exports_of, left_out};
-pub use self::writing::{Summary, write};
+pub use self::writing::{Sessions, Summary, write};

@@ -23,16 +23,32 @@ const GROUP: usize = 16_384;
 pub struct ParquetFile {
     path: PathBuf,
     writer: SerializedFileWriter<File>,
-    columns: Vec<Column>,
-    /// The cells of the rows gathered, a column at a time.
-    gathered: Vec<Vec<Option<String>>>,
+    columns: Vec<Gathered>,
+    /// Rows gathered.
+    rows: usize,
+}
+
+/// The cells of a column that were gathered for the next row group.
+struct Gathered {
+    column: Column,
+    values: Values,
+    /// For each row 1, or 0 where the cell is empty.
+    levels: Vec<i16>,
+}
+
+/// Cells that are not empty, as Parquet has them.
+enum Values {
+    Texts(Vec<ByteArray>),
+    /// Whole numbers, and times in microseconds.
+    Integers(Vec<i64>),
+    Numbers(Vec<f64>),
+    Booleans(Vec<bool>),
 }
 
 impl ParquetFile {
     /// A file at `path` for the rows of `table`.
     pub fn create(path: &Path, table: &JoinedTable) -> Result<Self, PackageError> {
-        let columns: Vec<Column> = table.columns().copied().collect();
-        let fields = columns.iter().map(|column| field(column).map(Arc::new)).collect::<Result<_, _>>();
+        let fields = table.columns().map(|column| field(column).map(Arc::new)).collect::<Result<_, _>>();
         let fields = fields.map_err(PackageError::unwritable(path))?;
         let schema = Schema::group_type_builder(table.table.name).with_fields(fields).build();
         let schema = schema.map_err(PackageError::unwritable(path))?;
@@ -42,16 +58,18 @@ impl ParquetFile {
         let writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties));
         let writer = writer.map_err(PackageError::unwritable(path))?;
 
-        let gathered = vec![Vec::new(); columns.len()];
-        Ok(Self { path: path.to_owned(), writer, columns, gathered })
+        let columns = table.columns().copied().map(Gathered::new).collect();
+        Ok(Self { path: path.to_owned(), writer, columns, rows: 0 })
     }
 
     /// Adds a row: its cells as the CSV files have them.
     pub fn row(&mut self, cells: &[&str]) -> Result<(), PackageError> {
-        for ((column, gathered), cell) in self.columns.iter().zip(&mut self.gathered).zip(cells) {
-            gathered.push((!cell.is_empty()).then(|| column.read(cell)));
+        for (gathered, cell) in self.columns.iter_mut().zip(cells) {
+            gathered.take(cell).map_err(PackageError::unwritable(&self.path))?;
         }
-        if self.gathered.first().is_some_and(|column| column.len() >= GROUP) {
+
+        self.rows += 1;
+        if self.rows >= GROUP {
             self.pass_on()?;
         }
         Ok(())
@@ -59,7 +77,7 @@ impl ParquetFile {
 
     /// Ends the file, and waits until the disk has it.
     pub fn end(mut self) -> Result<(), PackageError> {
-        if self.gathered.first().is_some_and(|column| !column.is_empty()) {
+        if self.rows > 0 {
             self.pass_on()?;
         }
         let file = self.writer.into_inner().map_err(PackageError::unwritable(&self.path))?;
@@ -68,31 +86,86 @@ impl ParquetFile {
 
     fn pass_on(&mut self) -> Result<(), PackageError> {
         let path = self.path.clone();
+        self.rows = 0;
         self.group().map_err(PackageError::unwritable(path))
     }
 
     /// Writes the gathered rows as a row group.
     fn group(&mut self) -> Result<(), ParquetError> {
         let mut group = self.writer.next_row_group()?;
-        for (column, gathered) in self.columns.iter().zip(&mut self.gathered) {
-            let cells = std::mem::take(gathered);
+        for gathered in &mut self.columns {
             let Some(mut writer) = group.next_column()? else {
                 return Err(ParquetError::General("there are more columns than the schema has".to_owned()));
             };
-            match column.kind {
-                Type::String => write::<ByteArrayType>(&mut writer, column, &cells, |cell| Some(ByteArray::from(cell))),
-                Type::Integer => write::<Int64Type>(&mut writer, column, &cells, |cell| cell.parse().ok()),
-                Type::Number => write::<DoubleType>(&mut writer, column, &cells, |cell| cell.parse().ok()),
-                Type::Boolean => write::<BoolType>(&mut writer, column, &cells, |cell| cell.parse().ok()),
-                Type::Datetime => write::<Int64Type>(&mut writer, column, &cells, |cell| {
-                    cell.parse::<Timestamp>().ok().map(Timestamp::as_microsecond)
-                }),
-            }?;
+            gathered.write(&mut writer)?;
             writer.close()?;
         }
         group.close()?;
         Ok(())
     }
+}
+
+impl Gathered {
+    fn new(column: Column) -> Self {
+        let values = match column.kind {
+            Type::String => Values::Texts(Vec::new()),
+            Type::Integer | Type::Datetime => Values::Integers(Vec::new()),
+            Type::Number => Values::Numbers(Vec::new()),
+            Type::Boolean => Values::Booleans(Vec::new()),
+        };
+        Self { column, values, levels: Vec::new() }
+    }
+
+    /// Takes the next cell. An empty one has a definition level of 0 and no value.
+    fn take(&mut self, cell: &str) -> Result<(), ParquetError> {
+        self.levels.push(i16::from(!cell.is_empty()));
+        if cell.is_empty() {
+            return Ok(());
+        }
+
+        let name = self.column.name;
+        let nonsense = || ParquetError::General(format!("'{cell}' is not a valid {name}"));
+        match &mut self.values {
+            Values::Texts(values) => {
+                let text = self.column.read(cell);
+                // The same text often stands in one row after another: it is kept once.
+                let again = values.last().filter(|last| last.data() == text.as_bytes()).cloned();
+                values.push(again.unwrap_or_else(|| ByteArray::from(text)));
+            }
+            Values::Integers(values) if self.column.kind == Type::Datetime => {
+                let time = cell.parse::<Timestamp>().map_err(|_| nonsense())?;
+                values.push(time.as_microsecond());
+            }
+            Values::Integers(values) => values.push(cell.parse().map_err(|_| nonsense())?),
+            Values::Numbers(values) => values.push(cell.parse().map_err(|_| nonsense())?),
+            Values::Booleans(values) => values.push(cell.parse().map_err(|_| nonsense())?),
+        }
+        Ok(())
+    }
+
+    /// Writes what was gathered, and begins anew.
+    fn write(&mut self, writer: &mut SerializedColumnWriter<'_>) -> Result<(), ParquetError> {
+        let levels = Some(self.levels.as_slice());
+        match &mut self.values {
+            Values::Texts(values) => write::<ByteArrayType>(writer, values, levels),
+            Values::Integers(values) => write::<Int64Type>(writer, values, levels),
+            Values::Numbers(values) => write::<DoubleType>(writer, values, levels),
+            Values::Booleans(values) => write::<BoolType>(writer, values, levels),
+        }?;
+        self.levels.clear();
+        Ok(())
+    }
+}
+
+/// Writes the values of a column of a row group, and forgets them.
+fn write<D: DataType>(
+    writer: &mut SerializedColumnWriter<'_>,
+    values: &mut Vec<D::T>,
+    levels: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    writer.typed::<D>().write_batch(values, levels, None)?;
+    values.clear();
+    Ok(())
 }
 
 /// A column of the schema. Each may be empty: that is how the tables tell what is not known.
@@ -106,24 +179,4 @@ fn field(column: &Column) -> Result<Schema, ParquetError> {
     };
     let field = Schema::primitive_type_builder(column.name, physical);
     field.with_repetition(Repetition::OPTIONAL).with_logical_type(logical).build()
-}
-
-/// Writes a column of a row group. A definition level of 0 stands for an empty cell.
-fn write<D: DataType>(
-    writer: &mut SerializedColumnWriter<'_>,
-    column: &Column,
-    cells: &[Option<String>],
-    read: impl Fn(&str) -> Option<D::T>,
-) -> Result<(), ParquetError> {
-    let mut values = Vec::with_capacity(cells.len());
-    let mut levels = Vec::with_capacity(cells.len());
-    for cell in cells {
-        levels.push(i16::from(cell.is_some()));
-        if let Some(cell) = cell {
-            let nonsense = || ParquetError::General(format!("'{cell}' is not a valid {}", column.name));
-            values.push(read(cell).ok_or_else(nonsense)?);
-        }
-    }
-    writer.typed::<D>().write_batch(&values, Some(&levels), None)?;
-    Ok(())
 }

@@ -146,7 +146,7 @@ fn value(column: &Column, cell: &str) -> String {
             Ok(time) => time.strftime("%Y-%m-%d %H:%M:%S").to_string(),
             Err(_) => String::new(),
         },
-        (Type::String, cell) => column.read(cell),
+        (Type::String, cell) => column.read(cell).to_owned(),
         (Type::Integer | Type::Number, cell) => cell.to_owned(),
     }
 }

@@ -96,6 +96,11 @@ impl Source {
         format!("{SESSIONS}/{}", self.session)
     }
 
+    /// The same export where it lies now.
+    pub(super) fn at(&self, folder: PathBuf) -> Self {
+        Self { folder, ..self.clone() }
+    }
+
     fn apart(&self, other: &Self, reason: impl Into<String>) -> PackageError {
         PackageError::Apart { one: self.folder.clone(), other: other.folder.clone(), reason: reason.into() }
     }

@@ -123,7 +123,7 @@ impl Variable {
     /// Adds `cell` of the CSV files to a case.
     fn value(&self, cell: &str, case: &mut Vec<u8>) {
         if self.width > 0 {
-            return self.text(&self.column.read(cell), case);
+            return self.text(self.column.read(cell), case);
         }
         let number = match self.column.kind {
             Type::Boolean => (!cell.is_empty()).then(|| f64::from(u8::from(cell == "true"))),

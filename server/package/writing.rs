@@ -4,16 +4,17 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::error::PackageError;
 use super::parquet::ParquetFile;
-use super::source::{LeftOut, Source, agree};
+use super::source::{LeftOut, SESSIONS, Source, agree};
 use super::table::{JoinedTable, joined_tables};
 use super::{description, join, r, redcap, spss};
-use crate::files::{sync_folder_of, write_through};
+use crate::files::{files_below, sync_folder_of, write_through};
 use crate::store::export::SUMS;
 
 /// What was written.
@@ -33,6 +34,15 @@ pub struct Summary {
     pub unblinded: bool,
 }
 
+/// What becomes of the exports that go into a package.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sessions {
+    /// They stay where they are, and the package has copies.
+    Copied,
+    /// They are moved into the package, on whose disk they lie. A package that fails has taken them along.
+    Moved,
+}
+
 /// Writes the package of `sources` to the folder `out`, which must be new or empty and appears whole or not at all.
 /// `told` hears the number of steps done, and of all, as it goes on.
 ///
@@ -40,6 +50,7 @@ pub struct Summary {
 /// When there is no source, two of them do not belong together, or a file cannot be read or written.
 pub fn write(
     sources: &[Source],
+    sessions: Sessions,
     left_out: &[LeftOut],
     out: &Path,
     told: &mut dyn FnMut(usize, usize),
@@ -53,7 +64,7 @@ pub fn write(
     let temporary = tempfile::Builder::new().prefix(".parfocal-study-").tempdir_in(parent);
     let temporary = temporary.map_err(PackageError::unwritable(parent))?;
 
-    fill(sources, left_out, temporary.path(), told)?;
+    fill(sources, sessions, left_out, temporary.path(), told)?;
 
     // A folder that is there and empty gives way.
     let _ = fs::remove_dir(out);
@@ -81,6 +92,7 @@ fn check_new(out: &Path) -> Result<(), PackageError> {
 
 fn fill(
     sources: &[Source],
+    sessions: Sessions,
     left_out: &[LeftOut],
     folder: &Path,
     told: &mut dyn FnMut(usize, usize),
@@ -88,25 +100,61 @@ fn fill(
     let tables: Vec<JoinedTable> = joined_tables().filter(|table| join::is_there(table, sources)).collect();
     let steps = sources.len() + tables.len();
 
+    let mut taken = Vec::new();
     for (done, source) in sources.iter().enumerate() {
         told(done, steps);
-        copy(source, folder)?;
+        taken.push(take(source, sessions, folder)?);
     }
-    for (done, table) in (sources.len()..).zip(&tables) {
-        told(done, steps);
-        join_table(table, sources, folder)?;
-    }
-    told(steps, steps);
 
-    beside(&tables, sources, folder)?;
-    let description = description::describe(sources, &tables, left_out);
+    let mut done = sources.len();
+    join_tables(&tables, &taken, folder, &mut || {
+        done += 1;
+        told(done, steps);
+    })?;
+
+    beside(&tables, &taken, folder)?;
+    let description = description::describe(&taken, &tables, left_out);
     write_file(folder, "datapackage.json", format!("{description:#}\n").as_bytes())?;
     write_file(folder, SUMS, sums(folder)?.as_bytes())
 }
 
-/// Copies an export, file by file.
-fn copy(source: &Source, folder: &Path) -> Result<(), PackageError> {
-    copy_folder(&source.folder, &folder.join(source.place()))
+/// Joins all tables; `joined` hears of each one that is done. The long ones, which take most of the time, are joined
+/// beside the others, each on a thread of its own.
+fn join_tables(
+    tables: &[JoinedTable],
+    sources: &[Source],
+    folder: &Path,
+    joined: &mut dyn FnMut(),
+) -> Result<(), PackageError> {
+    let (long, short): (Vec<&JoinedTable>, Vec<&JoinedTable>) = tables.iter().partition(|table| table.long);
+    thread::scope(|scope| {
+        let long: Vec<_> =
+            long.into_iter().map(|table| scope.spawn(move || join_table(table, sources, folder))).collect();
+        for table in short {
+            join_table(table, sources, folder)?;
+            joined();
+        }
+        for thread in long {
+            let broken = || PackageError::unwritable(folder)("a thread ended before its table was whole");
+            thread.join().unwrap_or_else(|_| Err(broken()))?;
+            joined();
+        }
+        Ok(())
+    })
+}
+
+/// Puts an export into the package `folder`, and gives it as it lies there.
+fn take(source: &Source, sessions: Sessions, folder: &Path) -> Result<Source, PackageError> {
+    let place = folder.join(source.place());
+    match sessions {
+        Sessions::Copied => copy_folder(&source.folder, &place)?,
+        Sessions::Moved => {
+            let above = folder.join(SESSIONS);
+            fs::create_dir_all(&above).map_err(PackageError::unwritable(&above))?;
+            fs::rename(&source.folder, &place).map_err(PackageError::unwritable(&place))?;
+        }
+    }
+    Ok(source.at(place))
 }
 
 fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
@@ -168,22 +216,9 @@ fn write_file(folder: &Path, name: &str, content: &[u8]) -> Result<(), PackageEr
 
 /// The checksums of all files below `folder`, in the form of `sha256sum`, but for that of this list itself.
 pub fn sums(folder: &Path) -> Result<String, PackageError> {
-    let mut files = Vec::new();
-    let mut folders = vec![PathBuf::new()];
-    while let Some(within) = folders.pop() {
-        let path = folder.join(&within);
-        for entry in fs::read_dir(&path).map_err(PackageError::unreadable(&path))? {
-            let entry = entry.map_err(PackageError::unreadable(&path))?;
-            let name = within.join(entry.file_name());
-            if entry.path().is_dir() {
-                folders.push(name);
-            } else if name != Path::new(SUMS) {
-                files.push(name);
-            }
-        }
-    }
+    let mut files = files_below(folder).map_err(PackageError::unreadable(folder))?;
+    files.retain(|file| file != Path::new(SUMS));
 
-    files.sort();
     let mut lines = Vec::new();
     for file in files {
         let mut digest = Digester(Sha256::new());

@@ -1,6 +1,7 @@
 //! What is hashed, byte for byte. `docs/evidence.md` describes the same for readers; a test computes it from there.
 
 use std::fmt;
+use std::io::Write;
 use std::str::FromStr;
 
 use sha2::{Digest, Sha256};
@@ -33,16 +34,28 @@ impl Fields {
 
     /// Adds `field` at the end.
     pub fn add(&mut self, field: &str) {
-        self.0.update(field.len().to_string());
-        self.0.update(b":");
-        self.0.update(field);
-        self.0.update(b",");
+        let mut bytes = Vec::with_capacity(field.len() + 8);
+        netstring(field, &mut bytes);
+        self.0.update(bytes);
+    }
+
+    /// Adds fields that are netstrings already.
+    pub fn add_netstrings(&mut self, netstrings: &[u8]) {
+        self.0.update(netstrings);
     }
 
     /// The SHA-256, in hexadecimal.
     pub fn hex(self) -> String {
         hex::encode(self.0.finalize())
     }
+}
+
+/// Adds `field` to `bytes` as a netstring.
+pub fn netstring(field: &str, bytes: &mut Vec<u8>) {
+    // Writing into memory does not fail.
+    let _ = write!(bytes, "{}:", field.len());
+    bytes.extend_from_slice(field.as_bytes());
+    bytes.push(b',');
 }
 
 /// The hash of what of a record can be withheld or erased. Without the salt nobody can try what it may have been.

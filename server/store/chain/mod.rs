@@ -12,7 +12,7 @@ mod telemetry;
 
 pub use adopt::adopt;
 pub use append::append;
-pub use form::{Entry, Fields, Head, begin_sealed};
+pub use form::{Entry, Fields, Head, begin_sealed, netstring};
 pub use kinds::{KINDS, Kind, UNBLINDED};
 pub use records::{Record, all};
-pub use telemetry::{OPEN, SEALED, begin_open, hashes, seal, unsealed};
+pub use telemetry::{Block, OPEN, SEALED, begin_open, hashes, seal, unsealed};

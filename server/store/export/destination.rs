@@ -1,7 +1,7 @@
 //! Where an export goes: a folder that appears whole or not at all, or a ZIP file that is sent while it is made.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -15,7 +15,7 @@ use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{CompressionMethod, ZipWriter};
 
 use super::ExportError;
-use crate::files::sync_folder_of;
+use crate::files::{files_below, sync_folder_of};
 
 /// Pieces of a ZIP file that may wait for whoever downloads it.
 const PIECES: usize = 4;
@@ -177,9 +177,32 @@ impl ZipStream {
         (Self { root, archive, made, pieces }, bytes)
     }
 
+    /// Sends every file of `folder` and of the folders in it, no faster than they are taken.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or nothing is taken any more; then the ZIP file is cut off.
+    pub async fn send_folder(mut self, folder: &Path) -> io::Result<()> {
+        let mut block = vec![0; PIECE];
+        for name in files_below(folder)? {
+            let mut file = File::open(folder.join(&name))?;
+            // A study's telemetry is large: what a slower level saves is not worth the wait. Sizes beyond 4 GB must be
+            // told beforehand.
+            let large = file.metadata()?.len() >= u64::from(u32::MAX);
+            let options = options().compression_level(Some(1)).large_file(large);
+            self.archive.start_file(format!("{}/{}", self.root, name.display()), options)?;
+
+            loop {
+                match file.read(&mut block)? {
+                    0 => break,
+                    read => self.write(&block[..read]).await?,
+                }
+            }
+        }
+        self.finish().await
+    }
+
     fn begin(&mut self, name: &str) -> io::Result<()> {
-        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
-        Ok(self.archive.start_file(format!("{}/{name}", self.root), options)?)
+        Ok(self.archive.start_file(format!("{}/{name}", self.root), options())?)
     }
 
     async fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -198,6 +221,10 @@ impl ZipStream {
         send(&pieces, Piece::Bytes(made.take())).await?;
         send(&pieces, Piece::End).await
     }
+}
+
+fn options() -> SimpleFileOptions {
+    SimpleFileOptions::default().compression_method(CompressionMethod::Deflated)
 }
 
 async fn send(pieces: &mpsc::Sender<Piece>, piece: Piece) -> io::Result<()> {

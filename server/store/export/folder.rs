@@ -57,13 +57,14 @@ impl Folder {
             folder: self,
             name,
             csv: new_block(),
+            cell: Vec::new(),
             sha256: Sha256::new(),
             bytes: 0,
             gathered: 0,
             rows: PhantomData,
         };
 
-        file.record(&header)?;
+        file.header(&header)?;
         Ok(file)
     }
 
@@ -131,6 +132,8 @@ pub struct CsvFile<'a, R> {
     name: String,
     /// Rows that have not gone on yet.
     csv: csv::Writer<Vec<u8>>,
+    /// Room for a cell.
+    cell: Vec<u8>,
     /// At least the bytes in them.
     gathered: usize,
     sha256: Sha256,
@@ -142,10 +145,8 @@ pub struct CsvFile<'a, R> {
 impl<R: Row> CsvFile<'_, R> {
     /// Writes a row.
     pub async fn row(&mut self, row: &R) -> Result<(), ExportError> {
-        let cells = row.cells();
-        let columns = R::TABLE.columns.iter();
-        let cells: Vec<_> = columns.zip(&cells).map(|(column, cell)| column.csv(cell)).collect();
-        self.record(&cells)?;
+        let written = row.write_csv(&mut self.csv, &mut self.cell);
+        self.gathered += written.map_err(|error| self.unwritable(error))?;
         if self.gathered >= BLOCK {
             self.pass_on().await?;
         }
@@ -161,12 +162,12 @@ impl<R: Row> CsvFile<'_, R> {
         Ok(())
     }
 
-    fn record(&mut self, cells: &[String]) -> Result<(), ExportError> {
-        let path = || Path::new(&self.name).to_owned();
-        let unwritable = |error: csv::Error| ExportError::Unwritable { path: path(), error: error.into() };
-        self.csv.write_record(cells).map_err(unwritable)?;
-        self.gathered += cells.iter().map(|cell| cell.len() + 1).sum::<usize>();
-        Ok(())
+    fn header(&mut self, names: &[String]) -> Result<(), ExportError> {
+        self.csv.write_record(names).map_err(|error| self.unwritable(error))
+    }
+
+    fn unwritable(&self, error: csv::Error) -> ExportError {
+        ExportError::Unwritable { path: Path::new(&self.name).to_owned(), error: error.into() }
     }
 
     async fn pass_on(&mut self) -> Result<(), ExportError> {

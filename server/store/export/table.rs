@@ -65,6 +65,13 @@ pub trait Row {
 
     /// A cell for each column, in order, null where there is nothing.
     fn cells(&self) -> Vec<Value>;
+
+    /// Writes the row into a CSV file. `cell` is room for one cell, kept from row to row. Gives about how many bytes
+    /// were written.
+    ///
+    /// # Errors
+    /// When `csv` cannot be written.
+    fn write_csv(&self, csv: &mut csv::Writer<Vec<u8>>, cell: &mut Vec<u8>) -> Result<usize, csv::Error>;
 }
 
 /// What a field of a row may be.
@@ -74,6 +81,11 @@ pub trait Cell {
 
     /// The cell, null where there is nothing.
     fn value(&self) -> Value;
+
+    /// Adds the cell to `csv` as the CSV files have it: nothing where there is nothing.
+    fn write_csv(&self, csv: &mut Vec<u8>) {
+        csv.extend_from_slice(in_csv(Self::KIND, &self.value()).as_bytes());
+    }
 }
 
 macro_rules! cells {
@@ -91,11 +103,63 @@ macro_rules! cells {
 }
 
 cells! {
-    String: String, &'static str, SessionId, SegmentId, DeviceId, IdempotencyKey, PolicyName, Role, SessionStatus;
-    Integer: i64, u32, u64, usize;
-    Number: f64;
-    Boolean: bool;
+    String: &'static str, SessionId, SegmentId, DeviceId, IdempotencyKey, PolicyName, Role, SessionStatus;
     Datetime: Timestamp;
+}
+
+/// The cells of tables with a row for each frame: millions of them are written without anything in between.
+macro_rules! plain_cells {
+    ($($kind:ident: $($cell:ty),+;)+) => {
+        $($(
+            impl Cell for $cell {
+                const KIND: Type = Type::$kind;
+
+                fn value(&self) -> Value {
+                    json!(self)
+                }
+
+                fn write_csv(&self, csv: &mut Vec<u8>) {
+                    // Writing into memory does not fail.
+                    let _ = serde_json::to_writer(csv, self);
+                }
+            }
+        )+)+
+    };
+}
+
+plain_cells! {
+    Integer: i64, u32, u64, usize;
+    Boolean: bool;
+}
+
+impl Cell for f64 {
+    const KIND: Type = Type::Number;
+
+    fn value(&self) -> Value {
+        json!(self)
+    }
+
+    fn write_csv(&self, csv: &mut Vec<u8>) {
+        // JSON has no infinity and no "not a number": the cell stays empty.
+        if self.is_finite() {
+            let _ = serde_json::to_writer(csv, self);
+        }
+    }
+}
+
+impl Cell for String {
+    const KIND: Type = Type::String;
+
+    fn value(&self) -> Value {
+        json!(self)
+    }
+
+    fn write_csv(&self, csv: &mut Vec<u8>) {
+        if is_formula(self) {
+            csv.push(b'\'');
+        }
+        csv.extend_from_slice(self.as_bytes());
+    }
 }
 
 impl<T: Cell> Cell for Option<T> {
@@ -103,6 +167,12 @@ impl<T: Cell> Cell for Option<T> {
 
     fn value(&self) -> Value {
         self.as_ref().map_or(Value::Null, Cell::value)
+    }
+
+    fn write_csv(&self, csv: &mut Vec<u8>) {
+        if let Some(cell) = self {
+            cell.write_csv(csv);
+        }
     }
 }
 
@@ -162,6 +232,22 @@ macro_rules! table {
 
             fn cells(&self) -> Vec<Value> {
                 vec![$(self.$field.value(),)+]
+            }
+
+            fn write_csv(
+                &self,
+                csv: &mut ::csv::Writer<Vec<u8>>,
+                cell: &mut Vec<u8>,
+            ) -> Result<usize, ::csv::Error> {
+                let mut bytes = 0;
+                $(
+                    cell.clear();
+                    self.$field.write_csv(cell);
+                    csv.write_field(&*cell)?;
+                    bytes += cell.len() + 1;
+                )+
+                csv.write_record(None::<&[u8]>)?;
+                Ok(bytes)
             }
         }
     };
@@ -261,18 +347,15 @@ impl Column {
     /// `cell` as the CSV files have it.
     #[must_use]
     pub fn csv(&self, cell: &Value) -> String {
-        match cell {
-            Value::String(text) if self.kind == Type::String && is_formula(text) => format!("'{text}"),
-            other => plain(other),
-        }
+        in_csv(self.kind, cell)
     }
 
     /// What a cell of the CSV files says.
     #[must_use]
-    pub fn read(&self, csv: &str) -> String {
+    pub fn read<'a>(&self, csv: &'a str) -> &'a str {
         match csv.strip_prefix('\'') {
-            Some(text) if self.kind == Type::String && is_formula(text) => text.to_owned(),
-            _ => csv.to_owned(),
+            Some(text) if self.kind == Type::String && is_formula(text) => text,
+            _ => csv,
         }
     }
 
@@ -281,6 +364,14 @@ impl Column {
     #[must_use]
     pub fn tells(&self, csv: &str, cell: &Value) -> bool {
         csv == self.csv(cell) || csv == plain(cell)
+    }
+}
+
+/// `cell` of a column of type `kind` as the CSV files have it.
+fn in_csv(kind: Type, cell: &Value) -> String {
+    match cell {
+        Value::String(text) if kind == Type::String && is_formula(text) => format!("'{text}"),
+        other => plain(other),
     }
 }
 
@@ -353,6 +444,49 @@ mod tests {
         let row = MarkRow { number: 3, at: Some(Timestamp::UNIX_EPOCH), text: None };
         assert_eq!(row.cells(), [json!(3), json!("1970-01-01T00:00:00Z"), Value::Null]);
         assert_eq!(objects(&[row]), json!([{ "number": 3, "at": "1970-01-01T00:00:00Z", "text": null }]));
+    }
+
+    table! {
+        name: "written",
+        description: "A cell of each kind",
+        key: [number],
+        row:
+        #[derive(Debug)]
+        WrittenRow {
+            number: i64 = means("Number"),
+            measure: Option<f64> = means("Measure"),
+            held: bool = means("Held"),
+            at: Timestamp = means("When"),
+            text: Option<String> = means("What"),
+            kind: &'static str = means("Kind"),
+        }
+    }
+
+    #[test]
+    fn a_row_is_written_cell_by_cell_as_its_columns_tell() {
+        let measures = [Some(0.1), Some(-0.0), Some(1e-7), Some(1e300), Some(f64::NAN), Some(f64::INFINITY), None];
+        let texts = [Some("=1+1"), Some("sharp, \"good\""), Some("two\nlines"), Some("'=1"), Some(""), None, Some("é")];
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        let mut by_column = csv::Writer::from_writer(Vec::new());
+        let mut cell = Vec::new();
+
+        for (measure, text) in measures.into_iter().zip(texts) {
+            let row = WrittenRow {
+                number: i64::MIN,
+                measure,
+                held: measure.is_some(),
+                at: Timestamp::UNIX_EPOCH,
+                text: text.map(str::to_owned),
+                kind: "-held",
+            };
+            row.write_csv(&mut csv, &mut cell).unwrap();
+
+            let cells = row.cells();
+            let columns = WrittenRow::TABLE.columns.iter().zip(&cells);
+            by_column.write_record(columns.map(|(column, cell)| column.csv(cell))).unwrap();
+        }
+
+        assert_eq!(csv.into_inner().unwrap(), by_column.into_inner().unwrap());
     }
 
     #[test]

@@ -12,9 +12,10 @@ use super::files::{cells, csv, json, session_cell};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, Found, FoundRow, Walk};
 use crate::store::chain::{
-    Entry, Fields, Head, KINDS, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed,
+    Block, Entry, Fields, Head, KINDS, Kind, OPEN, Record, SEALED, UNBLINDED, begin_open, begin_sealed, netstring,
 };
-use crate::store::export::description::ALL;
+use crate::store::export::description::{ALL, ChainRow};
+use crate::store::export::table::Row;
 
 /// A row of a table: its cells by column, as they were recorded.
 type Cells = BTreeMap<String, String>;
@@ -26,8 +27,8 @@ pub(super) fn chain(folder: &Path, format: u64, expected: Option<&Head>) -> Outc
     let steps = Steps::read(folder)?;
     let mut last = None;
 
-    for row in rows(folder, "chain")? {
-        let row = found(row, &salts)?;
+    let mut rows = ChainRows::open(folder)?;
+    while let Some(row) = rows.next(&salts)? {
         if let Some(block) = walk.row(&row)?
             && !steps.check(&block)?
         {
@@ -62,35 +63,73 @@ fn ends_with_itself(folder: &Path, last: Option<Found>, head: &Head) -> Result<(
     }
 }
 
-fn found(mut row: Cells, salts: &BTreeMap<String, String>) -> Result<FoundRow, String> {
-    let mut take = |column: &str| row.remove(column).unwrap_or_default();
-    let number = take("number");
-    let hash = take("hash");
-    let hashed = take("entry");
-    let entry = Entry {
-        wall: take("wall"),
-        kind: take("kind"),
-        key: take("key"),
-        session: take("session"),
-        place: take("place").parse().ok(),
-        adopted: take("adopted") == "true",
-        salt: take("salt"),
-        sealed: take("sealed"),
-        content: take("content"),
-    };
+/// The rows of chain.csv, one by one: each export tells the whole chain, other sessions' rows by their hash alone.
+struct ChainRows {
+    reader: ::csv::Reader<std::fs::File>,
+    row: StringRecord,
+    /// The place of each column of `CHAIN` in the file, if it has it.
+    places: [Option<usize>; CHAIN.len()],
+}
 
-    let sealed_salt = Some(take("sealed_salt")).filter(|salt| !salt.is_empty()).or_else(|| salts.get(&number).cloned());
-    if entry.kind.is_empty() {
-        return Ok(FoundRow { number, previous: None, entry: Found::Hash(hashed), hash });
+/// The columns of chain.csv that are read.
+const CHAIN: [&str; 13] = [
+    "number", "hash", "entry", "wall", "kind", "key", "session", "place", "adopted", "salt", "sealed", "content",
+    "sealed_salt",
+];
+
+impl ChainRows {
+    fn open(folder: &Path) -> Result<Self, String> {
+        let mut reader = csv(folder, "chain.csv")?;
+        let headers = reader.headers().map_err(unreadable)?;
+        let places = CHAIN.map(|column| headers.iter().position(|name| name == column));
+        Ok(Self { reader, row: StringRecord::new(), places })
     }
 
-    if entry.hash() != hashed {
-        return Err(format!(
-            "chain: row {number} ({} {}) was changed: its entry has another hash",
-            entry.kind, entry.key
-        ));
+    fn next(&mut self, salts: &BTreeMap<String, String>) -> Result<Option<FoundRow>, String> {
+        if !self.reader.read_record(&mut self.row).map_err(unreadable)? {
+            return Ok(None);
+        }
+
+        let cells = self.places.map(|place| place.and_then(|place| self.row.get(place)).unwrap_or_default());
+        let [number, hash, hashed, wall, kind, key, session, place, adopted, salt, sealed, content, sealed_salt] = cells;
+        if kind.is_empty() {
+            let entry = Found::Hash(hashed.to_owned());
+            return Ok(Some(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() }));
+        }
+
+        let entry = Entry {
+            wall: as_recorded("wall", wall),
+            kind: as_recorded("kind", kind),
+            key: as_recorded("key", key),
+            session: as_recorded("session", session),
+            place: place.parse().ok(),
+            adopted: adopted == "true",
+            salt: as_recorded("salt", salt),
+            sealed: as_recorded("sealed", sealed),
+            content: as_recorded("content", content),
+        };
+        if entry.hash() != hashed {
+            return Err(format!(
+                "chain: row {number} ({} {}) was changed: its entry has another hash",
+                entry.kind, entry.key
+            ));
+        }
+
+        let told = Some(sealed_salt).filter(|salt| !salt.is_empty()).map(str::to_owned);
+        let sealed_salt = told.or_else(|| salts.get(number).cloned());
+        let entry = Found::Whole(entry, sealed_salt);
+        Ok(Some(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() }))
     }
-    Ok(FoundRow { number, previous: None, entry: Found::Whole(entry, sealed_salt), hash })
+}
+
+/// A text of chain.csv as it was recorded.
+fn as_recorded(column: &str, cell: &str) -> String {
+    let column = ChainRow::TABLE.columns.iter().find(|known| known.name == column);
+    column.map_or(cell, |column| column.read(cell)).to_owned()
+}
+
+fn unreadable(error: ::csv::Error) -> String {
+    format!("chain.csv: {error}")
 }
 
 /// The salts that an unblinded export adds.
@@ -112,7 +151,7 @@ fn rows(folder: &Path, name: &str) -> Result<Vec<Cells>, String> {
 
     let read = |(name, cell): (&String, &str)| {
         let column = table.and_then(|table| table.columns.iter().find(|column| column.name == name));
-        (name.clone(), column.map_or_else(|| cell.to_owned(), |column| column.read(cell)))
+        (name.clone(), column.map_or(cell, |column| column.read(cell)).to_owned())
     };
     let cells = |row: StringRecord| headers.iter().zip(&row).map(read).collect();
     reader.records().map(|row| row.map(cells).map_err(|error| format!("{file}: {error}"))).collect()
@@ -169,9 +208,39 @@ fn records(folder: &Path, format: u64) -> Result<BTreeMap<(&'static str, String)
 
 /// The steps of telemetry of each segment, in order.
 struct Steps {
-    open: BTreeMap<String, Vec<Vec<String>>>,
+    open: BTreeMap<String, Netstrings>,
     /// None in a blinded export.
-    sealed: Option<BTreeMap<String, Vec<Vec<String>>>>,
+    sealed: Option<BTreeMap<String, Netstrings>>,
+}
+
+/// The cells of a segment's steps as they are hashed, one after another: an hour of a session has 200,000 steps.
+#[derive(Default)]
+struct Netstrings {
+    bytes: Vec<u8>,
+    /// Where each step ends.
+    ends: Vec<usize>,
+}
+
+impl Netstrings {
+    /// Adds a step.
+    fn step<'a>(&mut self, cells: impl Iterator<Item = &'a str>) {
+        for cell in cells {
+            netstring(cell, &mut self.bytes);
+        }
+        self.ends.push(self.bytes.len());
+    }
+
+    /// The steps of `block` that are there: how many, and their bytes.
+    fn of(&self, block: &Block) -> (i64, &[u8]) {
+        let count = self.ends.len();
+        let first = usize::try_from(block.first - 1).unwrap_or(usize::MAX).min(count);
+        let wanted = usize::try_from(block.steps()).unwrap_or_default();
+        let last = first.saturating_add(wanted).min(count);
+
+        let end_of = |steps: usize| steps.checked_sub(1).map_or(0, |step| self.ends[step]);
+        let steps = last - first;
+        (steps as i64, &self.bytes[end_of(first)..end_of(last)])
+    }
 }
 
 impl Steps {
@@ -204,24 +273,15 @@ impl Steps {
     /// Steps that no row tells of.
     fn beyond(&self, walk: &Walk) -> i64 {
         let tables = std::iter::once(&self.open).chain(&self.sealed);
-        let beyond = tables.flatten().map(|(segment, steps)| steps.len() as i64 - walk.steps(segment));
+        let beyond = tables.flatten().map(|(segment, steps)| steps.ends.len() as i64 - walk.steps(segment));
         beyond.filter(|steps| *steps > 0).sum()
     }
 }
 
-fn hashed(steps: &BTreeMap<String, Vec<Vec<String>>>, block: &BlockToCheck, mut list: Fields) -> (i64, String) {
-    let block = &block.block;
-    let all = steps.get(&block.segment).map_or(&[][..], Vec::as_slice);
-    let skipped = usize::try_from(block.first - 1).unwrap_or(usize::MAX);
-    let wanted = usize::try_from(block.steps()).unwrap_or_default();
-
-    let mut count = 0;
-    for step in all.iter().skip(skipped).take(wanted) {
-        count += 1;
-        for cell in step {
-            list.add(cell);
-        }
-    }
+fn hashed(steps: &BTreeMap<String, Netstrings>, block: &BlockToCheck, mut list: Fields) -> (i64, String) {
+    let Some(steps) = steps.get(&block.block.segment) else { return (0, list.hex()) };
+    let (count, bytes) = steps.of(&block.block);
+    list.add_netstrings(bytes);
     (count, list.hex())
 }
 
@@ -230,7 +290,7 @@ fn by_segment(
     file: &str,
     columns: &[&str],
     segments: &BTreeMap<String, String>,
-) -> Result<BTreeMap<String, Vec<Vec<String>>>, String> {
+) -> Result<BTreeMap<String, Netstrings>, String> {
     let mut reader = csv(folder, file)?;
     let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?.clone();
     let place = |column: &str| {
@@ -239,12 +299,18 @@ fn by_segment(
     let setting = place("setting")?;
     let places: Vec<usize> = columns.iter().map(|column| place(column)).collect::<Result<_, _>>()?;
 
-    let mut found: BTreeMap<String, Vec<Vec<String>>> = BTreeMap::new();
-    for row in reader.records() {
-        let row = row.map_err(|error| format!("{file}: {error}"))?;
+    let mut found: BTreeMap<String, Netstrings> = BTreeMap::new();
+    let mut row = StringRecord::new();
+    while reader.read_record(&mut row).map_err(|error| format!("{file}: {error}"))? {
         let cell = |place: usize| row.get(place).unwrap_or_default();
-        let segment = segments.get(cell(setting)).cloned().unwrap_or_default();
-        found.entry(segment).or_default().push(places.iter().map(|&place| cell(place).to_owned()).collect());
+        let segment = segments.get(cell(setting)).map(String::as_str).unwrap_or_default();
+        // An export has a handful of segments: their names are copied once each.
+        if !found.contains_key(segment) {
+            found.insert(segment.to_owned(), Netstrings::default());
+        }
+        if let Some(steps) = found.get_mut(segment) {
+            steps.step(places.iter().map(|&place| cell(place)));
+        }
     }
     Ok(found)
 }

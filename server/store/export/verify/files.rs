@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use ::csv::StringRecord;
 use serde_json::Value;
 
 use crate::store::export::table::FORMAT;
@@ -28,14 +29,31 @@ pub fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, Stri
 /// # Errors
 /// A sentence that names the file, when it cannot be read or has no such column.
 pub fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
+    let mut cells = Vec::new();
+    each_cell(folder, file, column, |cell| {
+        cells.push(cell.to_owned());
+        Ok(())
+    })?;
+    Ok(cells)
+}
+
+/// Hands each cell of a column to `take`, without gathering them: a table may have a row for each frame.
+pub fn each_cell(
+    folder: &Path,
+    file: &str,
+    column: &str,
+    mut take: impl FnMut(&str) -> Result<(), String>,
+) -> Result<(), String> {
     let mut reader = csv(folder, file)?;
     let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?;
     let place =
         headers.iter().position(|name| name == column).ok_or_else(|| format!("{file} has no column {column}"))?;
-    reader
-        .records()
-        .map(|row| Ok(row.map_err(|error| format!("{file}: {error}"))?.get(place).unwrap_or_default().to_owned()))
-        .collect()
+
+    let mut row = StringRecord::new();
+    while reader.read_record(&mut row).map_err(|error| format!("{file}: {error}"))? {
+        take(row.get(place).unwrap_or_default())?;
+    }
+    Ok(())
 }
 
 pub fn session_cell(folder: &Path, column: &str) -> Result<String, String> {

@@ -11,6 +11,7 @@ mod voice;
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use ::csv::StringRecord;
 use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -29,7 +30,7 @@ use crate::store::export::table::{Row, Table};
 use crate::store::export::voice::FOLDER as RECORDINGS;
 use allocation::{commitment, schedule};
 use chain::chain;
-use files::{cells, csv, format, json, session_cell, text};
+use files::{cells, csv, each_cell, format, json, session_cell, text};
 use study::study;
 use verdict::Outcome;
 use voice::voice;
@@ -150,9 +151,12 @@ fn columns(folder: &Path) -> Outcome {
             return Err(format!("{file}: its columns are not those described"));
         }
 
-        for (row, line) in reader.records().zip(2..) {
-            let row = row.map_err(|error| format!("{file}: {error}"))?;
-            let mut cells = table.columns_of(format).zip(&row);
+        let columns: Vec<_> = table.columns_of(format).collect();
+        let mut row = StringRecord::new();
+        let mut line = 1;
+        while reader.read_record(&mut row).map_err(|error| format!("{file}: {error}"))? {
+            line += 1;
+            let mut cells = columns.iter().zip(&row);
             if let Some((column, cell)) = cells.find(|(column, cell)| !column.kind.accepts(cell)) {
                 return Err(format!("{file}, row {line}: '{cell}' is not a valid {}", column.name));
             }
@@ -267,7 +271,7 @@ fn copies(folder: &Path) -> Outcome {
         let mut reader = csv(folder, &file)?;
         let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(|error| format!("{file}: {error}"))?;
 
-        let same = |object: &Value, row: &csv::StringRecord| {
+        let same = |object: &Value, row: &StringRecord| {
             let columns: Vec<_> = table.columns_of(format).collect();
             row.len() == columns.len()
                 && columns.iter().zip(row).all(|(column, cell)| column.tells(cell, &object[column.name]))
@@ -291,10 +295,13 @@ fn references(folder: &Path) -> Outcome {
     }
 
     for file in ["telemetry.csv", "policy_steps.csv"].into_iter().filter(|file| folder.join(file).exists()) {
-        let unknown = cells(folder, file, "setting")?.into_iter().find(|setting| !settings.contains(setting));
-        if let Some(setting) = unknown {
-            return Err(format!("{file}: setting {setting} is not in segments.csv"));
-        }
+        each_cell(folder, file, "setting", |setting| {
+            if settings.contains(setting) {
+                Ok(())
+            } else {
+                Err(format!("{file}: setting {setting} is not in segments.csv"))
+            }
+        })?;
     }
 
     Ok(Verdict::Passed(format!("everything belongs to one of {} settings", settings.len())))

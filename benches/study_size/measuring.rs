@@ -1,0 +1,33 @@
+//! Time and memory of a piece of work.
+
+use std::time::Duration;
+
+use parfocal::clock::{Clock, SystemClock};
+
+/// What a piece of work gave and took.
+pub struct Measured<T> {
+    /// What it gave.
+    pub value: T,
+    /// Time.
+    pub took: Duration,
+    /// The most memory that the process had meanwhile, in MB: its own and that of the files it maps.
+    pub peak_mb: f64,
+}
+
+/// Does `work` and measures it.
+pub async fn measured<T>(work: impl AsyncFnOnce() -> T) -> Measured<T> {
+    // Makes the kernel count the peak from now on.
+    std::fs::write("/proc/self/clear_refs", "5").expect("Linux lets a process do so");
+
+    let begun = SystemClock.now();
+    let value = work().await;
+    let took = SystemClock.now().since(begun);
+    Measured { value, took, peak_mb: peak_mb() }
+}
+
+fn peak_mb() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux tells of a process");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kilobytes = line.and_then(|line| line.trim().strip_suffix("kB")).expect("it tells the peak");
+    kilobytes.trim().parse::<f64>().expect("it is a number") * 1024.0 / 1e6
+}

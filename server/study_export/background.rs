@@ -1,0 +1,215 @@
+//! Studies' exports while the server runs: one of a study at a time, made in the background, kept for a while so that a
+//! download that was cut off can be repeated, and then removed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use serde::Serialize;
+use tempfile::TempDir;
+use utoipa::ToSchema;
+
+use super::error::StudyExportError;
+use super::making::{Progress, export_study};
+use crate::store::Recorder;
+
+/// The folder within the data folder in which exports are made.
+const FOLDER: &str = "study-exports";
+
+/// How long a finished export is kept.
+const KEPT: Duration = Duration::from_hours(1);
+
+/// The exports of studies, each study's latest.
+#[derive(Clone)]
+pub struct StudyExports {
+    folder: PathBuf,
+    latest: Arc<Mutex<BTreeMap<String, Latest>>>,
+}
+
+/// A study's latest export.
+struct Latest {
+    unblinded: bool,
+    stage: Stage,
+    /// Tells it apart from the one before.
+    number: u64,
+}
+
+enum Stage {
+    Running(Progress),
+    Failed(String),
+    Ready(Made),
+}
+
+/// A finished export. Its folder is removed when nobody holds it any more.
+#[derive(Clone)]
+pub struct Made {
+    /// Whether policies are in it.
+    pub unblinded: bool,
+    /// The package.
+    pub folder: PathBuf,
+    /// Sessions in it.
+    sessions: usize,
+    /// Around the package.
+    _room: Arc<TempDir>,
+}
+
+/// How a study's latest export stands.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(tag = "state", rename_all = "lowercase")]
+pub enum StudyExportState {
+    /// There is none, or it was removed.
+    None,
+    /// It is being made.
+    Running {
+        /// Whether policies will be in it.
+        unblinded: bool,
+        /// How far it has come.
+        progress: Progress,
+    },
+    /// It can be downloaded.
+    Ready {
+        /// Whether policies are in it.
+        unblinded: bool,
+        /// Sessions in it.
+        sessions: usize,
+    },
+    /// It failed; nothing is left of it.
+    Failed {
+        /// Whether policies were asked for.
+        unblinded: bool,
+        /// Why, for people.
+        reason: String,
+    },
+}
+
+impl StudyExports {
+    /// None yet. What an earlier server left in the data folder `data` is removed.
+    #[must_use]
+    pub fn new(data: &Path) -> Self {
+        let folder = data.join(FOLDER);
+        match std::fs::remove_dir_all(&folder) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                tracing::warn!("{} is left from earlier exports and cannot be removed: {error}", folder.display());
+            }
+            _ => {}
+        }
+        Self { folder, latest: Arc::default() }
+    }
+
+    /// How the latest export of `study` stands.
+    #[must_use]
+    pub fn state(&self, study: &str) -> StudyExportState {
+        self.lock().get(study).map_or(StudyExportState::None, Latest::state)
+    }
+
+    /// The latest export of `study`, if it is finished.
+    #[must_use]
+    pub fn made(&self, study: &str) -> Option<Made> {
+        match &self.lock().get(study)?.stage {
+            Stage::Ready(made) => Some(made.clone()),
+            Stage::Running(_) | Stage::Failed(_) => None,
+        }
+    }
+
+    /// Begins to export `study` as `recorder` records it, unless that is already under way. How it then stands.
+    #[must_use]
+    pub fn start(&self, recorder: Recorder, study: &str, unblinded: bool) -> StudyExportState {
+        let mut latest = self.lock();
+        let number = match latest.get(study) {
+            Some(running) if matches!(running.stage, Stage::Running(_)) => return running.state(),
+            Some(earlier) => earlier.number + 1,
+            None => 1,
+        };
+
+        // The one before goes now: two packages of a study may be more than the disk has room for.
+        let started = Latest { unblinded, stage: Stage::Running(Progress::default()), number };
+        let state = started.state();
+        let before = latest.insert(study.to_owned(), started);
+        drop(latest);
+        forget(before);
+
+        let job = Job { exports: self.clone(), study: study.to_owned(), unblinded, number };
+        tokio::spawn(job.run(recorder));
+        state
+    }
+
+    /// Takes away export `number` of `study`, unless a later one is in its place.
+    fn take(&self, study: &str, number: u64) -> Option<Latest> {
+        let mut latest = self.lock();
+        let same = latest.get(study).is_some_and(|latest| latest.number == number);
+        if same { latest.remove(study) } else { None }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Latest>> {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Latest {
+    fn state(&self) -> StudyExportState {
+        let unblinded = self.unblinded;
+        match &self.stage {
+            Stage::Running(progress) => StudyExportState::Running { unblinded, progress: *progress },
+            Stage::Failed(reason) => StudyExportState::Failed { unblinded, reason: reason.clone() },
+            Stage::Ready(made) => StudyExportState::Ready { unblinded, sessions: made.sessions },
+        }
+    }
+}
+
+/// An export under way.
+struct Job {
+    exports: StudyExports,
+    study: String,
+    unblinded: bool,
+    number: u64,
+}
+
+impl Job {
+    async fn run(self, recorder: Recorder) {
+        let stage = match self.make(&recorder).await {
+            Ok(made) => Stage::Ready(made),
+            Err(error) => {
+                tracing::warn!(study = %self.study, "a study could not be exported: {error}");
+                Stage::Failed(error.to_string())
+            }
+        };
+        self.stands_at(stage);
+
+        tokio::time::sleep(KEPT).await;
+        forget(self.exports.take(&self.study, self.number));
+    }
+
+    async fn make(&self, recorder: &Recorder) -> Result<Made, StudyExportError> {
+        let folder = &self.exports.folder;
+        let unwritable = |error| StudyExportError::Unwritable { path: folder.clone(), error };
+        std::fs::create_dir_all(folder).map_err(unwritable)?;
+        let room = tempfile::Builder::new().prefix("export-").tempdir_in(folder).map_err(unwritable)?;
+        let package = room.path().join(&self.study);
+
+        let exports = self.exports.clone();
+        let study = self.study.clone();
+        let told = move |progress| {
+            if let Some(latest) = exports.lock().get_mut(&study) {
+                latest.stage = Stage::Running(progress);
+            }
+        };
+        let summary = export_study(recorder, &self.study, self.unblinded, &package, Arc::new(told)).await?;
+
+        let room = Arc::new(room);
+        Ok(Made { unblinded: self.unblinded, folder: package, sessions: summary.sessions, _room: room })
+    }
+
+    fn stands_at(&self, stage: Stage) {
+        if let Some(latest) = self.exports.lock().get_mut(&self.study) {
+            latest.stage = stage;
+        }
+    }
+}
+
+/// Removes an export's files, on a thread that may wait for the disk.
+fn forget(export: Option<Latest>) {
+    if export.is_some() {
+        tokio::task::spawn_blocking(move || drop(export));
+    }
+}

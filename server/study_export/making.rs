@@ -1,0 +1,204 @@
+//! A study's export being made. Sessions are read and checked on a few threads behind all others, so that neither the
+//! control loop nor a viewer waits for it.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use serde::Serialize;
+use tokio::runtime::Handle;
+use tokio::sync::oneshot;
+use utoipa::ToSchema;
+
+use super::error::StudyExportError;
+use crate::ids::SessionId;
+use crate::package::{self, LeftOut, Sessions, Source, Summary};
+use crate::priority;
+use crate::store::export::Export;
+use crate::store::{Reader, Recorder};
+use crate::trial::study::places::Enrolled;
+use crate::trial::study::stage::Stage;
+
+/// Most sessions that are exported at a time. Each takes some 50 MB, and more than the processors gain nothing.
+const AT_A_TIME: usize = 4;
+
+/// How far an export has come.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Progress {
+    /// Sessions to export.
+    pub sessions: usize,
+    /// Sessions that are exported and verified.
+    pub exported: usize,
+    /// Steps of joining them; 0 until all sessions are exported.
+    pub steps: usize,
+    /// Steps of joining that are done.
+    pub joined: usize,
+}
+
+/// Hears how far an export has come.
+pub type Told = Arc<dyn Fn(Progress) + Send + Sync>;
+
+/// Exports study `study` as a package into the folder `out`, which must be new or empty and appears whole or not at
+/// all. Each session's export is recorded as one.
+///
+/// # Errors
+/// When there is no such study or no session in it, it is asked for unblinded before it was, an export does not
+/// verify, or `out` cannot be written.
+pub async fn export_study(
+    recorder: &Recorder,
+    study: &str,
+    unblinded: bool,
+    out: &Path,
+    told: Told,
+) -> Result<Summary, StudyExportError> {
+    let (sessions, left_out) = sessions_of(recorder.reader(), study, unblinded).await?;
+    let making = Making { recorder: recorder.clone(), sessions, left_out, unblinded, out: out.to_owned(), told };
+
+    let runtime = Handle::current();
+    let (done, made) = oneshot::channel();
+    let thread = thread::Builder::new().name("study-export".to_owned());
+    let work = move || {
+        // The threads that this one starts stand behind the others like it.
+        priority::lower_further();
+        // Whoever asked for it may be gone.
+        let _ = done.send(making.run(&runtime));
+    };
+
+    thread.spawn(work).map_err(|error| StudyExportError::Unwritable { path: out.to_owned(), error })?;
+    made.await.map_err(|_| StudyExportError::Broken)?
+}
+
+/// Checks that `study` can be exported: before anything is recorded or begun.
+///
+/// # Errors
+/// When there is no such study or no session in it, it is asked for unblinded before it was, or the database failed.
+pub async fn check(reader: &Reader, study: &str, unblinded: bool) -> Result<(), StudyExportError> {
+    sessions_of(reader, study, unblinded).await.map(|_| ())
+}
+
+/// The sessions of `study` that are exported, and those that are not.
+async fn sessions_of(
+    reader: &Reader,
+    study: &str,
+    unblinded: bool,
+) -> Result<(Vec<SessionId>, Vec<LeftOut>), StudyExportError> {
+    let Some(stored) = reader.study(study).await? else {
+        let names = reader.study_names().await?;
+        let known = if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
+        return Err(StudyExportError::NoStudy { study: study.to_owned(), known });
+    };
+
+    let withdrawn = |session: &Enrolled| LeftOut {
+        session: session.session.to_string(),
+        reason: "the participant withdrew".to_owned(),
+    };
+    let left_out = stored.sessions.iter().filter(|session| session.withdrawn).map(withdrawn).collect();
+    let kept: Vec<&Enrolled> = stored.sessions.iter().filter(|session| !session.withdrawn).collect();
+    if kept.is_empty() {
+        return Err(StudyExportError::NoSession(study.to_owned()));
+    }
+    if unblinded && stored.state().stage != Stage::Unblinded && kept.iter().any(|session| !session.unblinded) {
+        return Err(StudyExportError::StillBlinded(study.to_owned()));
+    }
+
+    Ok((kept.into_iter().map(|session| session.session).collect(), left_out))
+}
+
+/// What is to be exported, and where to.
+struct Making {
+    recorder: Recorder,
+    sessions: Vec<SessionId>,
+    left_out: Vec<LeftOut>,
+    unblinded: bool,
+    out: PathBuf,
+    told: Told,
+}
+
+impl Making {
+    /// Makes the package. Not on a thread of `runtime`.
+    fn run(&self, runtime: &Handle) -> Result<Summary, StudyExportError> {
+        let parent = self.out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let unwritable = |error| StudyExportError::Unwritable { path: parent.to_owned(), error };
+        std::fs::create_dir_all(parent).map_err(unwritable)?;
+        let exports = tempfile::Builder::new().prefix(".parfocal-exports-").tempdir_in(parent).map_err(unwritable)?;
+
+        let sources = self.export_sessions(runtime, exports.path())?;
+        let all = self.sessions.len();
+        let summary =
+            package::write(&sources, Sessions::Moved, &self.left_out, &self.out, &mut |joined, steps| {
+                (self.told)(Progress { sessions: all, exported: all, steps, joined });
+            })?;
+        Ok(summary)
+    }
+
+    /// Exports and verifies each session into a folder of its own below `folder`.
+    fn export_sessions(&self, runtime: &Handle, folder: &Path) -> Result<Vec<Source>, StudyExportError> {
+        let processors = thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        let work = Work {
+            making: self,
+            runtime,
+            folder,
+            next: AtomicUsize::new(0),
+            stopped: AtomicBool::new(false),
+            exported: Mutex::new(Vec::new()),
+            turn: tokio::sync::Mutex::new(()),
+        };
+
+        self.tell(0);
+        let outcomes: Vec<Result<(), StudyExportError>> = thread::scope(|scope| {
+            let workers: Vec<_> = (0..processors.min(AT_A_TIME)).map(|_| scope.spawn(|| work.run())).collect();
+            workers.into_iter().map(|worker| worker.join().unwrap_or(Err(StudyExportError::Broken))).collect()
+        });
+        outcomes.into_iter().collect::<Result<(), _>>()?;
+
+        let mut exported = work.exported.into_inner().unwrap_or_else(PoisonError::into_inner);
+        exported.sort_by_key(|(place, _)| *place);
+        Ok(exported.into_iter().map(|(_, source)| source).collect())
+    }
+
+    fn tell(&self, exported: usize) {
+        (self.told)(Progress { sessions: self.sessions.len(), exported, steps: 0, joined: 0 });
+    }
+}
+
+/// The sessions being exported, shared by all threads that do it.
+struct Work<'a> {
+    making: &'a Making,
+    runtime: &'a Handle,
+    folder: &'a Path,
+    /// The place of the next session.
+    next: AtomicUsize,
+    /// Whether an export failed, so that the others need not go on.
+    stopped: AtomicBool,
+    /// What is exported, each with its place in the study.
+    exported: Mutex<Vec<(usize, Source)>>,
+    /// An export ends with its own record in the chain, so two must not be recorded in the same moment.
+    turn: tokio::sync::Mutex<()>,
+}
+
+impl Work<'_> {
+    fn run(&self) -> Result<(), StudyExportError> {
+        while !self.stopped.load(Ordering::Relaxed) {
+            let place = self.next.fetch_add(1, Ordering::Relaxed);
+            let Some(&session) = self.making.sessions.get(place) else { break };
+            let source = self.export(session).inspect_err(|_| self.stopped.store(true, Ordering::Relaxed))?;
+
+            let mut exported = self.exported.lock().unwrap_or_else(PoisonError::into_inner);
+            exported.push((place, source));
+            self.making.tell(exported.len());
+        }
+        Ok(())
+    }
+
+    fn export(&self, session: SessionId) -> Result<Source, StudyExportError> {
+        let folder = self.folder.join(session.to_string());
+        self.runtime.block_on(async {
+            let turn = self.turn.lock().await;
+            let export = Export::prepare(&self.making.recorder, session, self.making.unblinded).await?;
+            drop(turn);
+            export.into_folder(&folder).await
+        })?;
+        Ok(Source::open(&folder)?)
+    }
+}
