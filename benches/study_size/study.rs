@@ -49,7 +49,7 @@ repeats = 2
 order = "balanced"
 segment_seconds = 3600
 
-[[questions]]
+[[after_segment]]
 id = "sharpness"
 text = "How sharp was the picture?"
 kind = "likert"

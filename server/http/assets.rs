@@ -61,6 +61,8 @@ static ASSETS: &[Asset] = &assets![
     "researcher/svg.js",
     "researcher/studies.js",
     "researcher/study.js",
+    "researcher/study_export.js",
+    "researcher/study_export_words.js",
     "researcher/timeline.js",
     "researcher/timeline_drawing.js",
     "researcher/timeline_words.js",

@@ -109,6 +109,11 @@ impl StudyPage {
         matches!(self.detail.line.stage, Stage::Open | Stage::Closed)
     }
 
+    /// Whether there is a session to export.
+    fn may_export(&self) -> bool {
+        self.detail.study_sessions.iter().any(|session| !session.withdrawn)
+    }
+
     const fn order(&self) -> &'static str {
         match self.detail.order {
             Order::Balanced => "balanced, in sets",

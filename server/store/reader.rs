@@ -16,6 +16,10 @@ use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
 use crate::trial::phase::SessionStatus;
 
+/// Rows that are read ahead of whoever takes them: with fewer, two threads wait for each other over and over while
+/// telemetry is read.
+const ROWS_AHEAD: usize = 1024;
+
 /// A database open for reading. Clone freely.
 #[derive(Clone, Debug)]
 pub struct Reader {
@@ -42,7 +46,11 @@ impl Reader {
     }
 
     pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
-        let options = SqliteConnectOptions::new().filename(file).read_only(true).busy_timeout(Duration::from_secs(5));
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .read_only(true)
+            .busy_timeout(Duration::from_secs(5))
+            .row_buffer_size(ROWS_AHEAD);
         Ok(Self { pool: SqlitePoolOptions::new().max_connections(3).connect_with(options).await? })
     }
 

@@ -25,6 +25,7 @@ const AT_A_TIME: usize = 4;
 
 /// How far an export has come.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
+#[schema(as = StudyExportProgress)]
 pub struct Progress {
     /// Sessions to export.
     pub sessions: usize,

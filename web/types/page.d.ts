@@ -35,6 +35,8 @@ declare global {
     type SetAside = Schemas["SetAside"];
     type Setting = Schemas["Setting"];
     type StudyAction = Schemas["StudyAction"];
+    type StudyExportProgress = Schemas["StudyExportProgress"];
+    type StudyExportState = Schemas["StudyExportState"];
     type SurgeonView = Schemas["SurgeonView"];
     type Timeline = Schemas["Timeline"];
     type TimelineComment = Schemas["TimelineComment"];

@@ -79,6 +79,19 @@ async fn a_session(operator: &Browser) {
     operator.sees("#new-session", "Prepare session").await;
 }
 
+/// Exports the study, whose page is open. The package is there when the page is opened again.
+async fn export(page: &Browser) {
+    page.sees_no("#export-ready").await;
+    page.click("#export-blinded").await;
+    page.sees("#export-ready", "Download the package").await;
+    page.reload().await;
+    page.sees("#export-told", "The export without policies is ready: 1 session").await;
+    page.sees("#export-ready", "Download the package").await;
+    page.sees_no("#export-progress").await;
+    shoot(page, "study-3-exported").await;
+    assert!(page.start_of("/api/researcher/studies/scope-2026/export.zip").await.starts_with("200 PK"));
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_study_is_led_from_the_pages() {
     let driver = Driver::start();
@@ -125,9 +138,11 @@ async fn a_study_is_led_from_the_pages() {
     page.reload().await;
     page.sees("main", "aborted").await;
     shoot(&page, "study-3-open").await;
+    export(&page).await;
     page.click_labelled("td", "Withdraw").await;
     sign(&page, "The surgeon asked for it").await;
     page.sees("td .badge.warn", "withdrawn").await;
+    assert_eq!(page.count("#export").await, 0, "no session is left to export");
 
     page.click("#close").await;
     sign(&page, "The last surgeon was here").await;

@@ -23,4 +23,5 @@ mod service;
 mod sizes;
 mod stopping;
 pub mod studies;
+mod study_export;
 mod voice;

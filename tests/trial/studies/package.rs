@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use parfocal::study_export::{Progress, StudyExportState, StudyExports};
 use serde_json::Value;
 
 use super::*;
@@ -272,4 +273,44 @@ async fn a_withdrawn_session_is_left_out_and_named() {
         refused(&["export", "--study", "nothing", "--data-dir", text(&data), "--out", text(&out)])
             .contains("there is no study 'nothing'")
     );
+}
+
+#[tokio::test]
+async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = whole(&mut trial, "S-02", "leeds").await;
+    let left = folder.path().join("study-exports/export-of-a-server-that-was-killed");
+    std::fs::create_dir_all(&left).unwrap();
+
+    let exports = StudyExports::new(folder.path());
+    assert!(!left.exists());
+    assert_eq!(exports.state(STUDY), StudyExportState::None);
+
+    // Nothing is done between the two: the test has not waited yet.
+    let first = exports.start(trial.recorder(), STUDY, false);
+    let begun = StudyExportState::Running { unblinded: false, progress: Progress::default() };
+    assert_eq!(first, begun);
+    assert_eq!(exports.start(trial.recorder(), STUDY, true), begun);
+
+    let mut told = Vec::new();
+    let ready = loop {
+        match exports.state(STUDY) {
+            StudyExportState::Running { progress, .. } => told.push(progress),
+            ended => break ended,
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+    };
+    assert_eq!(ready, StudyExportState::Ready { unblinded: false, sessions: 1 });
+    assert!(told.is_sorted_by_key(|progress| (progress.exported, progress.joined)), "{told:?}");
+
+    let made = exports.made(STUDY).unwrap();
+    let export = made.folder.join("sessions").join(session.to_string());
+    let accesses = rows(&export, "accesses");
+    assert_eq!(accesses.len(), 1, "one export: {accesses:?}");
+
+    // The next one takes its place, once nobody downloads it any more.
+    let _ = exports.start(trial.recorder(), STUDY, false);
+    assert!(exports.made(STUDY).is_none());
+    assert!(made.folder.is_dir(), "it is being downloaded");
 }

@@ -5,6 +5,7 @@ import { askConfirmed, askReason } from "../shared/dialogs.js";
 import { byId } from "../shared/dom.js";
 import "../shared/sign_in.js";
 import { tellTrouble } from "../shared/trouble.js";
+import { showExport } from "./study_export.js";
 
 const study = byId("study").dataset.study ?? "";
 
@@ -133,3 +134,6 @@ for (const [id, action] of Object.entries(actions)) {
 for (const button of document.querySelectorAll("button")) {
   if (button.dataset.withdraw) button.addEventListener("click", () => withdraw(button));
 }
+
+// A study without a session has nothing to export.
+if (document.getElementById("export")) showExport(study);

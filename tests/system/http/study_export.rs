@@ -1,0 +1,119 @@
+//! A whole study exported by the server: started, followed, downloaded, verified; and what is left of it.
+
+use std::io::Cursor;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::time::Duration;
+
+use reqwest::{Method, StatusCode};
+use rustix::process::Signal;
+use serde_json::{Value, json};
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+
+use super::studies::{act, ask, new_session, open, post, refused, server, sign_in_as_lead};
+use crate::support::Server;
+
+const EXPORT: &str = "/api/researcher/studies/scope-2026/export";
+const ZIP: &str = "/api/researcher/studies/scope-2026/export.zip";
+
+async fn state(server: &Server) -> Value {
+    let (status, said) = ask(server, "researcher", Method::GET, EXPORT, &Value::Null).await;
+    assert_eq!(status, StatusCode::OK, "{said}");
+    serde_json::from_str(&said).unwrap()
+}
+
+/// How the export stands once it is no longer being made.
+async fn ended(server: &Server) -> Value {
+    loop {
+        let state = state(server).await;
+        if state["state"] != "running" {
+            return state;
+        }
+        assert_eq!(state["unblinded"], false);
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+/// A session of `participant` in the study, aborted and off the screens.
+async fn a_session(server: &Server, participant: &str) {
+    post(server, "operator", "/api/operator/participants", json!({"code": participant})).await;
+    let made = post(server, "operator", "/api/operator/sessions", new_session(participant)).await;
+    let session = made["session"].clone();
+    act(server, "operator", json!({"session": session, "action": "abort", "reason": "the light failed"})).await;
+    post(server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+}
+
+/// The exports of sessions that the chain has, each with the account that asked for it.
+async fn recorded(data: &Path) -> Vec<(String, String)> {
+    let file = SqliteConnectOptions::new().filename(data.join("parfocal.db")).read_only(true);
+    let pool = SqlitePool::connect_with(file).await.unwrap();
+    let sql = "SELECT detail, account FROM accesses JOIN actors ON actors.record = accesses.number
+               WHERE accesses.kind = 'exported' AND actors.kind = 'access' ORDER BY accesses.number";
+    let found = sqlx::query_as(sql).fetch_all(&pool).await.unwrap();
+    pool.close().await;
+    found
+}
+
+fn in_folder(folder: &Path) -> usize {
+    std::fs::read_dir(folder).map_or(0, Iterator::count)
+}
+
+#[tokio::test]
+async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
+    let (_protocols, mut server) = server();
+    let data = Arc::clone(&server.data);
+    let exports = data.path().join("study-exports");
+
+    // A role's link is not enough.
+    assert_eq!(refused(&server, "researcher", EXPORT, json!({})).await.0, 403);
+    assert_eq!(ask(&server, "researcher", Method::GET, EXPORT, &Value::Null).await.0, StatusCode::FORBIDDEN);
+
+    sign_in_as_lead(&mut server).await;
+    assert_eq!(refused(&server, "researcher", EXPORT, json!({})).await.0, 404);
+    open(&server).await;
+    let (status, said) = refused(&server, "researcher", EXPORT, json!({})).await;
+    assert!(status == 409 && said.contains("has no session to export"), "{said}");
+    a_session(&server, "S-01").await;
+    a_session(&server, "S-02").await;
+    let (status, said) = refused(&server, "researcher", EXPORT, json!({"unblinded": true})).await;
+    assert!(status == 409 && said.contains("is not unblinded"), "{said}");
+    let (status, said) = ask(&server, "researcher", Method::GET, ZIP, &Value::Null).await;
+    assert!(status == StatusCode::NOT_FOUND && said.contains("Start one on the study's page"), "{said}");
+    assert_eq!(state(&server).await, json!({"state": "none"}));
+
+    // What cannot be written fails with a reason, is not recorded, and leaves the way free for another try.
+    std::fs::write(&exports, "").unwrap();
+    assert_eq!(post(&server, "researcher", EXPORT, json!({})).await["state"], "running");
+    let failed = ended(&server).await;
+    assert!(failed["state"] == "failed" && failed["reason"].as_str().unwrap().contains("study-exports"), "{failed}");
+    std::fs::remove_file(&exports).unwrap();
+
+    // A monitor reads everything, exports included.
+    server.add_account("monitor", "monitor", "Ms Monitor");
+    let token = server.sign_in("monitor").await;
+    server.use_key("researcher", &token);
+    let started = post(&server, "researcher", EXPORT, json!({"unblinded": false})).await;
+    assert_eq!(started["state"], "running");
+    assert_eq!(ended(&server).await, json!({"state": "ready", "unblinded": false, "sessions": 2}));
+    let asked = ("blinded".to_owned(), "monitor".to_owned());
+    assert_eq!(recorded(data.path()).await, [asked.clone(), asked]);
+
+    let zip = server.get_as("researcher", ZIP).send().await.unwrap();
+    assert_eq!(zip.headers()["content-disposition"], "attachment; filename=\"parfocal-scope-2026.zip\"");
+    let zip = zip.bytes().await.unwrap();
+    let unpacked = tempfile::tempdir().unwrap();
+    zip::ZipArchive::new(Cursor::new(zip)).unwrap().extract(unpacked.path()).unwrap();
+    let package = unpacked.path().join("parfocal-scope-2026");
+    assert_eq!(in_folder(&package.join("sessions")), 2);
+    let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(&package).output().unwrap();
+    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+
+    // Only the finished package is kept, and not beyond the server.
+    assert_eq!(in_folder(&exports), 1);
+    let room = std::fs::read_dir(&exports).unwrap().next().unwrap().unwrap().path();
+    assert_eq!(in_folder(&room), 1);
+    assert!(server.end(Signal::TERM));
+    let server = Server::on(Arc::clone(&data), &["--bind", "127.0.0.1:0"]);
+    assert!(!exports.exists() && server.said.contains("127.0.0.1"));
+}

@@ -1,0 +1,64 @@
+// The study's export: started here, made by the server, downloaded here. The page asks how far it has come; it may be
+// closed meanwhile.
+
+import { get, post } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+import { tell, tellTrouble } from "../shared/trouble.js";
+import { failedWords, progressShare, progressWords, readyWords } from "./study_export_words.js";
+
+const PATH = "/api/researcher/studies/{study}/export";
+
+/** Between two questions how far it has come. */
+const ASK_AGAIN_MS = 1000;
+
+/**
+ * Shows how the export of `study` stands, and starts one when asked to.
+ *
+ * @param {string} study
+ */
+export function showExport(study) {
+  const trouble = byId("export-trouble");
+  const buttons = [byId("export-blinded", HTMLButtonElement)];
+  const unblinded = document.getElementById("export-unblinded");
+  if (unblinded instanceof HTMLButtonElement) buttons.push(unblinded);
+
+  for (const button of buttons) {
+    button.addEventListener("click", async () => {
+      for (const each of buttons) each.disabled = true;
+      try {
+        show(await post(PATH, { unblinded: button === unblinded }, { study }));
+      } catch (error) {
+        for (const each of buttons) each.disabled = false;
+        tellTrouble(trouble, error);
+      }
+    });
+  }
+
+  /** Asks until it is finished: a server that does not answer may answer again. */
+  async function ask() {
+    try {
+      show(await get(PATH, { study }));
+    } catch (error) {
+      tellTrouble(trouble, error);
+      setTimeout(ask, ASK_AGAIN_MS);
+    }
+  }
+
+  /** @param {Api.StudyExportState} now */
+  function show(now) {
+    const isRunning = now.state === "running";
+    for (const button of buttons) button.disabled = isRunning;
+    byId("export-progress").hidden = !isRunning;
+    byId("export-ready").hidden = now.state !== "ready";
+    setText(byId("export-told"), now.state === "ready" ? readyWords(now) : "");
+    tell(trouble, now.state === "failed" ? failedWords(now) : "");
+
+    if (now.state === "running") {
+      setText(byId("export-words"), progressWords(now));
+      byId("export-bar", HTMLProgressElement).value = progressShare(now.progress);
+      setTimeout(ask, ASK_AGAIN_MS);
+    }
+  }
+
+  ask();
+}

@@ -1,0 +1,48 @@
+// How a study's export stands, in words.
+
+/** Of the time that an export takes, the share until all sessions are exported; the rest is joining them. */
+const EXPORTING = 0.7;
+
+/** @param {number} count */
+function sessionsInWords(count) {
+  return count === 1 ? "1 session" : `${count} sessions`;
+}
+
+/** @param {boolean} unblinded */
+function withPolicies(unblinded) {
+  return unblinded ? "with policies" : "without policies";
+}
+
+/**
+ * What is being done now.
+ *
+ * @param {Extract<Api.StudyExportState, { state: "running" }>} running
+ */
+export function progressWords({ progress, unblinded }) {
+  const { sessions, exported, steps, joined } = progress;
+  const how = withPolicies(unblinded);
+  if (sessions === 0) return `The export ${how} begins.`;
+  if (steps === 0) return `Exporting ${how}: ${exported} of ${sessionsInWords(sessions)}.`;
+  return `Exporting ${how}: ${sessionsInWords(sessions)} done. Joining them: step ${joined} of ${steps}.`;
+}
+
+/**
+ * How much of it is done, 0 to 1.
+ *
+ * @param {Api.StudyExportProgress} progress
+ */
+export function progressShare({ sessions, exported, steps, joined }) {
+  if (sessions === 0) return 0;
+  if (steps === 0) return (EXPORTING * exported) / sessions;
+  return EXPORTING + ((1 - EXPORTING) * joined) / steps;
+}
+
+/** @param {Extract<Api.StudyExportState, { state: "ready" }>} ready */
+export function readyWords({ sessions, unblinded }) {
+  return `The export ${withPolicies(unblinded)} is ready: ${sessionsInWords(sessions)}. The server keeps it for an hour.`;
+}
+
+/** @param {Extract<Api.StudyExportState, { state: "failed" }>} failed */
+export function failedWords({ reason, unblinded }) {
+  return `The export ${withPolicies(unblinded)} failed: ${reason}`;
+}
