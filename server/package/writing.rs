@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use serde::Serialize;
@@ -53,7 +54,7 @@ pub fn write(
     sessions: Sessions,
     left_out: &[LeftOut],
     out: &Path,
-    told: &mut dyn FnMut(usize, usize),
+    told: &mut (dyn FnMut(usize, usize) + Send),
 ) -> Result<Summary, PackageError> {
     let first = sources.first().ok_or_else(|| PackageError::Empty(out.to_owned()))?;
     agree(sources)?;
@@ -95,49 +96,75 @@ fn fill(
     sessions: Sessions,
     left_out: &[LeftOut],
     folder: &Path,
-    told: &mut dyn FnMut(usize, usize),
+    told: Told,
 ) -> Result<(), PackageError> {
     let tables: Vec<JoinedTable> = joined_tables().filter(|table| join::is_there(table, sources)).collect();
-    let steps = sources.len() + tables.len();
+    let steps = Steps::new(sources, sessions, &tables, told);
 
     let mut taken = Vec::new();
-    for (done, source) in sources.iter().enumerate() {
-        told(done, steps);
+    for source in sources {
         taken.push(take(source, sessions, folder)?);
+        if sessions == Sessions::Copied {
+            steps.done();
+        }
     }
 
-    let mut done = sources.len();
-    join_tables(&tables, &taken, folder, &mut || {
-        done += 1;
-        told(done, steps);
-    })?;
-
+    join_tables(&tables, &taken, folder, &steps)?;
     beside(&tables, &taken, folder)?;
     let description = description::describe(&taken, &tables, left_out);
     write_file(folder, "datapackage.json", format!("{description:#}\n").as_bytes())?;
-    write_file(folder, SUMS, sums(folder)?.as_bytes())
+    write_file(folder, SUMS, sums(folder)?.as_bytes())?;
+    steps.done();
+    Ok(())
 }
 
-/// Joins all tables; `joined` hears of each one that is done. The long ones, which take most of the time, are joined
-/// beside the others, each on a thread of its own.
+/// Hears the number of steps done, and of all.
+type Told<'a> = &'a mut (dyn FnMut(usize, usize) + Send);
+
+/// The steps of joining, counted from several threads: each export that is copied, each table, of a long table each
+/// export, and the checksums.
+struct Steps<'a> {
+    all: usize,
+    done: Mutex<(usize, Told<'a>)>,
+}
+
+impl<'a> Steps<'a> {
+    fn new(sources: &[Source], sessions: Sessions, tables: &[JoinedTable], told: Told<'a>) -> Self {
+        let copied = if sessions == Sessions::Copied { sources.len() } else { 0 };
+        let joined = tables.iter().map(|table| if table.long { sources.len() } else { 1 });
+        let all = copied + joined.sum::<usize>() + 1;
+        told(0, all);
+        Self { all, done: Mutex::new((0, told)) }
+    }
+
+    fn done(&self) {
+        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        done.0 += 1;
+        let (count, told) = &mut *done;
+        told(*count, self.all);
+    }
+}
+
+/// Joins all tables. The long ones, which take most of the time, are joined beside the others, each on a thread of its
+/// own.
 fn join_tables(
     tables: &[JoinedTable],
     sources: &[Source],
     folder: &Path,
-    joined: &mut dyn FnMut(),
+    steps: &Steps,
 ) -> Result<(), PackageError> {
     let (long, short): (Vec<&JoinedTable>, Vec<&JoinedTable>) = tables.iter().partition(|table| table.long);
     thread::scope(|scope| {
-        let long: Vec<_> =
-            long.into_iter().map(|table| scope.spawn(move || join_table(table, sources, folder))).collect();
+        let begin = |table| scope.spawn(move || join_long(table, sources, folder, steps));
+        let long: Vec<_> = long.into_iter().map(begin).collect();
         for table in short {
-            join_table(table, sources, folder)?;
-            joined();
+            join_short(table, sources, folder)?;
+            steps.done();
         }
+
         for thread in long {
             let broken = || PackageError::unwritable(folder)("a thread ended before its table was whole");
             thread.join().unwrap_or_else(|_| Err(broken()))?;
-            joined();
         }
         Ok(())
     })
@@ -171,15 +198,20 @@ fn copy_folder(from: &Path, to: &Path) -> Result<(), PackageError> {
     Ok(())
 }
 
-/// Writes a table as Parquet, and as CSV and for SPSS unless it has a row for each frame.
-fn join_table(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<(), PackageError> {
+/// Writes a table that has a row for each frame: as Parquet alone.
+fn join_long(table: &JoinedTable, sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
+    let mut parquet = ParquetFile::create(&folder.join(format!("{}.parquet", table.table.name)), table)?;
+    for source in sources {
+        join::rows(table, std::slice::from_ref(source), |cells| parquet.row(cells))?;
+        steps.done();
+    }
+    parquet.end()
+}
+
+/// Writes any other table: as Parquet, as CSV and for SPSS.
+fn join_short(table: &JoinedTable, sources: &[Source], folder: &Path) -> Result<(), PackageError> {
     let name = table.table.name;
     let mut parquet = ParquetFile::create(&folder.join(format!("{name}.parquet")), table)?;
-    if table.long {
-        join::rows(table, sources, |cells| parquet.row(cells))?;
-        return parquet.end();
-    }
-
     let path = folder.join(table.table.file());
     let file = fs::File::create(&path).map_err(PackageError::unwritable(&path))?;
     let mut csv = csv::Writer::from_writer(BufWriter::new(file));
