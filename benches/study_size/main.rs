@@ -83,7 +83,11 @@ async fn export(made: &study::Made, data: &std::path::Path, unblinded: bool) {
 
     let sessions = Duration::from_nanos(exported_after.load(Ordering::Relaxed));
     let joining = exported.took.saturating_sub(sessions);
-    println!("| of these, sessions and then joining | | {:.2} s + {:.2} s | |", sessions.as_secs_f64(), joining.as_secs_f64());
+    println!(
+        "| of these, sessions and then joining | | {:.2} s + {:.2} s | |",
+        sessions.as_secs_f64(),
+        joining.as_secs_f64()
+    );
     println!("| its size | | {:.0} MB | |", size_mb(&out));
 
     // A tenth of the checks of `parfocal verify`: one session's.

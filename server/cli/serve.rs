@@ -214,12 +214,10 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let (end, shutdown) = watch::channel(false);
 
     let reach = reach(address, certificates.as_deref());
-    let accounts = Accounts::of_server(&store, Arc::clone(&clock), Cost::default());
-    let study_exports = StudyExports::new(&arguments.data_dir);
     let app = Arc::new(App {
+        accounts: Accounts::of_server(&store, Arc::clone(&clock), Cost::default()),
         clock,
-        accounts,
-        study_exports,
+        study_exports: StudyExports::new(&arguments.data_dir),
         live,
         store: store.clone(),
         health,

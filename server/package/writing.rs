@@ -147,12 +147,7 @@ impl<'a> Steps<'a> {
 
 /// Joins all tables. The long ones, which take most of the time, are joined beside the others, each on a thread of its
 /// own.
-fn join_tables(
-    tables: &[JoinedTable],
-    sources: &[Source],
-    folder: &Path,
-    steps: &Steps,
-) -> Result<(), PackageError> {
+fn join_tables(tables: &[JoinedTable], sources: &[Source], folder: &Path, steps: &Steps) -> Result<(), PackageError> {
     let (long, short): (Vec<&JoinedTable>, Vec<&JoinedTable>) = tables.iter().partition(|table| table.long);
     thread::scope(|scope| {
         let begin = |table| scope.spawn(move || join_long(table, sources, folder, steps));

@@ -175,6 +175,8 @@ impl Job {
             }
         };
         self.stands_at(stage);
+        // The server may end meanwhile: it closes its database without waiting for this.
+        drop(recorder);
 
         tokio::time::sleep(KEPT).await;
         forget(self.exports.take(&self.study, self.number));

@@ -33,7 +33,7 @@ pub enum StudyExportError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// A folder could not be made.
-    #[error("cannot write {}: {error}; free some space or choose another folder, and export again", .path.display())]
+    #[error("cannot write {}: {error}; see that it can be written and has room, and export again", .path.display())]
     Unwritable {
         /// Which.
         path: PathBuf,

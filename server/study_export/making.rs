@@ -126,10 +126,9 @@ impl Making {
 
         let sources = self.export_sessions(runtime, exports.path())?;
         let all = self.sessions.len();
-        let summary =
-            package::write(&sources, Sessions::Moved, &self.left_out, &self.out, &mut |joined, steps| {
-                (self.told)(Progress { sessions: all, exported: all, steps, joined });
-            })?;
+        let summary = package::write(&sources, Sessions::Moved, &self.left_out, &self.out, &mut |joined, steps| {
+            (self.told)(Progress { sessions: all, exported: all, steps, joined });
+        })?;
         Ok(summary)
     }
 

@@ -198,7 +198,7 @@ impl ZipStream {
                 }
             }
         }
-        self.finish().await
+        Box::pin(self.finish()).await
     }
 
     fn begin(&mut self, name: &str) -> io::Result<()> {

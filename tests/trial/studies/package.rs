@@ -59,9 +59,19 @@ async fn data_of(folder: &Path, seed: u64, sites: &[&str]) {
     trial.store.close().await;
 }
 
-/// Exports the study from the data folder `data`.
+/// Exports the study from the data folder `data`. Where standard error is no terminal, its lines tell how far it has
+/// come.
 fn exported(data: &Path, out: &Path, more: &[&str]) {
-    done(&[&["export", "--study", STUDY, "--data-dir", text(data), "--out", text(out)], more].concat());
+    let arguments = ["export", "--study", STUDY, "--data-dir", text(data), "--out", text(out)];
+    let output = parfocal(&[&arguments[..], more].concat());
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{told}");
+
+    let (sessions, joining): (Vec<&str>, Vec<&str>) = told.lines().partition(|line| line.contains("sessions exported"));
+    let last = sessions.last().and_then(|line| line.split_once(" of ")).unwrap();
+    assert_eq!(last.1, format!("{} sessions exported", last.0));
+    let last = joining.last().and_then(|line| line.split_once(" of ")).unwrap();
+    assert_eq!(last.1, format!("{} steps of joining", last.0));
 }
 
 /// The package of a study of three sessions at two sites.

@@ -73,25 +73,37 @@ struct ChainRows {
 
 /// The columns of chain.csv that are read.
 const CHAIN: [&str; 13] = [
-    "number", "hash", "entry", "wall", "kind", "key", "session", "place", "adopted", "salt", "sealed", "content",
+    "number",
+    "hash",
+    "entry",
+    "wall",
+    "kind",
+    "key",
+    "session",
+    "place",
+    "adopted",
+    "salt",
+    "sealed",
+    "content",
     "sealed_salt",
 ];
 
 impl ChainRows {
     fn open(folder: &Path) -> Result<Self, String> {
         let mut reader = csv(folder, "chain.csv")?;
-        let headers = reader.headers().map_err(unreadable)?;
+        let headers = reader.headers().map_err(|error| unreadable(&error))?;
         let places = CHAIN.map(|column| headers.iter().position(|name| name == column));
         Ok(Self { reader, row: StringRecord::new(), places })
     }
 
     fn next(&mut self, salts: &BTreeMap<String, String>) -> Result<Option<FoundRow>, String> {
-        if !self.reader.read_record(&mut self.row).map_err(unreadable)? {
+        if !self.reader.read_record(&mut self.row).map_err(|error| unreadable(&error))? {
             return Ok(None);
         }
 
         let cells = self.places.map(|place| place.and_then(|place| self.row.get(place)).unwrap_or_default());
-        let [number, hash, hashed, wall, kind, key, session, place, adopted, salt, sealed, content, sealed_salt] = cells;
+        let [number, hash, hashed, wall, kind, key, session, place, adopted, salt, sealed, content, sealed_salt] =
+            cells;
         if kind.is_empty() {
             let entry = Found::Hash(hashed.to_owned());
             return Ok(Some(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() }));
@@ -128,7 +140,7 @@ fn as_recorded(column: &str, cell: &str) -> String {
     column.map_or(cell, |column| column.read(cell)).to_owned()
 }
 
-fn unreadable(error: ::csv::Error) -> String {
+fn unreadable(error: &::csv::Error) -> String {
     format!("chain.csv: {error}")
 }
 
