@@ -44,6 +44,11 @@ pub struct Operator(Option<Account>);
 #[derive(Debug, Clone)]
 pub struct Researcher(Option<Account>);
 
+/// Proof that the request speaks for somebody who may read what researchers read. For a request that changes nothing
+/// that was recorded, whatever its method: monitors may make it, too.
+#[derive(Debug, Clone)]
+pub struct ResearchReader(Option<Account>);
+
 /// The roles that the request speaks for, at least one.
 #[derive(Debug, Clone)]
 pub struct Roles {
@@ -134,6 +139,29 @@ macro_rules! proof {
 
 proof!(Operator);
 proof!(Researcher);
+
+impl FromRequestParts<AppState> for ResearchReader {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Error> {
+        let person = parts.extensions.get::<Person>();
+        let reads = |person: &&Person| person.account.role.may_act_as(Role::Researcher, false);
+        let account = person.filter(reads).map(|person| person.account.clone());
+        if account.is_some() || holds(&parts.headers, &app.keys, Role::Researcher) {
+            Ok(Self(account))
+        } else {
+            Err(Error::NeedsRole(Role::Researcher))
+        }
+    }
+}
+
+impl Acting for ResearchReader {
+    const ROLE: Role = Role::Researcher;
+
+    fn account(&self) -> Option<&Account> {
+        self.0.as_ref()
+    }
+}
 
 impl FromRequestParts<AppState> for Roles {
     type Rejection = Error;

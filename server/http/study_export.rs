@@ -13,12 +13,10 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::AppState;
 use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
-use super::people::{Acting, SignedIn};
-use super::roles::Researcher;
+use super::people::Acting;
+use super::roles::{ResearchReader, Researcher};
 use crate::store::export::ZipStream;
 use crate::study_export::{StudyExportError, StudyExportState, check};
-use crate::trial::account::Actor;
-use crate::trial::role::Role;
 
 impl From<StudyExportError> for Error {
     fn from(error: StudyExportError) -> Self {
@@ -51,20 +49,14 @@ struct ExportStudy {
     (status = 404, description = "No such study", body = ErrorBody),
     (status = 409, description = "It has no session to export, or is not unblinded", body = ErrorBody)))]
 async fn start_study_export(
-    SignedIn(person): SignedIn,
+    by: ResearchReader,
     State(app): State<AppState>,
     Path(study): Path<String>,
     JsonBody(wanted): JsonBody<ExportStudy>,
 ) -> Result<Json<StudyExportState>, Error> {
-    // An export changes nothing that was recorded: monitors may make one, too.
-    let account = person.ok_or(Error::NeedsAccount(Role::Researcher))?.account;
-    if !account.role.may_act_as(Role::Researcher, false) {
-        return Err(Error::NeedsRole(Role::Researcher));
-    }
-
+    by.personally()?;
     check(app.conductor.reader(), &study, wanted.unblinded).await?;
-    let by = Actor { role: Role::Researcher, account: Some(account.account) };
-    Ok(Json(app.study_exports.start(app.conductor.recorder(by), &study, wanted.unblinded)))
+    Ok(Json(app.study_exports.start(app.conductor.recorder(by.actor()), &study, wanted.unblinded)))
 }
 
 /// How the latest export of a study stands. A finished one is kept for an hour.
