@@ -56,6 +56,11 @@ pub fn write(
     out: &Path,
     told: &mut (dyn FnMut(usize, usize) + Send),
 ) -> Result<Summary, PackageError> {
+    // In the order in which `check` finds them again: of their folders' names.
+    let mut sources = sources.to_vec();
+    sources.sort_by(|one, other| one.session.cmp(&other.session));
+    let sources = sources.as_slice();
+
     let first = sources.first().ok_or_else(|| PackageError::Empty(out.to_owned()))?;
     agree(sources)?;
     check_new(out)?;
