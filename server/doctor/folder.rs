@@ -27,7 +27,7 @@ pub fn disk(data: &Path) -> Finding {
         }
     };
 
-    let minutes = free.for_recordings() / RECORDING_RATE / 60;
+    let minutes = free.spare() / RECORDING_RATE / 60;
     let found = format!(
         "{:.1} GB are free, enough for about {minutes} minutes of hyperspectral recording.",
         free.available as f64 / 1e9

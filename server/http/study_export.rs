@@ -28,6 +28,7 @@ impl From<StudyExportError> for Error {
             StudyExportError::Package(_)
             | StudyExportError::Store(_)
             | StudyExportError::Unwritable { .. }
+            | StudyExportError::NoRoom { .. }
             | StudyExportError::Broken => Self::Storage(text),
         }
     }

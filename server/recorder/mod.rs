@@ -149,7 +149,7 @@ impl Recordings {
         }
 
         let rate = told.bytes_per_second.filter(|rate| *rate > 0.0);
-        told.seconds_left = room.zip(rate).map(|(room, rate)| room.for_recordings() as f64 / rate);
+        told.seconds_left = room.zip(rate).map(|(room, rate)| room.spare() as f64 / rate);
         told
     }
 

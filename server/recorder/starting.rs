@@ -55,7 +55,7 @@ pub fn start(
     began: Moment,
 ) -> Result<Option<Running>, StartError> {
     let room = room(&parts.folder).map_err(|error| StartError::Failed(error.to_string()))?;
-    if room.for_recordings() == 0 {
+    if room.spare() == 0 {
         return Err(StartError::NoRoom(room));
     }
 

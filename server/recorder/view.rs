@@ -92,7 +92,7 @@ impl Worker {
             let Some(frame) = frame else { break Ended::Stopped };
             let picture = &frame.picture;
 
-            let left = room(self.writer.folder()).map_or(u64::MAX, Room::for_recordings);
+            let left = room(self.writer.folder()).map_or(u64::MAX, Room::spare);
             if left < picture.jpeg.len() as u64 {
                 break Ended::DiskNearlyFull;
             }

@@ -1,4 +1,4 @@
-//! How much a recording may write: it leaves a reserve, so that the trial's own data always has room.
+//! How much recordings and exports may write: they leave a reserve, so that the trial's own data always has room.
 
 use std::path::Path;
 
@@ -12,14 +12,14 @@ const PART: u64 = 20;
 pub struct Room {
     /// What this program may still write.
     pub available: u64,
-    /// What recordings leave free: 1 GiB, or a twentieth of a disk smaller than 20 GiB.
+    /// What recordings and exports leave free: 1 GiB, or a twentieth of a disk smaller than 20 GiB.
     pub reserve: u64,
 }
 
 impl Room {
-    /// Bytes that a recording may still take.
+    /// Bytes that recordings and exports may still take.
     #[must_use]
-    pub const fn for_recordings(self) -> u64 {
+    pub const fn spare(self) -> u64 {
         self.available.saturating_sub(self.reserve)
     }
 }
@@ -41,8 +41,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_leaves_the_reserve() {
-        assert_eq!(Room { available: 5000, reserve: 1000 }.for_recordings(), 4000);
-        assert_eq!(Room { available: 500, reserve: 1000 }.for_recordings(), 0);
+    fn the_reserve_is_left() {
+        assert_eq!(Room { available: 5000, reserve: 1000 }.spare(), 4000);
+        assert_eq!(Room { available: 500, reserve: 1000 }.spare(), 0);
     }
 }

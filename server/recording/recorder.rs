@@ -256,7 +256,7 @@ impl Storer {
         let bytes = frame.len() as u64;
 
         // A disk that does not tell its room is written to until it is full.
-        let room = room(self.writer.folder()).map_or(u64::MAX, Room::for_recordings);
+        let room = room(self.writer.folder()).map_or(u64::MAX, Room::spare);
         if self.writer.waiting_bytes() + bytes > room {
             return Some(Ended::DiskNearlyFull);
         }

@@ -40,6 +40,17 @@ pub enum StudyExportError {
         /// Why.
         error: std::io::Error,
     },
+    /// The disk has too little room beside what the trial needs.
+    #[error(
+        "the disk of {} has no room for the export: {:.1} GB have to stay free for trials; \
+         remove what is no longer needed there, and export again", .path.display(), *.reserve as f64 / 1e9
+    )]
+    NoRoom {
+        /// Where it was to be written.
+        path: PathBuf,
+        /// Bytes that no export takes.
+        reserve: u64,
+    },
     /// A thread failed.
     #[error("the export ended before it was whole; export again, and report it if that happens again")]
     Broken,

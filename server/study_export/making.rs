@@ -1,6 +1,7 @@
 //! A study's export being made. Sessions are read and checked on a few threads behind all others, so that neither the
 //! control loop nor a viewer waits for it.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,9 +13,11 @@ use tokio::sync::oneshot;
 use utoipa::ToSchema;
 
 use super::error::StudyExportError;
+use crate::files::files_below;
 use crate::ids::SessionId;
 use crate::package::{self, LeftOut, Sessions, Source, Summary};
 use crate::priority;
+use crate::recording::room;
 use crate::store::export::Export;
 use crate::store::{Reader, Recorder};
 use crate::trial::study::places::Enrolled;
@@ -125,6 +128,9 @@ impl Making {
         let exports = tempfile::Builder::new().prefix(".parfocal-exports-").tempdir_in(parent).map_err(unwritable)?;
 
         let sources = self.export_sessions(runtime, exports.path())?;
+        // The joined tables tell once more what the exports tell.
+        check_room(parent, size_of(exports.path()).map_err(unwritable)?)?;
+
         let all = self.sessions.len();
         let summary = package::write(&sources, Sessions::Moved, &self.left_out, &self.out, &mut |joined, steps| {
             (self.told)(Progress { sessions: all, exported: all, steps, joined });
@@ -192,6 +198,7 @@ impl Work<'_> {
     }
 
     fn export(&self, session: SessionId) -> Result<Source, StudyExportError> {
+        check_room(self.folder, 1)?;
         let folder = self.folder.join(session.to_string());
         self.runtime.block_on(async {
             let turn = self.turn.lock().await;
@@ -201,4 +208,24 @@ impl Work<'_> {
         })?;
         Ok(Source::open(&folder)?)
     }
+}
+
+/// Refuses to take `bytes` of the disk of `folder` where that would leave less than its reserve: what is said in a
+/// session has to find room.
+fn check_room(folder: &Path, bytes: u64) -> Result<(), StudyExportError> {
+    // A disk that does not tell its room says itself when it is full.
+    let Ok(room) = room(folder) else { return Ok(()) };
+    if room.spare() < bytes {
+        return Err(StudyExportError::NoRoom { path: folder.to_owned(), reserve: room.reserve });
+    }
+    Ok(())
+}
+
+/// Bytes of all files below `folder`.
+fn size_of(folder: &Path) -> io::Result<u64> {
+    let mut bytes = 0;
+    for file in files_below(folder)? {
+        bytes += std::fs::metadata(folder.join(file))?.len();
+    }
+    Ok(bytes)
 }

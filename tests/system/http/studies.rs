@@ -29,15 +29,22 @@ pub fn definition() -> String {
     )
 }
 
-/// A folder with the protocol, and a server on another that reads it.
+/// A folder with the protocol.
+pub fn protocols() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("pair.toml"), PROTOCOL).unwrap();
+    folder
+}
+
+/// That folder, and a server on another that reads it.
 pub fn server() -> (TempDir, Server) {
-    let protocols = tempfile::tempdir().unwrap();
-    std::fs::write(protocols.path().join("pair.toml"), PROTOCOL).unwrap();
+    let protocols = protocols();
     let server = on(Arc::new(tempfile::tempdir().unwrap()), protocols.path());
     (protocols, server)
 }
 
-fn on(data: Arc<TempDir>, protocols: &Path) -> Server {
+/// A server on a data folder that another may have used before.
+pub fn on(data: Arc<TempDir>, protocols: &Path) -> Server {
     Server::on(data, &["--bind", "127.0.0.1:0", "--protocols", protocols.to_str().unwrap()])
 }
 

@@ -11,8 +11,9 @@ use rustix::process::Signal;
 use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
-use super::studies::{act, ask, new_session, open, post, refused, server, sign_in_as_lead};
+use super::studies::{act, ask, new_session, on, open, post, protocols, refused, server, sign_in_as_lead};
 use crate::support::Server;
+use crate::support::disk::SmallDisk;
 
 const EXPORT: &str = "/api/researcher/studies/scope-2026/export";
 const ZIP: &str = "/api/researcher/studies/scope-2026/export.zip";
@@ -116,4 +117,25 @@ async fn a_study_is_exported_in_the_background_downloaded_and_verifies() {
     assert!(server.end(Signal::TERM));
     let server = Server::on(Arc::clone(&data), &["--bind", "127.0.0.1:0"]);
     assert!(!exports.exists() && server.said.contains("127.0.0.1"));
+}
+
+#[tokio::test]
+async fn an_export_leaves_room_for_the_trial() {
+    let Some(disk) = SmallDisk::of_megabytes(40) else { return };
+    let protocols = protocols();
+    let mut server = on(Arc::clone(&disk.folder), protocols.path());
+    sign_in_as_lead(&mut server).await;
+    open(&server).await;
+    a_session(&server, "S-01").await;
+
+    // A twentieth of a small disk stays free, which is 2 MB here.
+    disk.fill_but(1_500_000);
+    post(&server, "researcher", EXPORT, json!({})).await;
+    let failed = ended(&server).await;
+    assert!(failed["reason"].as_str().unwrap().contains("has no room for the export"), "{failed}");
+    assert_eq!(in_folder(&disk.folder.path().join("study-exports")), 0, "nothing is left of it");
+
+    disk.empty();
+    post(&server, "researcher", EXPORT, json!({})).await;
+    assert_eq!(ended(&server).await["state"], "ready");
 }

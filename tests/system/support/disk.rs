@@ -40,6 +40,13 @@ impl SmallDisk {
         while filler.write_all(&[0; 4096]).is_ok() {}
     }
 
+    /// Leaves this many bytes of room, or a few thousand less.
+    pub fn fill_but(&self, bytes: u64) {
+        let disk = rustix::fs::statvfs(self.folder.path()).unwrap();
+        let filling = (disk.f_bavail * disk.f_frsize).checked_sub(bytes).expect("there is as much room");
+        std::fs::write(self.filler(), vec![0; filling as usize]).unwrap();
+    }
+
     /// Makes room again.
     pub fn empty(&self) {
         std::fs::remove_file(self.filler()).unwrap();
