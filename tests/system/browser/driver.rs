@@ -60,7 +60,7 @@ impl Driver {
             .spawn()
             .unwrap_or_else(|error| panic!("cannot start chromedriver ({error}): {NEEDED}"));
 
-        let mut said = BufReader::new(process.stdout.take()?);
+        let mut said = BufReader::new(process.stdout.take().expect("piped above"));
         let mut lines = said.by_ref().lines().map_while(Result::ok);
         let port = lines.find_map(|line| line.split_once(STARTED)?.1.trim_end_matches('.').parse().ok());
         let Some(port) = port else {
