@@ -1,5 +1,6 @@
 //! What training and evaluation read: weights of a network, recorded scans and focal stacks.
 
+use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
@@ -84,7 +85,8 @@ fn network() -> nn::VarStore {
 /// Stripes, the less contrast the farther `focal_power` is from the middle.
 fn picture(focal_power: FocalPower) -> GrayImage {
     let contrast = 100.0 * (1.0 - (focal_power.get() - FocalPower::MIDDLE.get()).abs());
-    let level = |place: usize| if place / 4 % 2 == 0 { 128.0 + contrast } else { 128.0 - contrast };
+    let is_bright = |place: usize| (place / 4).is_multiple_of(2);
+    let level = |place: usize| if is_bright(place) { 128.0 + contrast } else { 128.0 - contrast };
     let data = (0..SIDE * SIDE).map(|place| level(place) as f32).collect();
     GrayImage::new(SIDE, SIDE, data).unwrap()
 }
@@ -123,7 +125,7 @@ fn make_stack(folder: &Path) {
         let gray = picture(power).data.into_iter().map(|level| level as u8).collect();
         let gray = image::GrayImage::from_raw(SIDE as u32, SIDE as u32, gray).unwrap();
         gray.save(pictures.join(&name)).unwrap();
-        list += &format!("{name},{number}\n");
+        writeln!(list, "{name},{number}").unwrap();
     }
     fs::write(folder.join(LIST), list).unwrap();
 }
