@@ -2,6 +2,7 @@
 
 mod book;
 mod reading;
+mod replay;
 mod verify;
 mod writing;
 

@@ -3,6 +3,7 @@
 use sqlx::Row;
 
 use super::StoredStudy;
+use super::replay::check_places;
 use crate::autofocus::PolicyName;
 use crate::store::{Reader, StoreError};
 use crate::trial::study::lists::Lists;
@@ -20,7 +21,7 @@ pub(in crate::store) async fn check_studies(snapshot: &Reader) -> Result<Result<
     }
 
     let studies = names.len();
-    Ok(Ok(format!("studies as planned: {studies}; sessions with the order of their place: {sessions}")))
+    Ok(Ok(format!("studies as planned: {studies}; sessions with the next place and its order: {sessions}")))
 }
 
 /// How many sessions of study `name` were checked, or what is wrong.
@@ -43,7 +44,7 @@ async fn check_study(snapshot: &Reader, name: &str) -> Result<Result<usize, Stri
             return Ok(Err(format!("session {}: {problem}", enrolled.session)));
         }
     }
-    Ok(Ok(study.sessions.len()))
+    Ok(check_places(snapshot, &study).await?.map(|()| study.sessions.len()))
 }
 
 /// The orders of `study` if they are those committed to; none where it was never opened.

@@ -325,7 +325,8 @@ async fn the_command_line_plans_opens_closes_locks_and_shows_studies() {
     let verified = Command::new(env!("CARGO_BIN_EXE_parfocal")).arg("verify").arg(data.path()).output().unwrap();
     let said = String::from_utf8(verified.stdout).unwrap();
     assert!(
-        verified.status.success() && said.contains("studies as planned: 1; sessions with the order of their place: 1"),
+        verified.status.success()
+            && said.contains("studies as planned: 1; sessions with the next place and its order: 1"),
         "{said}"
     );
 }

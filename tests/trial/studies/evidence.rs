@@ -76,7 +76,7 @@ async fn two_databases_draw_different_orders_for_the_same_definition() {
 }
 
 /// What is done to a database, the check that has to fail, and what it has to say.
-const TAMPERED: [(&str, &str, &str); 13] = [
+const TAMPERED: [(&str, &str, &str); 14] = [
     (
         "UPDATE studies SET definition = replace(definition, 'surgeons = 2', 'surgeons = 4')",
         "studies",
@@ -106,6 +106,11 @@ const TAMPERED: [(&str, &str, &str); 13] = [
     ("UPDATE study_sessions SET place = 3 WHERE place = 2", "chain", "study_sessions: study-session"),
     ("UPDATE study_sessions SET place = 3 WHERE place = 2", "studies", "its order is not that of place 3 in its list"),
     ("DELETE FROM study_sessions WHERE site = 'london'", "chain", "study_sessions: study-session"),
+    (
+        "DELETE FROM study_sessions WHERE site = 'leeds' AND place = 1",
+        "studies",
+        "has place 2 of the list of leeds, and place 1 was next",
+    ),
 ];
 
 #[tokio::test]
@@ -118,7 +123,9 @@ async fn whatever_is_changed_of_a_study_in_a_database_is_found() {
     let checks = verify_database(folder.path(), None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
     assert!(
-        said(&checks, "studies").unwrap().contains("studies as planned: 1; sessions with the order of their place: 3")
+        said(&checks, "studies")
+            .unwrap()
+            .contains("studies as planned: 1; sessions with the next place and its order: 3")
     );
 
     let database = folder.path().join("parfocal.db");
@@ -127,6 +134,26 @@ async fn whatever_is_changed_of_a_study_in_a_database_is_found() {
         let found = said(&checks, check).expect_err(sql);
         assert!(found.contains(expected), "{sql}: {found}");
     }
+}
+
+#[tokio::test]
+async fn a_place_that_was_given_by_no_rule_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    // Two surgeons are planned in Leeds. The aborted session opens a spare place.
+    aborted(&trial, PARTICIPANT, "leeds").await;
+    whole(&mut trial, "S-02", "leeds").await;
+    let spare = whole(&mut trial, "S-03", "leeds").await;
+    trial.store.close().await;
+    drop(trial);
+
+    let checks = verify_database(folder.path(), None).await.unwrap();
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+
+    let database = folder.path().join("parfocal.db");
+    let checks = after(&database, "DELETE FROM events WHERE kind = 'aborted'", None).await;
+    let found = said(&checks, "studies").unwrap_err();
+    assert!(found.contains(&format!("session {spare} should have been refused")), "{found}");
 }
 
 /// What is done to a file of an unblinded export, and what the check of the study has to say.
