@@ -234,8 +234,12 @@ function scrollWithin(list, line) {
  */
 function jump(index) {
   choose(index);
-  const comment = timeline?.comments[index];
-  if (comment) player?.playBefore(comment.seconds);
+  const comments = timeline?.comments ?? [];
+  const comment = comments[index];
+  if (!comment) return;
+  // What was said before the place where playback begins is not pointed out instead.
+  passed = comments.length;
+  player?.playBefore(comment.seconds);
 }
 
 function draw() {
