@@ -39,10 +39,10 @@ pub struct Column {
     pub since: u64,
 }
 
-/// The format of exports that this version writes. The seventh has voice comments. The sixth names the personal accounts. The fifth names recordings
-/// and studies, and has corrections, scores, consents, withdrawals and erasures. The fourth has the chain. The third
-/// tells what the policies knew of the optic, the second what was said late and on which device; the first did not name
-/// itself.
+/// The format of exports that this version writes. The seventh has voice comments. The sixth names the personal
+/// accounts. The fifth names recordings and studies, and has corrections, scores, consents, withdrawals and erasures.
+/// The fourth has the chain. The third tells what the policies knew of the optic, the second what was said late and on
+/// which device; the first did not name itself.
 pub const FORMAT: u64 = 7;
 
 /// A table without its rows.
