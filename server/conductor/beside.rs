@@ -74,7 +74,7 @@ impl Conductor {
         let actors = reader.actors(session).await?;
         let line = |kind: &str, number: i64, run: i64, stamp: Stamp, by: Role, text: String| {
             let account = actors.get(&(kind.to_owned(), number.to_string())).cloned();
-            (clocks.wall(run, stamp.at), LogLine { at: stamp.wall, by, account, text })
+            (clocks.wall(run, stamp.at), LogLine { at: stamp.wall, by, account, text, erasable_event: None })
         };
 
         let mut lines = Vec::new();
@@ -99,9 +99,14 @@ impl Conductor {
             lines.push(line("correction", number, run, correction.stamp, correction.by, text));
         }
         for StoredErasure { number, run, erasure } in reader.erasures(session).await? {
-            let what = erasure.subject.name();
-            let text =
-                format!("Words of {} {what} erased: {}", if what == "answer" { "an" } else { "a" }, erasure.reason);
+            let what = match erasure.subject {
+                Erasable::Answer => "Words of an answer",
+                Erasable::Comment => "Words of a comment",
+                Erasable::Correction => "Words of a correction",
+                Erasable::Event => "Reason of an event",
+                Erasable::StudyEvent => "Reason in the study's audit trail",
+            };
+            let text = format!("{what} erased: {}", erasure.reason);
             lines.push(line("erasure", number, run, erasure.stamp, erasure.by, text));
         }
         Ok(lines)

@@ -3,7 +3,6 @@
 use super::course::Course;
 use super::{ConductError, Pen, Shared};
 use crate::ids::SessionId;
-use crate::store::DeviceReport;
 use crate::trial::action::Action;
 use crate::trial::allocation::Seed;
 use crate::trial::grace::{Grace, Outstanding};
@@ -70,9 +69,9 @@ impl Shared {
     ) -> Result<Option<Outstanding>, ConductError> {
         let devices = self.store.reader().surgeon_devices(session).await?;
         let clocks = &self.run_clock.clocks;
-        let told = |device: &DeviceReport| device.told.map(|(holding, run, at)| (holding, clocks.wall(run, at)));
+        let told = devices.iter().map(|device| device.told_on(clocks));
 
         let now = self.run_clock.time(self.clock.now());
-        Ok(grace.outstanding(now, devices.iter().map(told)))
+        Ok(grace.outstanding(now, told))
     }
 }

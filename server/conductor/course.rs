@@ -309,6 +309,16 @@ impl Course {
         comments.into_iter().for_each(|comment| self.heard(comment));
     }
 
+    /// Takes in its `events` as the disk has them, where a reason was erased.
+    pub fn read_again(&mut self, events: impl IntoIterator<Item = Event>) {
+        for event in events {
+            let kept = self.events.iter_mut().find(|kept| kept.number == event.number);
+            if let Some(kept) = kept {
+                *kept = event;
+            }
+        }
+    }
+
     /// Takes in a comment that was kept.
     pub fn heard(&mut self, comment: Comment) {
         self.comments += 1;

@@ -7,12 +7,14 @@ use crate::store::{Answer, Comment, Erasure, StoredCorrection};
 use crate::trial::account::Actor;
 use crate::trial::correction::Field;
 use crate::trial::erasure::{self, Erasable, NewErasure};
+use crate::trial::event::EventKind;
 use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
+use crate::trial::study::event::StudyEventKind;
 
 impl Conductor {
-    /// Erases words that were said in session `session`, and the notes on them. When this returns, they are nowhere in
-    /// the database's files.
+    /// Erases words that were said in session `session` with the notes on them, or the reason of one of its events. When
+    /// this returns, they are nowhere in the database's files.
     ///
     /// # Errors
     /// When `by` is not the researcher, a session is under way, the record has no words, or the disk failed.
@@ -33,32 +35,86 @@ impl Shared {
         if reader.session(session).await?.is_none() {
             return Err(ConductError::no_session());
         }
-        let corrections = reader.corrections(session).await?;
-        match new.subject {
-            Erasable::Comment => is_comment(&reader.comments(session).await?, &new.record)?,
-            Erasable::Answer => is_text(&reader.answers(session).await?, &new.record)?,
-            Erasable::Correction => is_note(&corrections, &new.record)?,
-        }
+        let records = match new.subject {
+            Erasable::Event => self.with_its_copy(session, &new.record).await?,
+            Erasable::StudyEvent => {
+                let advice = "erase the reason of the session's event: that of the study's event goes with it";
+                return Err(Refusal::Invalid(advice.to_owned()).into());
+            }
+            Erasable::Comment | Erasable::Answer | Erasable::Correction => {
+                self.with_its_notes(session, new.subject, new.record).await?
+            }
+        };
 
         let stamp = self.stamp();
         let Actor { role: by, account } = by;
-        let erasure =
-            |subject: Erasable, record: String| Erasure { session, subject, record, reason: reason.clone(), by, stamp };
-
-        // A note on the words may repeat them.
-        let notes = corrections.iter().filter(|stored| stored.correction.record == new.record);
-        let notes = notes.map(|stored| erasure(Erasable::Correction, stored.number.to_string()));
-        let mut erasures = vec![erasure(new.subject, new.record.clone())];
-        erasures.extend(notes);
+        let erasure = |(subject, record)| Erasure { session, subject, record, reason: reason.clone(), by, stamp };
+        let erasures: Vec<Erasure> = records.into_iter().map(erasure).collect();
         self.store.erase(&erasures, account.as_ref()).await?;
 
         let comments = reader.comments(session).await?;
+        let events = reader.events(session).await?;
         let mut live = self.live();
         if let Some(course) = live.course_of(session) {
             course.hear_again(comments.into_iter().map(|(_, comment)| comment));
+            course.read_again(events.into_iter().map(|(_, event)| event));
             self.publish(&live);
         }
         Ok(())
+    }
+
+    /// The record of something said, and the notes on it: a note may repeat the words.
+    async fn with_its_notes(
+        &self,
+        session: SessionId,
+        subject: Erasable,
+        record: String,
+    ) -> Result<Vec<(Erasable, String)>, ConductError> {
+        let reader = self.store.reader();
+        let corrections = reader.corrections(session).await?;
+        match subject {
+            Erasable::Comment => is_comment(&reader.comments(session).await?, &record)?,
+            Erasable::Answer => is_text(&reader.answers(session).await?, &record)?,
+            _ => is_note(&corrections, &record)?,
+        }
+
+        let notes = corrections.iter().filter(|stored| stored.correction.record == record);
+        let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string())).collect::<Vec<_>>();
+        let mut records = vec![(subject, record)];
+        records.extend(notes);
+        Ok(records)
+    }
+
+    /// The session's event with this number, and the event of its study that repeats the reason.
+    async fn with_its_copy(&self, session: SessionId, number: &str) -> Result<Vec<(Erasable, String)>, ConductError> {
+        let reader = self.store.reader();
+        let events = reader.events(session).await?;
+        let found = events.iter().map(|(_, event)| event).find(|event| event.number.to_string() == number);
+        let event = found.ok_or_else(no_such_record)?;
+        if event.kind.reason().is_none() {
+            return Err(Refusal::conflict("only a reason can be erased; this event has none").into());
+        }
+
+        let mut records = vec![(Erasable::Event, format!("{session}/{}", event.number))];
+        if let Some(enrolment) = reader.enrolment(session).await? {
+            let of_study = reader.study_events(&enrolment.study).await?;
+            let copies = of_study.iter().filter(|copy| repeats(&copy.kind, session, &event.kind));
+            records.extend(copies.map(|copy| (Erasable::StudyEvent, format!("{}/{}", enrolment.study, copy.number))));
+        }
+        Ok(records)
+    }
+}
+
+/// Whether the event of a study tells what the event `of_session` of session `session` does.
+fn repeats(of_study: &StudyEventKind, session: SessionId, of_session: &EventKind) -> bool {
+    match of_study {
+        StudyEventKind::SessionWithdrawn { session: about } => {
+            *about == session && matches!(of_session, EventKind::Withdrawn { .. })
+        }
+        StudyEventKind::SessionUnblinded { session: about } => {
+            *about == session && matches!(of_session, EventKind::Unblinded { .. })
+        }
+        _ => false,
     }
 }
 

@@ -209,7 +209,10 @@ impl Conductor {
         for (run, event) in events {
             let text = event.kind.in_words(|segment| course.setting(segment));
             let account = event.account.as_ref().map(ToString::to_string);
-            lines.push((clocks.wall(run, event.at), LogLine { at: event.wall, by: event.by, account, text }));
+            let has_reason = event.kind.reason().is_some_and(|reason| !reason.is_empty());
+            let erasable_event = has_reason.then_some(event.number);
+            let line = LogLine { at: event.wall, by: event.by, account, text, erasable_event };
+            lines.push((clocks.wall(run, event.at), line));
         }
 
         let made = lines.first().map(|(at, _)| *at);
@@ -217,7 +220,8 @@ impl Conductor {
             let at = clocks.wall(run, at);
             if Some(at) >= made {
                 let text = format!("The {device}: {message}");
-                lines.push((at, LogLine { at: wall, by: Role::System, account: None, text }));
+                let line = LogLine { at: wall, by: Role::System, account: None, text, erasable_event: None };
+                lines.push((at, line));
             }
         }
 

@@ -209,10 +209,7 @@ impl Studies {
         for enrolled in &study.sessions {
             let Some(stored) = reader.session(enrolled.session).await? else { continue };
             let devices = reader.surgeon_devices(enrolled.session).await?;
-            let told = devices.iter().map(|device| {
-                let (holding, run, at) = device.told?;
-                Some((holding, clocks.wall(run, at)))
-            });
+            let told = devices.iter().map(|device| device.told_on(&clocks));
             outstanding += usize::from(stored.grace(&clocks).outstanding(now, told).is_some());
         }
         Ok(outstanding)

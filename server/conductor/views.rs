@@ -78,7 +78,8 @@ fn log(course: &Course) -> Vec<LogLine> {
         let text = event.kind.for_the_blinded().in_words(|segment| course.setting(segment));
         let unrecorded = if course.is_recorded(event.number) { "" } else { " (not recorded yet)" };
         let account = event.account.as_ref().map(ToString::to_string);
-        LogLine { at: event.wall, by: event.by, account, text: format!("{text}{unrecorded}") }
+        let text = format!("{text}{unrecorded}");
+        LogLine { at: event.wall, by: event.by, account, text, erasable_event: None }
     };
     course.events.iter().rev().take(LATEST).map(line).collect()
 }

@@ -20,7 +20,7 @@ pub struct Erasure {
     pub session: SessionId,
     /// What sort of record.
     pub subject: Erasable,
-    /// Its key; of a correction its number.
+    /// Its key, as the chain has it.
     pub record: String,
     /// Why.
     pub reason: String,
@@ -113,6 +113,10 @@ async fn insert_erasure(
         Erasable::Correction => {
             "UPDATE corrections SET old_value = '', new_value = '', reason = '' WHERE CAST(number AS TEXT) = ?"
         }
+        Erasable::Event => {
+            "UPDATE events SET payload = json_set(payload, '$.reason', '') WHERE session || '/' || number = ?"
+        }
+        Erasable::StudyEvent => "UPDATE study_events SET reason = '' WHERE study || '/' || number = ?",
     };
     sqlx::query(emptied).bind(&erasure.record).execute(&mut *connection).await?;
     if erasure.subject == Erasable::Comment {

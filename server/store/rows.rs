@@ -97,6 +97,15 @@ pub struct DeviceReport {
     pub told: Option<(u32, i64, Moment)>,
 }
 
+impl DeviceReport {
+    /// How much the device held, and when it told so on the time of `clocks`; none where it never told.
+    #[must_use]
+    pub fn told_on(&self, clocks: &RunClocks) -> Option<(u32, Timestamp)> {
+        let (holding, run, at) = self.told?;
+        Some((holding, clocks.wall(run, at)))
+    }
+}
+
 /// A participant.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Participant {

@@ -12,7 +12,7 @@ use super::role::Role;
 pub struct NewErasure {
     /// What sort of record.
     pub subject: Erasable,
-    /// Its key; of a correction its number.
+    /// Its key; of a correction or an event its number.
     pub record: String,
     /// Why; kept with the erasure. It must not repeat the words.
     #[schema(pattern = r"\S")]
@@ -29,6 +29,10 @@ pub enum Erasable {
     Comment,
     /// A correction, with its note and its reason.
     Correction,
+    /// An event of the session: its reason.
+    Event,
+    /// An event of the session's study that is about the session: its reason. Erased with that of the session's event.
+    StudyEvent,
 }
 
 impl Erasable {
@@ -39,13 +43,17 @@ impl Erasable {
             Self::Answer => "answer",
             Self::Comment => "comment",
             Self::Correction => "correction",
+            Self::Event => "event",
+            Self::StudyEvent => "study-event",
         }
     }
 
     /// The sort called `name`.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Answer, Self::Comment, Self::Correction].into_iter().find(|subject| subject.name() == name)
+        const ALL: [Erasable; 5] =
+            [Erasable::Answer, Erasable::Comment, Erasable::Correction, Erasable::Event, Erasable::StudyEvent];
+        ALL.into_iter().find(|subject| subject.name() == name)
     }
 }
 

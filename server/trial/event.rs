@@ -131,12 +131,38 @@ impl EventKind {
         }
     }
 
+    /// The reason that somebody gave; it may be empty. None for what nobody gives a reason for.
+    #[must_use]
+    pub fn reason(&self) -> Option<&str> {
+        match self {
+            Self::Paused { reason, .. }
+            | Self::Aborted { reason, .. }
+            | Self::Withdrawn { reason }
+            | Self::Unblinded { reason, .. } => Some(reason),
+            _ => None,
+        }
+    }
+
+    /// The same without its reason.
+    #[must_use]
+    pub fn without_reason(&self) -> Self {
+        let mut kind = self.clone();
+        match &mut kind {
+            Self::Paused { reason, .. }
+            | Self::Aborted { reason, .. }
+            | Self::Withdrawn { reason }
+            | Self::Unblinded { reason, .. } => reason.clear(),
+            _ => {}
+        }
+        kind
+    }
+
     /// The same without what only the researcher may read: a reason for unblinding may name a
     /// policy.
     #[must_use]
     pub fn for_the_blinded(&self) -> Self {
         match self {
-            Self::Unblinded { emergency, .. } => Self::Unblinded { reason: String::new(), emergency: *emergency },
+            Self::Unblinded { .. } => self.without_reason(),
             other => other.clone(),
         }
     }
@@ -155,18 +181,22 @@ impl EventKind {
                 format!("Questions on setting {} done", setting(*segment))
             }
             Self::QuestionsFinished { segment: None } => "Closing questions done".to_owned(),
-            Self::Paused { reason, .. } if reason.is_empty() => "Paused".to_owned(),
-            Self::Paused { reason, .. } => format!("Paused: {reason}"),
+            Self::Paused { reason, .. } => because("Paused", reason),
             Self::Resumed => "Resumed".to_owned(),
             Self::ServerRestarted { .. } => "The server restarted; paused where it was".to_owned(),
             Self::Completed => "Session completed".to_owned(),
-            Self::Aborted { reason, .. } => format!("Session aborted: {reason}"),
-            Self::Withdrawn { reason } => format!("Withdrawn: {reason}"),
+            Self::Aborted { reason, .. } => because("Session aborted", reason),
+            Self::Withdrawn { reason } => because("Withdrawn", reason),
             Self::Unblinded { reason, .. } if reason.is_empty() => "Unblinded by the researcher".to_owned(),
             Self::Unblinded { reason, emergency: false } => format!("Unblinded: {reason}"),
             Self::Unblinded { reason, emergency: true } => format!("Unblinded in an emergency: {reason}"),
         }
     }
+}
+
+/// `what` with its reason, if there is one: it may be left out, or have been erased.
+fn because(what: &str, reason: &str) -> String {
+    if reason.is_empty() { what.to_owned() } else { format!("{what}: {reason}") }
 }
 
 fn seconds(milliseconds: u64) -> String {

@@ -104,4 +104,6 @@ pub struct LogLine {
     pub account: Option<String>,
     /// What happened.
     pub text: String,
+    /// The number of the session's event that it tells, where the event has a reason that a researcher can erase.
+    pub erasable_event: Option<u32>,
 }

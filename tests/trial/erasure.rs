@@ -14,9 +14,11 @@ use parfocal::trial::erasure::{Erasable, NewErasure};
 use parfocal::trial::question::AnswerValue;
 use parfocal::trial::remark::NewComment;
 use parfocal::trial::role::Role;
+use parfocal::trial::study::signature::Signature;
 
 use crate::exports::{failed, rows};
-use crate::fixture::Trial;
+use crate::fixture::{PARTICIPANT, Trial};
+use crate::studies;
 
 /// Words that stand nowhere else. Long enough to fill pages of the database, so that SQLite splits them.
 fn words(what: &str) -> String {
@@ -119,6 +121,73 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
     // A tablet that never heard that its comment was kept sends it again, and may forget it.
     trial.conductor.comment(comment).await.unwrap();
     assert_eq!(holding(&data, "Mustermann"), NOWHERE);
+}
+
+/// Reasons that name a patient: of an abort, and of an unblinding, which the study's audit trail repeats.
+#[tokio::test]
+async fn an_erased_reason_is_nowhere_and_the_event_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    std::fs::create_dir(&data).unwrap();
+    let trial = studies::opened(&data).await;
+    let session = studies::prepare(&trial, PARTICIPANT, "leeds").await.unwrap();
+    let abort = Action::Abort { reason: "Frau Mustermann bled".to_owned() };
+    trial.conductor.act(Role::Operator, session, abort).await.unwrap();
+    let signature = Signature::new("Dr Ward", "Frau Mustermann needs to know").unwrap();
+    trial.conductor.unblind_in_emergency(Role::Researcher, session, signature, true).await.unwrap();
+
+    let reasons = async || -> Vec<u32> {
+        let detail = trial.conductor.session_detail(session).await.unwrap();
+        detail.log.iter().filter_map(|line| line.erasable_event).collect()
+    };
+    let told = reasons().await;
+    assert_eq!(told.len(), 2, "{told:?}");
+    for event in told {
+        let erasure = |number: &str| NewErasure {
+            subject: Erasable::Event,
+            record: number.to_owned(),
+            reason: "names a patient".to_owned(),
+        };
+        trial.conductor.erase(Role::Researcher, session, erasure(&event.to_string())).await.unwrap();
+        let none = trial.conductor.erase(Role::Researcher, session, erasure("1")).await.unwrap_err();
+        assert!(matches!(&none, ConductError::Conflict(text) if text.contains("this event has none")), "{none}");
+        let unknown = trial.conductor.erase(Role::Researcher, session, erasure("99")).await.unwrap_err();
+        assert!(matches!(unknown, ConductError::NotFound(_)), "{unknown}");
+    }
+    assert_eq!(holding(&data, "Mustermann"), NOWHERE);
+    assert_eq!(reasons().await, [0; 0]);
+    let log = trial.conductor.session_detail(session).await.unwrap().log;
+    assert!(log.iter().any(|line| line.text == "Session aborted"), "{log:?}");
+    assert!(log.iter().any(|line| line.text == "Reason of an event erased: names a patient"), "{log:?}");
+
+    let out = folder.path().join("export");
+    export(&trial.recorder(), session, &out, true).await.unwrap();
+    assert_eq!(failed(&verify(&out, None)), [""; 0], "{:?}", verify(&out, None));
+    let erased: Vec<String> =
+        rows(&out, "erasures").into_iter().map(|mut row| row.remove("subject").unwrap()).collect();
+    assert_eq!(erased, ["event", "event", "study-event"]);
+    trial.store.close().await;
+    drop(trial);
+
+    // The server's own view of the session comes from the events again.
+    let trial = Trial::start_with(&data, Some(&data), 5).await;
+    let checks = verify_database(&data, None).await.unwrap();
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+    assert!(trial.conductor.session_detail(session).await.unwrap().unblinding.is_some());
+    trial.store.close().await;
+
+    let pool = crate::storage::raw(&data).await;
+    for sql in [
+        "UPDATE events SET payload = json_set(payload, '$.reason', 'other') WHERE kind = 'aborted'",
+        "UPDATE events SET payload = json_set(payload, '$.inspected_ms', 1) WHERE kind = 'aborted'",
+        "UPDATE events SET payload = '{}' WHERE kind = 'created'",
+        "UPDATE study_events SET reason = 'other'",
+        "UPDATE study_events SET reason = ''",
+    ] {
+        let refused = sqlx::raw_sql(sql).execute(&pool).await.unwrap_err();
+        assert!(refused.to_string().contains("append-only"), "{sql}: {refused}");
+    }
+    pool.close().await;
 }
 
 async fn count(data: &Path, sql: &'static str) -> i64 {

@@ -1512,7 +1512,7 @@ export interface components {
          * @description A record whose words can be erased.
          * @enum {string}
          */
-        Erasable: "answer" | "comment" | "correction";
+        Erasable: "answer" | "comment" | "correction" | "event" | "study-event";
         /** @description A failure as programs get it. */
         ErrorBody: {
             /** @description What happened and what to do. */
@@ -1666,6 +1666,11 @@ export interface components {
             at: string;
             /** @description Who. */
             by: components["schemas"]["Role"];
+            /**
+             * Format: int32
+             * @description The number of the session's event that it tells, where the event has a reason that a researcher can erase.
+             */
+            erasable_event?: number | null;
             /** @description What happened. */
             text: string;
         };
@@ -1753,7 +1758,7 @@ export interface components {
         NewErasure: {
             /** @description Why; kept with the erasure. It must not repeat the words. */
             reason: string;
-            /** @description Its key; of a correction its number. */
+            /** @description Its key; of a correction or an event its number. */
             record: string;
             /** @description What sort of record. */
             subject: components["schemas"]["Erasable"];

@@ -24,6 +24,7 @@ declare global {
     type Origin = Schemas["Origin"];
     type NewConsent = Schemas["NewConsent"];
     type NewCorrection = Schemas["NewCorrection"];
+    type NewErasure = Schemas["NewErasure"];
     type Outstanding = Schemas["Outstanding"];
     type Pair = Schemas["Pair"];
     type Question = Schemas["Question"];

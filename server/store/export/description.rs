@@ -306,8 +306,8 @@ table! {
     ErasureRow {
         number: i64 = means("Order of the record in the database").since(5),
         session: SessionId = SESSION.since(5),
-        subject: &'static str = means("What was erased: answer, comment or correction").since(5),
-        record: String = means("The key of the answer or comment, or the number of the correction").since(5),
+        subject: &'static str = means("What was erased: answer, comment or correction; or the reason of an event or study-event").since(5),
+        record: String = means("Its key, as in the chain: of a correction its number, of an event SESSION/NUMBER, of a study-event STUDY/NUMBER").since(5),
         reason: String = means("Why, as the researcher said").since(5),
         role: Role = means("Who did it: researcher").since(5),
         wall: Timestamp = WALL.since(5),

@@ -162,12 +162,38 @@ export function askErasure(session, subject, key) {
       "hold them. The record stays, and says that its words were erased, by whom and why. Do not repeat the words here.",
     go: "Erase for good",
     danger: true,
-    done: async (reason) => {
-      const path = "/api/researcher/sessions/{session}/erasures";
-      await post(path, { subject, record: key, reason }, { session });
-      location.reload();
-    },
+    done: (reason) => erase(session, { subject, record: key, reason }),
   });
+}
+
+/**
+ * Asks whether the reason of an event is to be erased.
+ *
+ * @param {string} session
+ * @param {string} number the event's
+ */
+export function askErasureOfReason(session, number) {
+  askReason({
+    heading: "Erase this reason",
+    consequence:
+      "The reason leaves the database for good, also where the study’s audit trail repeats it. Backups and exports " +
+      "made earlier still hold it. The event stays, and the audit trail says that its words were erased, by whom and " +
+      "why. Do not repeat the words here.",
+    go: "Erase for good",
+    danger: true,
+    done: (reason) => erase(session, { subject: "event", record: number, reason }),
+  });
+}
+
+/**
+ * Erases words, and shows the page without them.
+ *
+ * @param {string} session
+ * @param {Api.NewErasure} erasure
+ */
+async function erase(session, erasure) {
+  await post("/api/researcher/sessions/{session}/erasures", erasure, { session });
+  location.reload();
 }
 
 /**

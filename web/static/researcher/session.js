@@ -8,6 +8,7 @@ import "../shared/sign_in.js";
 import { clockText } from "../shared/text.js";
 import {
   askErasure,
+  askErasureOfReason,
   askNote,
   askTranscript,
   askWithdrawal,
@@ -364,12 +365,15 @@ document.getElementById("correct-answer")?.addEventListener("click", async () =>
     setText(byId("timeline-trouble"), inWords(error));
   }
 });
-for (const button of document.querySelectorAll("button[data-note], button[data-erase]")) {
+for (const button of document.querySelectorAll(
+  "button[data-note], button[data-erase], button[data-erase-reason]",
+)) {
   if (!(button instanceof HTMLButtonElement)) continue;
-  const { note, noted, erase } = button.dataset;
+  const { note, noted, erase, eraseReason } = button.dataset;
   button.onclick = () => {
     if (note) askNote(session, note, noted ?? "");
     if (erase) askErasure(session, "answer", erase);
+    if (eraseReason) askErasureOfReason(session, eraseReason);
   };
 }
 load();
