@@ -178,6 +178,13 @@ async fn researcher(theatre: &Theatre) {
     page.sees("main", "The data of this session stay out of exports").await;
     page.to_top().await;
     shoot(page, "researcher-9-withdrawn").await;
+
+    page.click_labelled(".events", "Erase reason…").await;
+    page.type_into("#reason", "it says why somebody left").await;
+    page.click("#reason-go").await;
+    page.sees(".events", "it says why somebody left").await;
+    assert!(!page.text("main").await.contains("wants no part"));
+
     let session = page.attribute("#session", "data-session").await.unwrap();
     assert_eq!(page.start_of(&format!("/api/researcher/sessions/{session}/export.zip")).await, "409 {\"");
     page.open(&theatre.server.url("/researcher")).await;
