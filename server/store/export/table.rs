@@ -2,6 +2,7 @@
 //! dictionary come from them.
 
 use jiff::Timestamp;
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::autofocus::PolicyName;
@@ -75,12 +76,14 @@ pub trait Row {
 }
 
 /// What a field of a row may be.
-pub trait Cell {
+pub trait Cell: Serialize {
     /// The type of its column.
     const KIND: Type;
 
     /// The cell, null where there is nothing.
-    fn value(&self) -> Value;
+    fn value(&self) -> Value {
+        json!(self)
+    }
 
     /// Adds the cell to `csv` as the CSV files have it: nothing where there is nothing.
     fn write_csv(&self, csv: &mut Vec<u8>) {
@@ -93,10 +96,6 @@ macro_rules! cells {
         $($(
             impl Cell for $cell {
                 const KIND: Type = Type::$kind;
-
-                fn value(&self) -> Value {
-                    json!(self)
-                }
             }
         )+)+
     };
@@ -113,10 +112,6 @@ macro_rules! plain_cells {
         $($(
             impl Cell for $cell {
                 const KIND: Type = Type::$kind;
-
-                fn value(&self) -> Value {
-                    json!(self)
-                }
 
                 fn write_csv(&self, csv: &mut Vec<u8>) {
                     // Writing into memory does not fail.
@@ -135,10 +130,6 @@ plain_cells! {
 impl Cell for f64 {
     const KIND: Type = Type::Number;
 
-    fn value(&self) -> Value {
-        json!(self)
-    }
-
     fn write_csv(&self, csv: &mut Vec<u8>) {
         // JSON has no infinity and no "not a number": the cell stays empty.
         if self.is_finite() {
@@ -150,10 +141,6 @@ impl Cell for f64 {
 impl Cell for String {
     const KIND: Type = Type::String;
 
-    fn value(&self) -> Value {
-        json!(self)
-    }
-
     fn write_csv(&self, csv: &mut Vec<u8>) {
         if is_formula(self) {
             csv.push(b'\'');
@@ -164,10 +151,6 @@ impl Cell for String {
 
 impl<T: Cell> Cell for Option<T> {
     const KIND: Type = T::KIND;
-
-    fn value(&self) -> Value {
-        self.as_ref().map_or(Value::Null, Cell::value)
-    }
 
     fn write_csv(&self, csv: &mut Vec<u8>) {
         if let Some(cell) = self {
