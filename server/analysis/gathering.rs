@@ -121,7 +121,7 @@ impl<'a> Gathering<'a> {
             .map(|stored| (stored.erasure.subject, stored.erasure.record))
             .collect();
 
-        for motion in reader.motions(session).await? {
+        for motion in reader.motions_of_ended(session).await? {
             self.take_motion(&motion);
         }
 

@@ -1,5 +1,8 @@
 //! What telemetry tells of each setting of a session in a few figures. Rows are read one by one: a study has millions.
 
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use futures_util::TryStreamExt;
 
 use super::{Reader, StoreError};
@@ -38,7 +41,26 @@ pub struct Motion {
 /// was held for a pause or a failed device.
 type Row = (i64, i64, f64, Option<f64>, Option<f64>, bool);
 
+/// Figures of sessions that are over, by session.
+pub(super) type MotionsOfEnded = Arc<Mutex<BTreeMap<SessionId, Vec<Motion>>>>;
+
 impl Reader {
+    /// The same as [`Reader::motions`] for a session whose telemetry is complete. It is read once and then remembered,
+    /// because a whole study's takes many seconds.
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn motions_of_ended(&self, session: SessionId) -> Result<Vec<Motion>, StoreError> {
+        let remembered = self.ended.lock().unwrap_or_else(PoisonError::into_inner).get(&session).cloned();
+        if let Some(motions) = remembered {
+            return Ok(motions);
+        }
+
+        let motions = self.motions(session).await?;
+        self.ended.lock().unwrap_or_else(PoisonError::into_inner).insert(session, motions.clone());
+        Ok(motions)
+    }
+
     /// How the lens was driven in each setting of `session` that has telemetry.
     ///
     /// # Errors

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
 use sqlx::{Connection as _, Row, migrate::Migrate};
 
+use super::motions::MotionsOfEnded;
 use super::schema::{DATABASE, MIGRATOR};
 use super::values::moment;
 use super::values::{parsed, stamp};
@@ -24,6 +26,8 @@ const ROWS_AHEAD: usize = 1024;
 #[derive(Clone, Debug)]
 pub struct Reader {
     pool: SqlitePool,
+    /// What was found in telemetry that does not change any more.
+    pub(super) ended: MotionsOfEnded,
 }
 
 impl Reader {
@@ -51,7 +55,8 @@ impl Reader {
             .read_only(true)
             .busy_timeout(Duration::from_secs(5))
             .row_buffer_size(ROWS_AHEAD);
-        Ok(Self { pool: SqlitePoolOptions::new().max_connections(3).connect_with(options).await? })
+        let pool = SqlitePoolOptions::new().max_connections(3).connect_with(options).await?;
+        Ok(Self { pool, ended: MotionsOfEnded::default() })
     }
 
     /// The database as it is now, whatever is written from now on: all that is read from what comes
@@ -74,7 +79,7 @@ impl Reader {
                 })
             });
 
-        Ok(Self { pool: pool.connect_with(options).await? })
+        Ok(Self { pool: pool.connect_with(options).await?, ended: Arc::clone(&self.ended) })
     }
 
     async fn check_version(&self) -> Result<(), StoreError> {

@@ -96,6 +96,10 @@ async fn figures_of_a_setting_are_those_by_hand_and_leave_out_pauses_and_restart
 
     let found = trial.store.reader().motions(session).await.unwrap();
     assert_eq!(found.len(), 2);
+    // What is remembered of a session that is over is the same, whoever asks.
+    for _ in 0..2 {
+        assert_eq!(trial.store.reader().motions_of_ended(session).await.unwrap(), found);
+    }
     let expected =
         Motion { setting: 1, frames: 7, seconds: 0.24, travel: 0.7, turns: 2, known: 3, error: 0.3, in_focus: 2 };
     assert_is(&found[0], expected);
