@@ -10,6 +10,8 @@ use std::sync::LazyLock;
 use libfuzzer_sys::fuzz_target;
 use targets::{TARGETS, Target};
 
+#[path = "../../tests/fuzz/backup.rs"]
+mod backup;
 #[path = "../../tests/fuzz/folders.rs"]
 mod folders;
 #[path = "../../tests/fuzz/lessons.rs"]

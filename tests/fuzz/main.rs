@@ -5,6 +5,7 @@
 //!
 //! The same targets can be run by libFuzzer, which follows the code that an input reaches: see `fuzz/`.
 
+mod backup;
 mod folders;
 mod lessons;
 mod mutation;

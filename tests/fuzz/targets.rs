@@ -19,7 +19,7 @@ use parfocal::trial::protocol::Protocol;
 use parfocal::trial::remark::{Holding, NewAnswer, NewComment};
 use parfocal::trial::study::definition::Definition;
 
-use super::{ROOT, folders, lessons};
+use super::{ROOT, backup, folders, lessons};
 
 /// Something that takes bytes from outside.
 pub struct Target {
@@ -32,7 +32,8 @@ pub struct Target {
 }
 
 /// All of them.
-pub static TARGETS: [Target; 17] = [
+pub static TARGETS: [Target; 18] = [
+    Target { name: "backup", take: backup::backup, more_seeds: backup::pieces },
     Target { name: "calibration", take: calibration, more_seeds: Vec::new },
     Target { name: "calibration-table", take: folders::calibration_table, more_seeds: Vec::new },
     Target { name: "certificate", take: folders::certificate, more_seeds: folders::certificates },
