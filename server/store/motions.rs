@@ -1,48 +1,12 @@
-//! What telemetry tells of each setting of a session in a few figures. Rows are read one by one: a study has millions.
+//! Reads how the lens was driven in each setting of a session.
 
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::PoisonError;
 
 use futures_util::TryStreamExt;
 
+use super::motion::{Motion, Row, Watched};
 use super::{Reader, StoreError};
-use crate::autofocus::IN_FOCUS;
 use crate::ids::SessionId;
-
-/// A change of focal power below this is none, as in evaluations.
-const LEAST_MOVE: f64 = 1e-9;
-
-/// A longer time without a frame is a gap, in nanoseconds.
-const GAP_NS: i64 = 1_000_000_000;
-
-/// How the lens was driven in a setting. Frames at which the loop held the lens for a pause or a failed device are left
-/// out; what a policy did, or failed to do, is not.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Motion {
-    /// Setting, from 1.
-    pub setting: usize,
-    /// Frames.
-    pub frames: u64,
-    /// Time between them, in seconds. Gaps of more than a second are left out: nothing was driven there.
-    pub seconds: f64,
-    /// Way of the focal power that was asked for, up and down.
-    pub travel: f64,
-    /// Its changes of direction.
-    pub turns: u64,
-    /// Frames of which a simulation knew the optimum.
-    pub known: u64,
-    /// Sum over them of the distance between the focal power at exposure and the optimum.
-    pub error: f64,
-    /// How many of them were in focus: nearer than [`IN_FOCUS`].
-    pub in_focus: u64,
-}
-
-/// A row of telemetry: run, end of the exposure, focal powers asked for and at exposure, the optimum, whether the loop
-/// was held for a pause or a failed device.
-type Row = (i64, i64, f64, Option<f64>, Option<f64>, bool);
-
-/// Figures of sessions that are over, by session.
-pub(super) type MotionsOfEnded = Arc<Mutex<BTreeMap<SessionId, Vec<Motion>>>>;
 
 impl Reader {
     /// The same as [`Reader::motions`] for a session whose telemetry is complete. It is read once and then remembered,
@@ -92,50 +56,5 @@ impl Reader {
             }
         }
         Ok(motions)
-    }
-}
-
-/// A setting's figures so far.
-#[derive(Default)]
-struct Watched {
-    motion: Motion,
-    /// Run, end of the exposure and focal power of the frame before, unless the loop was held then.
-    before: Option<(i64, i64, f64)>,
-    /// The latest change of focal power.
-    moved: f64,
-}
-
-impl Watched {
-    fn take(&mut self, &(run, exposed_ns, asked, measured, optimal, held): &Row) {
-        if held {
-            self.before = None;
-            return;
-        }
-
-        self.motion.frames += 1;
-        if let (Some(measured), Some(optimal)) = (measured, optimal) {
-            let error = (measured - optimal).abs();
-            self.motion.known += 1;
-            self.motion.error += error;
-            self.motion.in_focus += u64::from(error < IN_FOCUS);
-        }
-
-        if let Some((_, exposed_before, asked_before)) = self.before.filter(|before| before.0 == run) {
-            let passed = exposed_ns - exposed_before;
-            if passed <= GAP_NS {
-                self.motion.seconds += passed as f64 * 1e-9;
-            }
-            self.take_move(asked - asked_before);
-        }
-        self.before = Some((run, exposed_ns, asked));
-    }
-
-    fn take_move(&mut self, change: f64) {
-        if change.abs() <= LEAST_MOVE {
-            return;
-        }
-        self.motion.travel += change.abs();
-        self.motion.turns += u64::from(change * self.moved < 0.0);
-        self.moved = change;
     }
 }

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRow};
 use sqlx::{Connection as _, Row, migrate::Migrate};
 
-use super::motions::MotionsOfEnded;
+use super::motion::MotionsOfEnded;
 use super::schema::{DATABASE, MIGRATOR};
 use super::values::moment;
 use super::values::{parsed, stamp};
@@ -26,7 +26,7 @@ const ROWS_AHEAD: usize = 1024;
 #[derive(Clone, Debug)]
 pub struct Reader {
     pool: SqlitePool,
-    /// What was found in telemetry that does not change any more.
+    /// What telemetry told of sessions that are over, so that it is read once.
     pub(super) ended: MotionsOfEnded,
 }
 
