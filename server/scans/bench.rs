@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::planes::PlaneStack;
 use super::recorded::RecordedScan;
-use super::relief::StackScene;
+use super::relief::{Distance, StackScene};
 use super::simulated::Scene;
 use super::stack::source::{ScaledStack, StackSource, UnfitStack};
 use crate::camera::recorded::{HEADER, ScanError, ScanFolder};
@@ -119,5 +119,9 @@ fn recording(folder: &str, hash: &mut Sha256, doubts: &mut Vec<String>) -> Resul
 fn scene(planes: usize, pictures: PlaneStack) -> StackScene {
     let (first, last) = pictures.range();
     let reach = |factor: f64| (factor * planes.saturating_sub(1) as f64).clamp(1.0, last - first);
-    StackScene { slopes: (reach(REACH.0), reach(REACH.1)), planes: pictures, photographed: true }
+    StackScene {
+        slopes: (reach(REACH.0), reach(REACH.1)),
+        planes: pictures,
+        distance: Distance::Following { spacing: 1.0 },
+    }
 }

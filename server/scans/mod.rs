@@ -8,6 +8,7 @@ pub mod detail;
 pub mod footage;
 pub mod pictures;
 pub mod planes;
+pub mod reach;
 pub mod recorded;
 pub mod recording;
 pub mod relief;

@@ -18,7 +18,10 @@ pub struct PlaneStack {
     /// Where the focal plane lay for each picture, rising.
     positions: Vec<f32>,
     planes: Vec<Box<[u8]>>,
-    /// The sharpest position of the patches whose corners lie [`STRIDE`] pixels apart, row after row.
+    /// The mean gradient magnitude over all positions, for each of the patches whose corners lie [`STRIDE`] pixels
+    /// apart, row after row.
+    curves: Vec<f32>,
+    /// Where each of these curves peaks.
     sharpest: Vec<f32>,
 }
 
@@ -61,18 +64,14 @@ impl PlaneStack {
 
         let positions: Vec<f32> = pictures.iter().map(|picture| picture.0).collect();
         let sharpness: Vec<Vec<f32>> = pictures.iter().map(|(_, picture)| sharpness(picture)).collect();
-        let count = sharpness[0].len();
-
-        let peak_at = |place: usize| {
-            let curve: Vec<f32> = sharpness.iter().map(|plane| plane[place]).collect();
-            peak(&positions, &curve)
-        };
-        let sharpest = (0..count).map(peak_at).collect();
+        let places = 0..sharpness[0].len();
+        let curves: Vec<f32> = places.flat_map(|place| sharpness.iter().map(move |plane| plane[place])).collect();
+        let sharpest = curves.chunks_exact(positions.len()).map(|curve| peak(&positions, curve)).collect();
 
         let bytes = |picture: &GrayImage| picture.data.iter().map(|value| value.round() as u8).collect();
         let planes = pictures.iter().map(|(_, picture)| bytes(picture)).collect();
 
-        Ok(Self { width, height, positions, planes, sharpest })
+        Ok(Self { width, height, positions, planes, curves, sharpest })
     }
 
     /// Feeds `hash` with all that can be seen.
@@ -99,12 +98,38 @@ impl PlaneStack {
     /// The position at which the patch with its corner at `(x, y)` is sharpest: where its mean
     /// gradient magnitude peaks, refined by a parabola through the peak and its neighbours.
     #[must_use]
-    pub fn sharpest(&self, (x, y): (usize, usize)) -> f64 {
+    pub fn sharpest(&self, corner: (usize, usize)) -> f64 {
+        f64::from(self.sharpest[self.place(corner)])
+    }
+
+    /// The same among the positions from `low` to `high` alone. A patch that holds several depths has several peaks, and
+    /// the highest may lie outside.
+    #[must_use]
+    pub fn sharpest_within(&self, corner: (usize, usize), (low, high): (f64, f64)) -> f64 {
+        let sharpest = self.sharpest(corner);
+        if (low..=high).contains(&sharpest) {
+            return sharpest;
+        }
+
+        let count = self.positions.len();
+        let place = self.place(corner);
+        let curve = &self.curves[place * count..][..count];
+        let first = self.positions.partition_point(|&at| f64::from(at) <= low);
+        let end = self.positions.partition_point(|&at| f64::from(at) < high).max(first);
+
+        // The range from end to end; at its ends pictures are mixed, and so is their sharpness.
+        let inner = self.positions[first..end].iter().copied().zip(curve[first..end].iter().copied());
+        let ends = [low, high].map(|at| (at as f32, mixed_at(&self.positions, curve, at as f32)));
+        let (positions, curve): (Vec<f32>, Vec<f32>) = [ends[0]].into_iter().chain(inner).chain([ends[1]]).unzip();
+        f64::from(peak(&positions, &curve)).clamp(low, high)
+    }
+
+    /// The index of the patch at `corner` among those whose sharpness is known.
+    fn place(&self, (x, y): (usize, usize)) -> usize {
         let (columns, rows) = grid(self.width, self.height);
         let column = ((x + STRIDE / 2) / STRIDE).min(columns - 1);
         let row = ((y + STRIDE / 2) / STRIDE).min(rows - 1);
-
-        f64::from(self.sharpest[row * columns + column])
+        row * columns + column
     }
 
     /// The patch with its corner at `(x, y)` with the focal plane at `position`: a mix of the two
@@ -215,6 +240,14 @@ fn gradient_magnitudes(picture: &GrayImage) -> Vec<f32> {
     out
 }
 
+/// `curve` over `positions` at `position`, linear between two of them.
+fn mixed_at(positions: &[f32], curve: &[f32], position: f32) -> f32 {
+    let above = positions.partition_point(|&at| at <= position).clamp(1, positions.len() - 1);
+    let low = positions[above - 1];
+    let share = ((position - low) / (positions[above] - low)).clamp(0.0, 1.0);
+    curve[above - 1] + share * (curve[above] - curve[above - 1])
+}
+
 /// Where `curve` over `positions` peaks: at the vertex of the parabola through its greatest value and
 /// that one's neighbours.
 fn peak(positions: &[f32], curve: &[f32]) -> f32 {
@@ -262,6 +295,10 @@ mod tests {
         let stack = PlaneStack::new(&pictures).unwrap();
         assert!((stack.sharpest((8, 8)) - 2.0).abs() < 1e-3);
         assert!((stack.sharpest((90, 8)) - 5.0).abs() < 1e-3);
+        // Where the peak is out of reach, the greatest of what is left counts: an end, or another peak.
+        assert!((stack.sharpest_within((8, 8), (2.5, 5.0)) - 2.5).abs() < 1e-3);
+        assert!((stack.sharpest_within((8, 8), (-3.0, 1.5)) - 1.5).abs() < 1e-3);
+        assert!((stack.sharpest_within((90, 8), (0.0, 3.5)) - 0.0).abs() < 1e-3);
         let mixed = stack.patch((0, 0), 0.5).0;
         assert!((mixed[0] - 153.0).abs() < 1e-4 && (mixed[4] - 103.0).abs() < 1e-4);
     }

@@ -81,9 +81,22 @@ pub struct StackScene {
     pub planes: PlaneStack,
     /// Positions a unit of focal power, least and most.
     pub slopes: (f64, f64),
-    /// Whether the stack's ends are the end of what was photographed: the range then stays within
-    /// them, around the place that is sharpest. Otherwise the blur no longer grows beyond them.
-    pub photographed: bool,
+    /// What stands at the walking focal power.
+    pub distance: Distance,
+}
+
+/// How far the hand that holds the lens is from the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Distance {
+    /// It keeps its distance from the ground, at position 0: the optimum moves with the hand and with the height of
+    /// what comes into view. Beyond the stack's ends the blur no longer grows.
+    Kept,
+    /// It follows what is in view, so that the sharpest position, smoothed over the way, stands at the walking focal
+    /// power as nearly as the stack's ends allow: how photographed stacks are scanned (`stack/drift.rs`).
+    Following {
+        /// From one position to the next. In half of the scans the range moves by whole positions, as it does there.
+        spacing: f64,
+    },
 }
 
 /// The scenes `0..count` of `split`, every second one deep, the others varied; each is drawn from its number alone.
@@ -142,7 +155,7 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
 
     let least = softness.max(f64::from(relief) / style.most_share).max(taking.least_slope()).max(SLOPES.0);
     let slopes = (least, (style.slopes * least).min(SLOPES.1));
-    Ok(StackScene { planes: PlaneStack::new(&pictures)?, slopes, photographed: false })
+    Ok(StackScene { planes: PlaneStack::new(&pictures)?, slopes, distance: Distance::Kept })
 }
 
 /// How a scene's pictures are taken.

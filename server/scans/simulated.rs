@@ -9,8 +9,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::clip::{Area, Clip};
+use super::reach::{Following, Optics, Reach, corner, whole};
 use super::recorded::{Between, RecordedScan};
-use super::relief::StackScene;
+use super::relief::{Distance, StackScene};
 use crate::autofocus::BlurRate;
 use crate::imaging::{PATCH_SIDE, Patch, Square, View, WIDER};
 use crate::lens::FocalPower;
@@ -100,70 +101,6 @@ pub enum Scene {
     Recorded(Arc<RecordedScan>),
 }
 
-/// How a lens's focal power becomes a position in a focal stack.
-#[derive(Debug, Clone, Copy)]
-struct Optics {
-    /// Positions a unit of focal power; below 0 where they fall with it.
-    slope: f64,
-    /// How far from straight the response is: 0, or the change of slope over half a unit.
-    bend: f64,
-    /// Pixels that the picture moves along each axis when the position changes by one, as
-    /// magnification follows focus.
-    shift: [f64; 2],
-    /// The sharpest position, smoothed over the way, of a photographed stack; 0 for others.
-    anchor: f64,
-}
-
-/// Frames over which the anchor of a photographed stack follows what is in view.
-const ANCHOR_MEMORY: f64 = 12.0;
-
-impl Optics {
-    fn draw(scene: &StackScene, start: f64, course: &mut ChaCha8Rng) -> Self {
-        let (least, most) = scene.slopes;
-        let size = least * (most.max(least) / least).powf(course.random::<f64>());
-        let slope = if course.random_bool(0.5) { size } else { -size };
-
-        if scene.photographed {
-            return Self { slope, bend: 0.0, shift: [0.0; 2], anchor: start };
-        }
-
-        let bend = course.random_range(-0.3..0.3);
-        let shift = [(); 2].map(|()| 0.15 * standard_normal(course));
-        Self { slope, bend, shift, anchor: 0.0 }
-    }
-
-    /// The position at focal power 0 of a photographed stack whose anchor stands at `focus`, as
-    /// nearly as its ends allow.
-    fn origin(&self, focus: f64, (first, last): (f64, f64)) -> f64 {
-        let origin = self.anchor - self.slope * focus;
-        let (low, high) = if self.slope > 0.0 { (first, last - self.slope) } else { (first - self.slope, last) };
-        origin.clamp(low.min(high), high)
-    }
-
-    /// The position in `scene` at `focal_power` while `focus` is where the anchor stands.
-    fn position(&self, scene: &StackScene, focus: f64, focal_power: f64) -> f64 {
-        if scene.photographed {
-            return self.origin(focus, scene.planes.range()) + self.slope * focal_power;
-        }
-
-        let off = focal_power - focus;
-        self.slope * (off + self.bend * off * off)
-    }
-
-    /// The focal power at which `scene` is seen at `position`: the inverse of [`Optics::position`].
-    fn focal_power(&self, scene: &StackScene, focus: f64, position: f64) -> f64 {
-        if scene.photographed {
-            return (position - self.origin(focus, scene.planes.range())) / self.slope;
-        }
-
-        // The root that is 0 where place is, written so that a small bend is never divided by:
-        // off + bend off^2 = place.
-        let place = position / self.slope;
-        let root = (1.0 + 4.0 * self.bend * place).max(0.0).sqrt();
-        focus + 2.0 * place / (1.0 + root)
-    }
-}
-
 /// One focal-time scan, frame by frame. Its course depends on its seed alone, never on what is looked at.
 #[derive(Debug, Clone)]
 pub struct Scan {
@@ -177,7 +114,9 @@ pub struct Scan {
     contrast: f64,
     time: usize,
     focus: Walk,
+    /// Where the crop is; over followed stacks some frames ahead.
     crop: [Walk; 2],
+    following: Option<Following>,
     /// Where the veil lies on the clip, if there is one.
     veil: Option<[Walk; 2]>,
     /// The sensor's pattern, a gray level a pixel; empty if there is none.
@@ -211,7 +150,7 @@ impl Scan {
         let focus = Walk::new((0.0, 1.0), settings.focus, &mut course);
 
         let room = scene.room();
-        let crop = room.map(|room| Walk::new(room, settings.crop, &mut course));
+        let mut crop = room.map(|room| Walk::new(room, settings.crop, &mut course));
 
         let time = match &scene {
             Scene::Flat(clip) if clip.len() > 1 => course.random_range(0..2 * clip.len()),
@@ -242,7 +181,13 @@ impl Scan {
 
         let optics = match &scene {
             Scene::Flat(_) | Scene::Recorded(_) => None,
-            Scene::Stack(stack) => Some(Optics::draw(stack, stack.planes.sharpest(whole(corner(&crop))), &mut course)),
+            Scene::Stack(stack) => Some(Optics::draw(stack, &mut course)),
+        };
+        let following = match &scene {
+            Scene::Stack(stack) if stack.distance != Distance::Kept => {
+                Some(Following::new(stack, &mut crop, &mut course))
+            }
+            _ => None,
         };
         let defocus = Defocus::default();
 
@@ -256,6 +201,7 @@ impl Scan {
             time,
             focus,
             crop,
+            following,
             veil,
             pattern,
             wider_pattern,
@@ -273,14 +219,14 @@ impl Scan {
     /// The optimal focal power at this frame.
     #[must_use]
     pub fn optimum(&self) -> FocalPower {
-        let focus = self.focus.position();
         match (&self.scene, &self.optics) {
             (Scene::Stack(stack), Some(optics)) => {
-                let sharpest = stack.planes.sharpest(whole(corner(&self.crop)));
-                FocalPower::nearest(optics.focal_power(stack, focus, sharpest))
+                let reach = self.reach(stack, optics);
+                let sharpest = stack.planes.sharpest_within(whole(self.corner()), optics.ends(reach));
+                FocalPower::nearest(optics.focal_power(reach, sharpest))
             }
             (Scene::Recorded(scan), _) => scan.optimum(scan.pose_at(self.time)),
-            _ => FocalPower::nearest(focus),
+            _ => FocalPower::nearest(self.focus.position()),
         }
     }
 
@@ -289,7 +235,9 @@ impl Scan {
     pub fn blur(&self) -> Option<BlurRate> {
         match (&self.scene, &self.optics) {
             (Scene::Flat(_), _) => BlurRate::new(self.sigma0),
-            (Scene::Stack(stack), Some(optics)) if !stack.photographed => BlurRate::new(optics.slope.abs()),
+            (Scene::Stack(stack), Some(optics)) if stack.distance == Distance::Kept => {
+                BlurRate::new(optics.slope.abs())
+            }
             _ => None,
         }
     }
@@ -378,12 +326,21 @@ impl Scan {
 
     /// Where in a focal stack the patch lies, and the position of the focal plane.
     fn place_in_stack(&self, stack: &StackScene, focal_power: FocalPower) -> ((usize, usize), f64) {
-        let (x, y) = corner(&self.crop);
+        let (x, y) = self.corner();
         let Some(optics) = &self.optics else { return (whole((x, y)), 0.0) };
 
-        let position = optics.position(stack, self.focus.position(), focal_power.get());
-        let [along, down] = optics.shift.map(|shift| shift * (position - optics.anchor));
+        let position = optics.position(self.reach(stack, optics), focal_power.get());
+        let [along, down] = optics.shift.map(|shift| shift * position);
         (whole((x + along, y + down)), position)
+    }
+
+    fn reach(&self, stack: &StackScene, optics: &Optics) -> Reach {
+        optics.reach(stack, self.focus.position(), self.following.as_ref().map_or(0.0, Following::anchor))
+    }
+
+    /// Where the patch's corner lies.
+    fn corner(&self) -> (f64, f64) {
+        self.following.as_ref().map_or_else(|| corner(&self.crop), Following::corner)
     }
 
     /// The wider patches of a sharp picture, blurred, with the veil over it if there is one. They
@@ -465,11 +422,8 @@ impl Scan {
         self.tremor = self.settings.tremor * standard_normal(&mut self.course);
         self.contrast = (self.settings.flicker * standard_normal(&mut self.course)).exp();
 
-        if let (Scene::Stack(stack), Some(optics)) = (&self.scene, &mut self.optics)
-            && stack.photographed
-        {
-            let sharpest = stack.planes.sharpest(whole(corner(&self.crop)));
-            optics.anchor += (sharpest - optics.anchor) / ANCHOR_MEMORY;
+        if let (Scene::Stack(stack), Some(following)) = (&self.scene, &mut self.following) {
+            following.advance(stack, corner(&self.crop));
         }
     }
 }
@@ -491,15 +445,6 @@ impl Scene {
         };
         [(left, right), (top, bottom)].map(|(low, high)| (low as f64, (high - PATCH_SIDE) as f64))
     }
-}
-
-/// The pixel that holds a place; those before the first become it.
-fn whole((x, y): (f64, f64)) -> (usize, usize) {
-    (x.max(0.0) as usize, y.max(0.0) as usize)
-}
-
-fn corner(walks: &[Walk; 2]) -> (f64, f64) {
-    (walks[0].position(), walks[1].position())
 }
 
 /// Scales what differs from the patch's mean by `contrast`, and all by `gain`.
@@ -642,22 +587,29 @@ mod tests {
         assert!(whole.windows(8).any(|part| part == shown), "{shown:?}");
     }
 
+    /// Where the sharpest depth of a patch is out of reach, the optimum is the sharpest that the lens reaches. Mixed
+    /// pictures have less noise than photographed ones, so the two differ by up to half of the distance between those.
     #[test]
-    fn focal_power_inverts_position() {
-        let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 1).unwrap().remove(0);
-        let stack = StackScene::clone(&stack);
-        let photographed = StackScene { photographed: true, slopes: (8.0, 8.0), ..stack.clone() };
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
+    fn over_a_followed_stack_the_optimum_is_the_sharpest_that_the_lens_reaches() {
+        let stack = crate::scans::relief::scenes(crate::scans::pictures::Split::Training, 2).unwrap().remove(1);
+        let spacing = 0.5;
+        let followed = StackScene { distance: Distance::Following { spacing }, slopes: (5.0, 5.0), ..(*stack).clone() };
+        let followed = Scene::Stack(Arc::new(followed));
+        let powers = crate::scans::recorded::evenly_spread(41);
+        let mut near = 0;
+        let mut frames = 0;
 
-        for scene in [stack, photographed] {
-            for _ in 0..20 {
-                let optics = Optics::draw(&scene, 0.3, &mut rng);
-                for (focus, focal_power) in [(0.2, 0.7), (0.5, 0.5), (0.9, 0.1)] {
-                    let position = optics.position(&scene, focus, focal_power);
-                    assert!((optics.focal_power(&scene, focus, position) - focal_power).abs() < 1e-9);
-                }
+        for seed in 0..20 {
+            let mut scan = Scan::over(followed.clone(), ScanSettings::reference(), seed);
+            for _ in 0..10 {
+                let curve = powers.iter().map(|&power| (power, crate::autofocus::mgm(&scan.observe(power))));
+                let (sharpest, _) = curve.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+                frames += 1;
+                near += usize::from(sharpest.distance(scan.optimum()) < 0.15);
+                (0..10).for_each(|_| scan.advance());
             }
         }
+        assert!(near * 10 > frames * 9, "{near} of {frames}");
     }
 
     #[test]
