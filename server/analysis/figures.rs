@@ -14,7 +14,7 @@ const ALL: &str = "#000000";
 pub fn figure(compared: &Comparison) -> Option<String> {
     let means = || compared.surgeons.iter().flat_map(|line| line.means.iter().flatten().copied());
     let positions = compared.position.means.iter().copied();
-    let axis = Scale::over(means().chain(positions))?;
+    let axis = Scale::over(means().chain(positions))?.within(compared.outcome.lowest, compared.outcome.highest);
     let label = format!("{} ({})", compared.outcome.label, compared.outcome.unit);
     let up = axis.axis(&label);
 
@@ -55,6 +55,10 @@ struct Scale {
     from: i64,
     /// Its upper end, in steps.
     to: i64,
+    /// The lowest possible value: the scale does not go below it.
+    lowest: Option<f64>,
+    /// The highest possible value: the scale does not go above it.
+    highest: Option<f64>,
 }
 
 impl Scale {
@@ -75,16 +79,32 @@ impl Scale {
 
         let from = (low / step).floor() as i64;
         let to = ((high / step).ceil() as i64).max(from + 1);
-        Some(Self { step, from, to })
+        Some(Self { step, from, to, lowest: None, highest: None })
+    }
+
+    /// The same without what no value can reach.
+    const fn within(self, lowest: Option<f64>, highest: Option<f64>) -> Self {
+        Self { lowest, highest, ..self }
+    }
+
+    fn from(&self) -> f64 {
+        let from = self.at(self.from);
+        self.lowest.map_or(from, |lowest| from.max(lowest))
+    }
+
+    fn to(&self) -> f64 {
+        let to = self.at(self.to);
+        self.highest.map_or(to, |highest| to.min(highest))
     }
 
     fn axis<'a>(&self, label: &'a str) -> Axis<'a> {
-        Axis { label, from: self.at(self.from), to: self.at(self.to) }
+        Axis { label, from: self.from(), to: self.to() }
     }
 
     /// The levels between its ends.
     fn levels(self) -> impl Iterator<Item = f64> {
-        (self.from + 1..self.to).map(move |level| self.at(level))
+        let levels = (self.from + 1..self.to).map(move |level| self.at(level));
+        levels.filter(move |level| (self.from()..self.to()).contains(level) && *level > self.from())
     }
 
     /// A level as it is written: without what binary fractions add to it.
@@ -98,10 +118,13 @@ impl Scale {
 mod tests {
     use super::*;
 
-    fn ends(values: &[f64]) -> (f64, f64, Vec<f64>) {
-        let scale = Scale::over(values.iter().copied()).unwrap();
+    fn told(scale: Scale) -> (f64, f64, Vec<f64>) {
         let axis = scale.axis("");
         (axis.from, axis.to, scale.levels().collect())
+    }
+
+    fn ends(values: &[f64]) -> (f64, f64, Vec<f64>) {
+        told(Scale::over(values.iter().copied()).unwrap())
     }
 
     #[test]
@@ -111,5 +134,13 @@ mod tests {
         assert_eq!(ends(&[4.0, 4.0]), (4.0, 5.0, vec![]));
         assert_eq!(ends(&[0.0]), (0.0, 0.5, vec![]));
         assert!(Scale::over(std::iter::empty()).is_none());
+    }
+
+    #[test]
+    fn a_scale_shows_nothing_that_no_value_can_be() {
+        let rated = Scale::over([1.5, 7.0].into_iter()).unwrap();
+        assert_eq!(told(rated), (0.0, 8.0, vec![2.0, 4.0, 6.0]));
+        assert_eq!(told(rated.within(Some(1.0), Some(7.0))), (1.0, 7.0, vec![2.0, 4.0, 6.0]));
+        assert_eq!(told(rated.within(Some(0.0), None)), (0.0, 8.0, vec![2.0, 4.0, 6.0]));
     }
 }

@@ -64,7 +64,7 @@ pub async fn gather(
     let stored = reader.session(session.session).await?;
     let stored = stored.ok_or_else(|| StoreError::Damaged(format!("session {} is not there", session.session)))?;
     let corrections = Latest::of(&reader.corrections(session.session).await?);
-    let surgeon = corrections.participant(session.session).unwrap_or(&session.participant).to_owned();
+    let surgeon = session.surgeon().to_owned();
     match session.status {
         SessionStatus::Completed => {}
         SessionStatus::Aborted => return Ok((line(Some(surgeon), false, Some("aborted".to_owned())), None)),

@@ -19,7 +19,7 @@ pub const FOCAL_ERROR: &str = "focal-error";
 pub const IN_FOCUS: &str = "in-focus";
 
 /// Something that each setting has a number of.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Outcome {
     /// Its name: question and measure, or what of the focal power.
     pub outcome: String,
@@ -29,6 +29,10 @@ pub struct Outcome {
     pub unit: String,
     /// Which end is better, where that is known: `higher` or `lower`.
     pub better: Option<&'static str>,
+    /// Its lowest possible value, where there is one.
+    pub lowest: Option<f64>,
+    /// Its highest possible value, where there is one.
+    pub highest: Option<f64>,
 }
 
 /// The value of an outcome in one setting of a session that counts.
@@ -53,7 +57,9 @@ pub struct Observation {
 #[must_use]
 pub fn asked(protocol: &Protocol) -> Vec<Outcome> {
     let after_setting = protocol.after_segment.iter().flat_map(of_question);
-    let rankings = protocol.closing.iter().filter(|question| is_ranking(question)).map(of_ranking);
+    let settings = protocol.policies.len() * protocol.repeats;
+    let rankings = protocol.closing.iter().filter(|question| is_ranking(question));
+    let rankings = rankings.map(|question| of_ranking(question, settings));
     after_setting.chain(rankings).collect()
 }
 
@@ -66,17 +72,20 @@ pub fn asked_of_session(protocol: &Protocol) -> Vec<Outcome> {
 /// The outcomes that telemetry gives.
 #[must_use]
 pub fn driven() -> Vec<Outcome> {
-    let outcome = |outcome: &str, label: &str, unit: &str, better| Outcome {
+    let outcome = |outcome: &str, label: &str, unit: &str, better, highest| Outcome {
         outcome: outcome.to_owned(),
         label: label.to_owned(),
         unit: unit.to_owned(),
         better,
+        lowest: Some(0.0),
+        highest,
     };
+    let error = "True focal error, as the simulation knows it";
     vec![
-        outcome(FOCAL_ERROR, "True focal error, as the simulation knows it", "focal power, 0 to 1", Some("lower")),
-        outcome(IN_FOCUS, "Frames in focus: true focal error below 0.1", "share, 0 to 1", Some("higher")),
-        outcome(TURNS, "Turns: changes of direction of the focal power", "a second", None),
-        outcome(TRAVEL, "Travel of the focal power, up and down", "focal power a second", None),
+        outcome(FOCAL_ERROR, error, "focal power, 0 to 1", Some("lower"), Some(1.0)),
+        outcome(IN_FOCUS, "Frames in focus: true focal error below 0.1", "share, 0 to 1", Some("higher"), Some(1.0)),
+        outcome(TURNS, "Turns: changes of direction of the focal power", "a second", None, None),
+        outcome(TRAVEL, "Travel of the focal power, up and down", "focal power a second", None, None),
     ]
 }
 
@@ -120,12 +129,14 @@ pub fn rank_name(question: &Question) -> String {
     format!("{}/rank", question.id)
 }
 
-fn of_ranking(question: &Question) -> Outcome {
+fn of_ranking(question: &Question, settings: usize) -> Outcome {
     Outcome {
         outcome: rank_name(question),
-        label: format!("{} (rank)", question.text),
-        unit: "rank, 1 for the best".to_owned(),
+        label: question.text.clone(),
+        unit: format!("rank, 1 for the best to {settings}"),
         better: Some("lower"),
+        lowest: Some(1.0),
+        highest: Some(settings as f64),
     }
 }
 
@@ -153,16 +164,23 @@ const fn is_order(kind: &QuestionKind) -> bool {
 }
 
 fn outcome(question: &Question, measure: &Measure) -> Outcome {
-    let (unit, better) = match &question.kind {
-        QuestionKind::Likert { points, low, high, .. } => (scale("points, 1", *points, low, high), None),
-        QuestionKind::VisualAnalogue { low, high } => (scale("hundredths of the line, 0", 100, low, high), None),
-        QuestionKind::Sus => ("score, 0 to 100".to_owned(), Some("higher")),
-        QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. } => ("score, 0 to 100".to_owned(), Some("lower")),
-        QuestionKind::Recognition => ("1 no, 2 not sure, 3 yes".to_owned(), None),
-        QuestionKind::Ranking { .. } | QuestionKind::Text => (String::new(), None),
+    let (unit, better, ends) = match &question.kind {
+        QuestionKind::Likert { points, low, high, .. } => {
+            (scale("points, 1", *points, low, high), None, Some((1.0, f64::from(*points))))
+        }
+        QuestionKind::VisualAnalogue { low, high } => {
+            (scale("hundredths of the line, 0", 100, low, high), None, Some((0.0, 100.0)))
+        }
+        QuestionKind::Sus => ("0 to 100".to_owned(), Some("higher"), Some((0.0, 100.0))),
+        QuestionKind::NasaTlx { .. } | QuestionKind::SurgTlx { .. } => {
+            ("0 to 100".to_owned(), Some("lower"), Some((0.0, 100.0)))
+        }
+        QuestionKind::Recognition => ("1 no, 2 not sure, 3 yes".to_owned(), None, Some((1.0, 3.0))),
+        QuestionKind::Ranking { .. } | QuestionKind::Text => (String::new(), None, None),
     };
     let label = if measure.score { format!("{}: {}", question.text, measure.label) } else { question.text.clone() };
-    Outcome { outcome: name(question, measure), label, unit, better }
+    let (lowest, highest) = ends.unzip();
+    Outcome { outcome: name(question, measure), label, unit, better, lowest, highest }
 }
 
 fn scale(from: &str, to: u8, low: &str, high: &str) -> String {

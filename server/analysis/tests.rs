@@ -110,7 +110,9 @@ fn observations(study: &Study) -> Vec<Observation> {
 
 fn rating() -> Outcome {
     let outcome = "sharp/point".to_owned();
-    Outcome { outcome, label: "How sharp?".to_owned(), unit: "points, 1 to 7".to_owned(), better: None }
+    let label = "How sharp?".to_owned();
+    let unit = "points, 1 to 7".to_owned();
+    Outcome { outcome, label, unit, better: None, lowest: Some(1.0), highest: Some(7.0) }
 }
 
 fn assert_near(found: f64, expected: f64, what: &str) {

@@ -260,10 +260,11 @@ fn whole(detail: &StudyDetail) -> String {
         );
     }
     for session in &detail.study_sessions {
+        let participant = session.corrected_participant.as_ref().unwrap_or(&session.participant);
         let _ = writeln!(
             text,
-            "session {} {} {} {} place {}",
-            session.session, session.participant, session.site, session.protocol, session.place
+            "session {} {participant} {} {} place {}",
+            session.session, session.site, session.protocol, session.place
         );
     }
     for event in &detail.log {

@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 
     let (what, checks) = if is_package(path) {
-        ("package", check(path))
+        ("package", check(path, arguments.head.as_ref()))
     } else if is_export(path) {
         ("export", verify(path, arguments.head.as_ref()))
     } else {

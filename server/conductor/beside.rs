@@ -11,7 +11,7 @@ use crate::store::{Answer, Stamp, StoredConsent, StoredCorrection, StoredErasure
 use crate::trial::consent::Consent;
 use crate::trial::correction::{Field, Subject};
 use crate::trial::erasure::Erasable;
-use crate::trial::event::EventKind;
+use crate::trial::event::{Event, EventKind};
 use crate::trial::instruments::in_words;
 use crate::trial::question::Question;
 use crate::trial::role::Role;
@@ -61,8 +61,12 @@ pub struct WithdrawalLine {
     pub at: Timestamp,
     /// Who recorded it.
     pub by: Role,
+    /// The personal account of whoever recorded it, where somebody was signed in.
+    pub account: Option<String>,
     /// Why.
     pub reason: String,
+    /// Comments, answers in words and notes that still stand in the database: nobody has erased them.
+    pub words_left: usize,
 }
 
 impl Conductor {
@@ -160,6 +164,23 @@ impl Conductor {
         };
         Ok(corrections.into_iter().map(line).collect())
     }
+
+    /// That the participant withdrew, if so.
+    pub(super) async fn withdrawal(&self, course: &Course) -> Result<Option<WithdrawalLine>, ConductError> {
+        let of_withdrawal = |event: &Event| match &event.kind {
+            EventKind::Withdrawn { reason } => Some((event.clone(), reason.clone())),
+            _ => None,
+        };
+        let Some((event, reason)) = course.events.iter().find_map(of_withdrawal) else { return Ok(None) };
+
+        Ok(Some(WithdrawalLine {
+            at: event.wall,
+            by: event.by,
+            account: event.account.map(|account| account.to_string()),
+            reason,
+            words_left: self.shared.words_left(course.session()).await?.len(),
+        }))
+    }
 }
 
 fn question_of<'a>(course: &'a Course, answer: &Answer) -> Option<&'a Question> {
@@ -175,14 +196,4 @@ fn about(subject: Subject, setting: Option<usize>, question: Option<&Question>) 
         (Subject::Answer, Some(question)) => format!("Answer{on}: {}", question.text),
         (Subject::Answer, None) => format!("Answer{on}"),
     }
-}
-
-/// That the participant withdrew, if so.
-pub(super) fn withdrawal(course: &Course) -> Option<WithdrawalLine> {
-    course.events.iter().find_map(|event| match &event.kind {
-        EventKind::Withdrawn { reason } => {
-            Some(WithdrawalLine { at: event.wall, by: event.by, reason: reason.clone() })
-        }
-        _ => None,
-    })
 }

@@ -6,6 +6,7 @@ use crate::ids::{IdempotencyKey, SessionId};
 use crate::store::{Answer, Correction, Latest, standings};
 use crate::trial::account::Actor;
 use crate::trial::correction::{self, Corrected, Field, FieldChange, NewCorrection, Subject};
+use crate::trial::permission;
 use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
 
@@ -22,7 +23,7 @@ impl Conductor {
     /// Corrects something of session `session`. When this returns, the correction is on disk; the original stays.
     ///
     /// # Errors
-    /// When `by` is not the researcher, the session is under way, the correction makes no sense or was made meanwhile,
+    /// When `by` is not the researcher, the session is under way or withdrawn, the correction makes no sense or was made meanwhile,
     /// or the disk failed.
     pub async fn correct(
         &self,
@@ -40,6 +41,10 @@ impl Shared {
         let _pen = self.pen.lock().await;
         let course = self.load(session).await?;
         let reason = correction::check(by.role, course.state.ended(), &new.reason)?;
+        // Whose session it was is put right all the same: it says who has withdrawn.
+        if !matches!(new.change, FieldChange::Participant { .. }) {
+            permission::check_reading(course.state.withdrawn())?;
+        }
 
         let latest = Latest::of(&self.store.reader().corrections(session).await?);
         let Decided { subject, record, field, old, new } = match new.change {

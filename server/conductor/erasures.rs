@@ -1,7 +1,9 @@
 //! Erasure of words, with everything that the database has about them.
 
+use std::collections::BTreeSet;
+
 use super::corrections::no_such_record;
-use super::{ConductError, Conductor, Shared};
+use super::{ConductError, Conductor, Pen, Shared};
 use crate::ids::SessionId;
 use crate::store::{Answer, Comment, Erasure, StoredCorrection};
 use crate::trial::account::Actor;
@@ -10,6 +12,7 @@ use crate::trial::erasure::{self, Erasable, NewErasure};
 use crate::trial::event::EventKind;
 use crate::trial::question::AnswerValue;
 use crate::trial::refusal::Refusal;
+use crate::trial::remark::Said;
 use crate::trial::study::event::StudyEventKind;
 
 impl Conductor {
@@ -22,19 +25,81 @@ impl Conductor {
         let by = by.into();
         self.to_the_end(move |shared| async move { shared.erase(by, session, new).await }).await
     }
+
+    /// Erases all words of session `session`, whose participant withdrew: comments with their sound, answers in words,
+    /// and notes. When this returns, they are nowhere in the database's files.
+    ///
+    /// # Errors
+    /// When `by` is not the researcher, the participant has not withdrawn, a session is under way, nothing is left to
+    /// erase, or the disk failed.
+    pub async fn erase_all_words(
+        &self,
+        by: impl Into<Actor>,
+        session: SessionId,
+        reason: String,
+    ) -> Result<(), ConductError> {
+        let by = by.into();
+        self.to_the_end(move |shared| async move { shared.erase_all_words(by, session, &reason).await }).await
+    }
 }
 
 impl Shared {
-    async fn erase(&self, by: Actor, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
+    async fn erase_all_words(&self, by: Actor, session: SessionId, reason: &str) -> Result<(), ConductError> {
         let mut pen = self.pen.lock().await;
-        self.record_stops(&mut pen).await?;
-        let under_way = self.live().shown_phase().is_some_and(|phase| !phase.has_ended());
-        let reason = erasure::check(by.role, under_way, &new.reason)?;
+        let reason = self.check_erasing(&mut pen, &by, session, reason).await?;
+        if !self.store.reader().is_withdrawn(session).await? {
+            let refusal = "only of a withdrawn session all words are erased at once; erase others one by one";
+            return Err(Refusal::conflict(refusal).into());
+        }
 
+        let records = self.words_left(session).await?;
+        if records.is_empty() {
+            return Err(Refusal::conflict("no words of this session are left to erase").into());
+        }
+        self.erase_records(by, session, records, &reason).await
+    }
+
+    /// The records of `session` with words that nobody has erased: comments, answers in words, notes.
+    pub(super) async fn words_left(&self, session: SessionId) -> Result<Vec<(Erasable, String)>, ConductError> {
         let reader = self.store.reader();
-        if reader.session(session).await?.is_none() {
+        let comments = reader.comments(session).await?.into_iter();
+        let comments = comments.filter(|(_, comment)| comment.said != Said::Mark);
+        let comments = comments.map(|(_, comment)| (Erasable::Comment, comment.key.to_string()));
+        let answers = reader.answers(session).await?.into_iter();
+        let answers = answers.filter(|(_, answer)| matches!(answer.value, AnswerValue::Text(_)));
+        let answers = answers.map(|(_, answer)| (Erasable::Answer, answer.key.to_string()));
+        let notes = reader.corrections(session).await?.into_iter();
+        let notes = notes.filter(|stored| stored.correction.field == Field::Note);
+        let notes = notes.map(|stored| (Erasable::Correction, stored.number.to_string()));
+
+        let erased = reader.erasures(session).await?;
+        let erased: BTreeSet<(Erasable, String)> =
+            erased.into_iter().map(|stored| (stored.erasure.subject, stored.erasure.record)).collect();
+        let left = comments.chain(answers).chain(notes).filter(|record| !erased.contains(record));
+        Ok(left.collect())
+    }
+
+    /// Whether words of `session` may be erased now; the reason comes back without blanks around it.
+    async fn check_erasing(
+        &self,
+        pen: &mut Pen,
+        by: &Actor,
+        session: SessionId,
+        reason: &str,
+    ) -> Result<String, ConductError> {
+        self.record_stops(pen).await?;
+        let under_way = self.live().shown_phase().is_some_and(|phase| !phase.has_ended());
+        let reason = erasure::check(by.role, under_way, reason)?;
+
+        if self.store.reader().session(session).await?.is_none() {
             return Err(ConductError::no_session());
         }
+        Ok(reason)
+    }
+
+    async fn erase(&self, by: Actor, session: SessionId, new: NewErasure) -> Result<(), ConductError> {
+        let mut pen = self.pen.lock().await;
+        let reason = self.check_erasing(&mut pen, &by, session, &new.reason).await?;
         let records = match new.subject {
             Erasable::Event => self.with_its_copy(session, &new.record).await?,
             Erasable::StudyEvent => {
@@ -45,13 +110,23 @@ impl Shared {
                 self.with_its_notes(session, new.subject, new.record).await?
             }
         };
+        self.erase_records(by, session, records, &reason).await
+    }
 
+    async fn erase_records(
+        &self,
+        by: Actor,
+        session: SessionId,
+        records: Vec<(Erasable, String)>,
+        reason: &str,
+    ) -> Result<(), ConductError> {
         let stamp = self.stamp();
         let Actor { role: by, account } = by;
-        let erasure = |(subject, record)| Erasure { session, subject, record, reason: reason.clone(), by, stamp };
+        let erasure = |(subject, record)| Erasure { session, subject, record, reason: reason.to_owned(), by, stamp };
         let erasures: Vec<Erasure> = records.into_iter().map(erasure).collect();
         self.store.erase(&erasures, account.as_ref()).await?;
 
+        let reader = self.store.reader();
         let comments = reader.comments(session).await?;
         let events = reader.events(session).await?;
         let mut live = self.live();

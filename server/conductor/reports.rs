@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine, withdrawal};
+use super::beside::{ConsentLine, CorrectionLine, WithdrawalLine};
 use super::course::Course;
 use super::timeline::erased;
 use super::{ConductError, Conductor, ProtocolSummary};
@@ -14,7 +14,7 @@ use crate::autofocus::PolicyName;
 use crate::ids::{IdempotencyKey, SegmentId, SessionId};
 use crate::store::{DeviceEvent, Latest, Participant, Reader, Recorder, SessionLine, standings};
 use crate::trial::account::Actor;
-use crate::trial::correction::Subject;
+use crate::trial::correction::{Field, Subject};
 use crate::trial::erasure::Erasable;
 use crate::trial::event::EventKind;
 use crate::trial::grace::Outstanding;
@@ -39,9 +39,9 @@ pub struct SessionDetail {
     pub commitment: String,
     /// Its settings, in order.
     pub settings_detail: Vec<SettingDetail>,
-    /// Answers that count, in the order they were given.
+    /// Answers that count, in the order they were given; none once the participant has withdrawn.
     pub answers: Vec<AnswerLine>,
-    /// What was put right, oldest first.
+    /// What was put right, oldest first; once the participant has withdrawn, only whose session it was.
     pub corrections: Vec<CorrectionLine>,
     /// What the participant consented to, oldest first; the latest counts.
     pub consents: Vec<ConsentLine>,
@@ -139,6 +139,15 @@ impl Conductor {
         Recorder::of_server(&self.shared.store, by.into(), Arc::clone(&self.shared.clock))
     }
 
+    /// Whether what was said, answered and recorded in `session` may be read.
+    ///
+    /// # Errors
+    /// When its participant withdrew, or the database failed.
+    pub async fn check_reading(&self, session: SessionId) -> Result<(), ConductError> {
+        let withdrawn = self.shared.store.reader().is_withdrawn(session).await?;
+        Ok(permission::check_reading(withdrawn)?)
+    }
+
     /// The participants, by code.
     ///
     /// # Errors
@@ -177,6 +186,15 @@ impl Conductor {
     /// When there is none, or the database failed.
     pub async fn session_detail(&self, session: SessionId) -> Result<SessionDetail, ConductError> {
         let course = self.shared.load(session).await?;
+        let withdrawal = self.withdrawal(&course).await?;
+        let mut answers = self.answer_lines(&course).await?;
+        let mut corrections = self.correction_lines(&course).await?;
+        if withdrawal.is_some() {
+            answers.clear();
+            // Whose session it was stays right: the withdrawal is that participant's.
+            corrections.retain(|correction| correction.field == Field::Participant);
+        }
+
         let lines = self.sessions(true).await?;
         let line = lines.into_iter().find(|line| line.session == session);
         let line = line.ok_or_else(|| ConductError::NotFound("there is no such session".to_owned()))?;
@@ -186,10 +204,10 @@ impl Conductor {
             algorithm: course.made.algorithm.name(),
             commitment: course.made.commitment.clone(),
             settings_detail: settings(&course),
-            answers: self.answer_lines(&course).await?,
-            corrections: self.correction_lines(&course).await?,
+            answers,
+            corrections,
             consents: self.consent_lines(session).await?,
-            withdrawal: withdrawal(&course),
+            withdrawal,
             counts_until: course.grace.until(),
             outstanding: self.shared.outstanding(course.session(), course.grace).await?,
             log: self.log(&course).await?,

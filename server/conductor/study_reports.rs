@@ -95,6 +95,8 @@ pub struct StudySession {
     pub session: SessionId,
     /// Participant's code.
     pub participant: String,
+    /// The right code, where it was corrected.
+    pub corrected_participant: Option<String>,
     /// Its site.
     pub site: String,
     /// Its protocol.
@@ -233,6 +235,7 @@ fn sessions(study: &StoredStudy) -> Vec<StudySession> {
     let session = |enrolled: &Enrolled| StudySession {
         session: enrolled.session,
         participant: enrolled.participant.clone(),
+        corrected_participant: enrolled.corrected_participant.clone(),
         site: enrolled.site.clone(),
         protocol: enrolled.protocol.clone(),
         place: enrolled.place,
@@ -246,7 +249,7 @@ fn sessions(study: &StoredStudy) -> Vec<StudySession> {
 fn log(study: &StoredStudy) -> Vec<StudyLogLine> {
     let participant = |session: SessionId| {
         let enrolled = study.sessions.iter().find(|enrolled| enrolled.session == session);
-        enrolled.map_or_else(|| "an unknown session".to_owned(), |enrolled| enrolled.participant.clone())
+        enrolled.map_or_else(|| "an unknown session".to_owned(), |enrolled| enrolled.surgeon().to_owned())
     };
     let line = |event: &StudyEvent| StudyLogLine {
         at: event.wall,

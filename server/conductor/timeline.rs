@@ -146,9 +146,10 @@ impl Conductor {
     /// Session `session` over time as `by` may see it, its focal path thinned to about `points` a setting.
     ///
     /// # Errors
-    /// When there is none, or the database failed.
+    /// When there is none, its participant withdrew, or the database failed.
     pub async fn timeline(&self, by: Role, session: SessionId, points: u32) -> Result<Timeline, ConductError> {
         let course = self.shared.load(session).await?;
+        permission::check_reading(course.state.withdrawn())?;
         let with_metric = permission::may_see_metric(by, course.state.unblinded());
         let reader = self.shared.store.reader();
         let runs = &self.shared.run_clock.clocks;
@@ -233,9 +234,10 @@ impl Conductor {
     /// What playing the recordings of `session` needs to know of it.
     ///
     /// # Errors
-    /// When `by` may not play them (yet), there is no such session, or the database failed.
+    /// When `by` may not play them (yet), there is no such session, its participant withdrew, or the database failed.
     pub async fn to_play(&self, by: Role, session: SessionId) -> Result<Played, ConductError> {
         let course = self.shared.load(session).await?;
+        permission::check_reading(course.state.withdrawn())?;
         permission::check_playing(by, course.state.unblinded())?;
 
         let clocks = Arc::clone(&self.shared.run_clock.clocks);

@@ -33,12 +33,13 @@ impl Conductor {
     /// The sound of a voice comment of `session`, with what it is.
     ///
     /// # Errors
-    /// When there is none, it was erased, or the database failed.
+    /// When there is none, it was erased, the participant withdrew, or the database failed.
     pub async fn voice_audio(
         &self,
         session: SessionId,
         comment: IdempotencyKey,
     ) -> Result<(MediaType, Vec<u8>), ConductError> {
+        self.check_reading(session).await?;
         let found = self.shared.store.reader().voice_audio(session, comment).await?;
         let none = || ConductError::NotFound("this session has no such recording, or it was erased".to_owned());
         found.ok_or_else(none)

@@ -6,6 +6,7 @@ use axum::body::Body;
 use axum::extract::{Path, State};
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{Html, IntoResponse};
+use jiff::Timestamp;
 use tokio::runtime::Handle;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -14,7 +15,8 @@ use super::error::{Error, ErrorBody};
 use super::people::Acting;
 use super::roles::Researcher;
 use crate::analysis::{
-    Analysis, AnalysisError, ProtocolAnalysis, SettingWords, SurgeonWords, analyse, check, decimals,
+    Analysis, AnalysisError, Comparison, ProtocolAnalysis, SettingWords, SurgeonWords, analyse, check, decimals,
+    p_words,
 };
 use crate::conductor::ConductError;
 use crate::store::Access;
@@ -47,9 +49,22 @@ async fn looked_at(app: &AppState, by: &Researcher, study: &str) -> Result<Analy
 #[template(path = "analysis.html")]
 struct AnalysisPage {
     analysis: Analysis,
+    /// When this page was made.
+    made: Timestamp,
+    /// The head of the chain, and with it of every record that the analysis read.
+    chain: String,
+    /// The version that made it.
+    version: &'static str,
+    /// The line that committed to all orders.
+    commitment: Option<String>,
 }
 
 impl AnalysisPage {
+    /// When this page was made, in the words of the room.
+    fn made(&self) -> String {
+        super::researcher::day_and_time(&self.made)
+    }
+
     /// When the study was unblinded, in the words of the room.
     fn unblinded(&self) -> String {
         super::researcher::day_and_time(&self.analysis.unblinded)
@@ -64,6 +79,22 @@ fn said_of<'a>(surgeon: &'a SurgeonWords, policy: Option<&str>) -> Vec<&'a Setti
 /// A number in a table.
 fn number(value: Option<&f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| decimals(*value, 3))
+}
+
+/// p of all policies in a table: Friedman's over permutations; of two policies Wilcoxon's.
+fn p_of_all(compared: &Comparison) -> String {
+    let friedman = compared.difference.friedman.as_ref().map(|friedman| friedman.p_permutation);
+    let only_pair = match compared.pairs.as_slice() {
+        [pair] => Some(pair.p),
+        _ => None,
+    };
+    friedman.or(only_pair).map_or_else(|| "–".to_owned(), |p| p_words(p).replace("p = ", "").replace("p < ", "< "))
+}
+
+/// Kendall's W in a table.
+fn w_of(compared: &Comparison) -> String {
+    let w = compared.difference.friedman.as_ref().map(|friedman| friedman.kendalls_w);
+    w.map_or_else(|| "–".to_owned(), |w| decimals(w, 2))
 }
 
 /// The sessions of a protocol that do not count or of which something is to be known.
@@ -83,7 +114,11 @@ async fn analysis_page(
     Path(study): Path<String>,
 ) -> Result<Html<String>, Error> {
     let analysis = looked_at(&app, &by, &study).await?;
-    AnalysisPage { analysis }.render().map(Html).map_err(|_| Error::Internal)
+    let made = app.clock.wall();
+    let chain = super::researcher::chain_words(&app).await;
+    let commitment = app.conductor.studies().detail(&study).await?.commitment_line;
+    let version = env!("CARGO_PKG_VERSION");
+    AnalysisPage { analysis, made, chain, version, commitment }.render().map(Html).map_err(|_| Error::Internal)
 }
 
 /// The analysis of a study. Each look at it is recorded.

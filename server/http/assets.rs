@@ -51,6 +51,7 @@ static ASSETS: &[Asset] = &assets![
     "researcher/analysis.css",
     "researcher/correction_words.js",
     "researcher/corrections.js",
+    "researcher/deeds.js",
     "researcher/metric_drawing.js",
     "researcher/page.css",
     "researcher/pictures.js",

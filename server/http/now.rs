@@ -28,7 +28,9 @@ pub(super) struct Session {
 /// On the page of a session.
 pub(super) const fn on_session(session: Session) -> &'static str {
     match session {
-        Session { withdrawn: true, .. } => "Nothing to do. The participant withdrew, so this session is not exported.",
+        Session { withdrawn: true, .. } => {
+            "The participant withdrew: the session’s data are kept out of sight. Erase its words if that was asked for."
+        }
         Session { status: SessionStatus::UnderWay, .. } => {
             "Wait until the session has ended. Then correct and export it."
         }
@@ -83,7 +85,7 @@ mod tests {
 
         let under_way = Session { status: SessionStatus::UnderWay, ..ended };
         assert!(on_session(under_way).starts_with("Wait"));
-        assert!(on_session(Session { withdrawn: true, ..under_way }).starts_with("Nothing to do"));
+        assert!(on_session(Session { withdrawn: true, ..under_way }).starts_with("The participant withdrew"));
         assert!(
             !on_session(Session { in_study: true, ..ended }).contains("Unblind when"),
             "only its study is unblinded"

@@ -22,8 +22,8 @@ use crate::trial::erasure::NewErasure;
     request_body = NewCorrection, responses(
     (status = 204, description = "Recorded"),
     (status = 404, description = "No such session or record", body = ErrorBody),
-    (status = 409, description = "The session is under way, what a surgeon wrote cannot be corrected, or somebody \
-                                  has corrected the same meanwhile", body = ErrorBody),
+    (status = 409, description = "The session is under way, its participant withdrew, what a surgeon wrote cannot be \
+                                  corrected, or somebody has corrected the same meanwhile", body = ErrorBody),
     (status = 422, description = "It makes no sense, or no reason was given", body = ErrorBody)))]
 async fn correct(
     by: Researcher,
@@ -55,6 +55,35 @@ async fn erase(
     Ok(StatusCode::NO_CONTENT)
 }
 
+/// Why all words of a session are erased.
+#[derive(Debug, Deserialize, ToSchema)]
+struct EraseAll {
+    /// Kept with each erasure. It must not repeat the words.
+    #[schema(pattern = r"\S")]
+    reason: String,
+}
+
+/// Erases all words of a withdrawn session for good: comments with their sound, answers in words, and notes. Once this
+/// has answered, they are nowhere in the database; their records and hashes stay.
+#[utoipa::path(post, path = "/api/researcher/sessions/{session}/erasures/all", tag = "researcher",
+    params(("session" = SessionId, Path)),
+    request_body = EraseAll, responses(
+    (status = 204, description = "Erased"),
+    (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "The participant has not withdrawn, a session is under way, or no words are left",
+     body = ErrorBody),
+    (status = 422, description = "No reason was given", body = ErrorBody)))]
+async fn erase_all(
+    by: Researcher,
+    State(app): State<AppState>,
+    Path(id): Path<SessionId>,
+    JsonBody(EraseAll { reason }): JsonBody<EraseAll>,
+) -> Result<StatusCode, Error> {
+    let by = by.for_session(&app, id).await?;
+    app.conductor.erase_all_words(by, id, reason).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
 /// Why a participant withdrew.
 #[derive(Debug, Deserialize, ToSchema)]
 struct Withdraw {
@@ -63,7 +92,7 @@ struct Withdraw {
     reason: String,
 }
 
-/// Records that the participant withdrew: from now on the session's data stay out of exports.
+/// Records that the participant withdrew: from now on the session's data are not shown, analysed or exported.
 #[utoipa::path(post, path = "/api/researcher/sessions/{session}/withdraw", tag = "researcher",
     params(("session" = SessionId, Path)),
     request_body = Withdraw, responses(
@@ -84,5 +113,9 @@ async fn withdraw(
 
 /// The routes of this file.
 pub fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(correct)).routes(routes!(erase)).routes(routes!(withdraw))
+    OpenApiRouter::new()
+        .routes(routes!(correct))
+        .routes(routes!(erase))
+        .routes(routes!(erase_all))
+        .routes(routes!(withdraw))
 }

@@ -249,7 +249,8 @@ async fn session(
 /// One session over time without its focal path.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/course", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
-    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
+    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "Its participant withdrew", body = ErrorBody)))]
 async fn course(
     by: Researcher,
     State(app): State<AppState>,
@@ -263,7 +264,8 @@ async fn course(
 /// One session over time with its focal path, which may tell policies apart: each look at it is recorded.
 #[utoipa::path(get, path = "/api/researcher/sessions/{session}/timeline", tag = "researcher",
     params(("session" = SessionId, Path)), responses(
-    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody)))]
+    (status = 200, body = Timeline), (status = 404, description = "No such session", body = ErrorBody),
+    (status = 409, description = "Its participant withdrew", body = ErrorBody)))]
 async fn timeline(
     by: Researcher,
     State(app): State<AppState>,

@@ -15,6 +15,7 @@ use super::error::{Error, ErrorBody};
 use super::json::JsonBody;
 use super::people::Acting;
 use super::roles::{ResearchReader, Researcher};
+use crate::conductor::ConductError;
 use crate::store::export::ZipStream;
 use crate::study_export::{StudyExportError, StudyExportState, check};
 
@@ -60,7 +61,8 @@ async fn start_study_export(
     Ok(Json(app.study_exports.start(app.conductor.recorder(by.actor()), &study, wanted.unblinded)))
 }
 
-/// How the latest export of a study stands. A finished one is kept for an hour.
+/// How the latest export of a study stands. A finished one is kept for an hour, unless a surgeon withdraws or words are
+/// erased.
 #[utoipa::path(get, path = "/api/researcher/studies/{study}/export", tag = "researcher",
     params(("study" = String, Path)), responses((status = 200, body = StudyExportState)))]
 async fn study_export(
@@ -69,7 +71,8 @@ async fn study_export(
     Path(study): Path<String>,
 ) -> Result<Json<StudyExportState>, Error> {
     by.personally()?;
-    Ok(Json(app.study_exports.state(&study)))
+    let state = app.study_exports.state(app.conductor.reader(), &study).await;
+    Ok(Json(state.map_err(ConductError::from)?))
 }
 
 /// The finished export of a study as one ZIP file: the same as `parfocal export --study` writes.
@@ -84,7 +87,8 @@ async fn study_export_zip(
 ) -> Result<impl IntoResponse, Error> {
     by.personally()?;
     let missing = || Error::NotFound("No export of this study is ready. Start one on the study's page.".to_owned());
-    let made = app.study_exports.made(&study).ok_or_else(missing)?;
+    let made = app.study_exports.made(app.conductor.reader(), &study).await.map_err(ConductError::from)?;
+    let made = made.ok_or_else(missing)?;
 
     let name = format!("parfocal-{study}{}", if made.unblinded { "-unblinded" } else { "" });
     let (zip, bytes) = ZipStream::new(name.clone());

@@ -69,6 +69,7 @@ async fn keep_piece(
         (Vec<u8> = "audio/webm;codecs=opus"), (Vec<u8> = "audio/mp4"), (Vec<u8> = "audio/ogg;codecs=opus"))),
     (status = 206, description = "A part of it"),
     (status = 404, description = "No such session or recording, or it was erased", body = ErrorBody),
+    (status = 409, description = "The participant withdrew", body = ErrorBody),
     (status = 416, description = "It has no such part")))]
 async fn recording(
     by: Researcher,

@@ -6,8 +6,9 @@ use std::path::Path;
 use super::error::PackageError;
 use super::source::{SESSIONS, Source, exports_of, left_out};
 use super::writing::{Sessions, sums, write};
+use crate::store::Head;
 use crate::store::export::verify::{Check, Verdict};
-use crate::store::export::{SUMS, read_json};
+use crate::store::export::{SUMS, read_cells, read_json};
 
 /// Whether `path` is meant to be a package.
 #[must_use]
@@ -15,9 +16,10 @@ pub fn is_package(path: &Path) -> bool {
     path.join(SESSIONS).is_dir()
 }
 
-/// Checks the package in `folder`: every check, in order.
+/// Checks the package in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether the
+/// history up to it is still the same at the site where it was noted.
 #[must_use]
-pub fn check(folder: &Path) -> Vec<Check> {
+pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     let verdict = |outcome: Result<Verdict, String>| outcome.unwrap_or_else(Verdict::Failed);
     let checksums = Check { name: "checksums", verdict: verdict(checksums(folder)) };
     let (sources, sessions) = match sources(folder) {
@@ -29,11 +31,32 @@ pub fn check(folder: &Path) -> Vec<Check> {
     };
     let sessions = Check { name: "sessions", verdict: sessions };
 
-    let tables = match sessions.verdict {
-        Verdict::Failed(_) => Verdict::NotChecked("the exports do not verify".to_owned()),
-        _ => verdict(tables(folder, &sources)),
-    };
-    vec![checksums, sessions, Check { name: "tables", verdict: tables }]
+    let unverified = || Verdict::NotChecked("the exports do not verify".to_owned());
+    let verified = !matches!(sessions.verdict, Verdict::Failed(_));
+    let tables = if verified { verdict(tables(folder, &sources)) } else { unverified() };
+    let head = expected.map(|expected| if verified { verdict(head(&sources, expected)) } else { unverified() });
+
+    let head = head.map(|verdict| Check { name: "head", verdict });
+    [checksums, sessions].into_iter().chain(head).chain([Check { name: "tables", verdict: tables }]).collect()
+}
+
+/// Looks for the row of the chain that `expected` stands for. Sites have chains of their own, and each export has its
+/// site's up to itself.
+fn head(sources: &[Source], expected: &Head) -> Result<Verdict, String> {
+    for source in sources {
+        let column = |name| read_cells(&source.folder, "chain.csv", name).map_err(|error| error.to_string());
+        let hashes = column("hash")?;
+        let numbers = column("number")?;
+        let row = numbers.iter().position(|number| number.parse() == Ok(expected.number));
+        if row.is_some_and(|row| expected.is(expected.number, &hashes[row])) {
+            let same = format!("the history of site '{}' up to {expected} is the same", source.site);
+            return Ok(Verdict::Passed(same));
+        }
+    }
+    Err(format!(
+        "no export in it has the row {expected}: it was noted after the last export or elsewhere, or the history \
+         before it was changed"
+    ))
 }
 
 /// The exports of a package, verified.

@@ -49,7 +49,7 @@ struct Shared {
     /// The folder of the recordings.
     folder: PathBuf,
     projector: Projector,
-    /// Sessions that the researcher may have played. Unblinding is never undone, so nobody need ask again.
+    /// Unblinded sessions that the researcher may have played. Unblinding is never undone, so nobody need ask again.
     playable: Mutex<BTreeSet<SessionId>>,
 }
 
@@ -105,7 +105,10 @@ impl Player {
 
     async fn check(&self, by: Role, session: SessionId) -> Result<(), PlaybackError> {
         let known = by == Role::Researcher && self.playable().contains(&session);
-        if !known {
+        if known {
+            // A withdrawal may have come since, even while the recording is playing.
+            self.0.conductor.check_reading(session).await?;
+        } else {
             self.0.conductor.to_play(by, session).await?;
             self.playable().insert(session);
         }

@@ -12,13 +12,16 @@ use utoipa::ToSchema;
 
 use super::error::StudyExportError;
 use super::making::{Progress, export_study};
-use crate::store::Recorder;
+use crate::store::{Reader, Recorder, StoreError};
 
 /// The folder within the data folder in which exports are made.
 const FOLDER: &str = "study-exports";
 
 /// How long a finished export is kept.
 const KEPT: Duration = Duration::from_hours(1);
+
+/// Why a finished export is given up.
+const OUTDATED: &str = "since it was begun, a surgeon has withdrawn or words were erased; export again";
 
 /// The exports of studies, each study's latest.
 #[derive(Clone)]
@@ -50,6 +53,8 @@ pub struct Made {
     pub folder: PathBuf,
     /// Sessions in it.
     sessions: usize,
+    /// How often something had been taken back in the study before it was begun.
+    taken_back: i64,
     /// Around the package.
     _room: Arc<TempDir>,
 }
@@ -98,18 +103,38 @@ impl StudyExports {
     }
 
     /// How the latest export of `study` stands.
-    #[must_use]
-    pub fn state(&self, study: &str) -> StudyExportState {
-        self.lock().get(study).map_or(StudyExportState::None, Latest::state)
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn state(&self, reader: &Reader, study: &str) -> Result<StudyExportState, StoreError> {
+        self.give_up_outdated(reader, study).await?;
+        Ok(self.lock().get(study).map_or(StudyExportState::None, Latest::state))
     }
 
     /// The latest export of `study`, if it is finished.
-    #[must_use]
-    pub fn made(&self, study: &str) -> Option<Made> {
-        match &self.lock().get(study)?.stage {
-            Stage::Ready(made) => Some(made.clone()),
-            Stage::Running(_) | Stage::Failed(_) => None,
+    ///
+    /// # Errors
+    /// When the database failed.
+    pub async fn made(&self, reader: &Reader, study: &str) -> Result<Option<Made>, StoreError> {
+        self.give_up_outdated(reader, study).await?;
+        Ok(self.lock().get(study).and_then(Latest::made))
+    }
+
+    /// Gives up the finished export of `study` if a surgeon has withdrawn since it was begun, or words were erased: it
+    /// still holds them.
+    async fn give_up_outdated(&self, reader: &Reader, study: &str) -> Result<(), StoreError> {
+        let taken_back = reader.taken_back(study).await?;
+        let mut exports = self.lock();
+        let Some(latest) = exports.get_mut(study) else { return Ok(()) };
+        if latest.made().is_none_or(|made| made.taken_back == taken_back) {
+            return Ok(());
         }
+
+        let given_up = Latest { stage: Stage::Failed(OUTDATED.to_owned()), ..*latest };
+        let before = std::mem::replace(latest, given_up);
+        drop(exports);
+        forget(Some(before));
+        Ok(())
     }
 
     /// Begins to export `study` as `recorder` records it, unless that is already under way. How it then stands.
@@ -147,6 +172,14 @@ impl StudyExports {
 }
 
 impl Latest {
+    /// The export, if it is finished.
+    fn made(&self) -> Option<Made> {
+        match &self.stage {
+            Stage::Ready(made) => Some(made.clone()),
+            Stage::Running(_) | Stage::Failed(_) => None,
+        }
+    }
+
     fn state(&self) -> StudyExportState {
         let unblinded = self.unblinded;
         match &self.stage {
@@ -188,6 +221,7 @@ impl Job {
         std::fs::create_dir_all(folder).map_err(unwritable)?;
         let room = tempfile::Builder::new().prefix("export-").tempdir_in(folder).map_err(unwritable)?;
         let package = room.path().join(&self.study);
+        let taken_back = recorder.reader().taken_back(&self.study).await?;
 
         let exports = self.exports.clone();
         let study = self.study.clone();
@@ -199,7 +233,8 @@ impl Job {
         let summary = export_study(recorder, &self.study, self.unblinded, &package, Arc::new(told)).await?;
 
         let room = Arc::new(room);
-        Ok(Made { unblinded: self.unblinded, folder: package, sessions: summary.sessions, _room: room })
+        let sessions = summary.sessions;
+        Ok(Made { unblinded: self.unblinded, folder: package, sessions, taken_back, _room: room })
     }
 
     fn stands_at(&self, stage: Stage) {

@@ -103,6 +103,21 @@ pub fn check_playing(role: Role, unblinded: bool) -> Result<(), Refusal> {
     }
 }
 
+/// Whether what was said, answered and recorded in a session may be read: not once its participant has withdrawn. That
+/// the session took place, and what was done to it, stays readable in its audit trail.
+///
+/// # Errors
+/// When the participant withdrew.
+pub fn check_reading(withdrawn: bool) -> Result<(), Refusal> {
+    if withdrawn {
+        return Err(Refusal::conflict(
+            "the participant withdrew, so what was said, answered and recorded in this session is shown no more; its \
+             audit trail stays",
+        ));
+    }
+    Ok(())
+}
+
 /// A hold that lasts this long is not a slow start, but a fault that the operator must know of.
 const LASTING: Duration = Duration::from_secs(3);
 
@@ -204,6 +219,12 @@ mod tests {
         }
         let blinded = check_playing(Role::Researcher, false);
         assert!(matches!(blinded, Err(Refusal::Conflict(text)) if text.contains("once its session is unblinded")));
+    }
+
+    #[test]
+    fn nobody_reads_what_was_said_in_a_withdrawn_session() {
+        assert_eq!(check_reading(false), Ok(()));
+        assert!(matches!(check_reading(true), Err(Refusal::Conflict(text)) if text.contains("withdrew")));
     }
 
     #[test]

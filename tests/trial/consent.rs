@@ -7,6 +7,7 @@ use parfocal::store::export::{ExportError, export};
 use parfocal::store::verify_database;
 use parfocal::trial::action::Action;
 use parfocal::trial::consent::{Consent, NewConsent};
+use parfocal::trial::correction::{FieldChange, NewCorrection};
 use parfocal::trial::phase::Phase;
 use parfocal::trial::role::Role;
 
@@ -109,6 +110,55 @@ async fn a_withdrawn_session_is_in_no_export_but_its_place_is_told_and_the_chain
     let checks = verify_database(folder.path(), None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
     assert_eq!(failed(&verify(&before, None)), [""; 0], "an export made before still verifies");
+}
+
+#[tokio::test]
+async fn what_was_said_in_a_withdrawn_session_is_shown_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let (trial, session) = with_session(folder.path()).await;
+    trial.unblind(session).await;
+    trial.conductor.add_participant(Role::Researcher, "S-02").await.unwrap();
+    let before = trial.conductor.session_detail(session).await.unwrap();
+    let answer = before.answers.iter().find(|answer| answer.question == "sharpness").unwrap();
+    let note = |text: &str| FieldChange::Note { record: answer.key, old: String::new(), new: text.to_owned() };
+    let correct = async |change: FieldChange| {
+        let correction = NewCorrection { change, reason: "for the analysis".to_owned() };
+        trial.conductor.correct(Role::Researcher, session, correction).await
+    };
+    correct(note("a sharp word")).await.unwrap();
+    let participant = FieldChange::Participant { old: PARTICIPANT.to_owned(), new: "S-02".to_owned() };
+    correct(participant).await.unwrap();
+
+    trial.conductor.act(Role::Researcher, session, withdraw()).await.unwrap();
+    let after = trial.conductor.session_detail(session).await.unwrap();
+    assert_eq!(after.answers, []);
+    let told: Vec<&str> = after.corrections.iter().map(|correction| correction.about.as_str()).collect();
+    assert_eq!(told, ["Participant"], "whose session it was, and no note");
+    let withdrawal = after.withdrawal.as_ref().unwrap();
+    assert_eq!(
+        (withdrawal.by, withdrawal.words_left),
+        (Role::Researcher, 6 + 7 + 1),
+        "comments, answers in words, a note"
+    );
+
+    // Nothing that the surgeon said is in it, while everything that was done to the session is.
+    let [before_json, json] = [&before, &after].map(|detail| serde_json::to_string(detail).unwrap());
+    assert!(before_json.contains("fine 👍"));
+    for text in ["a sharp word", "sharpness", "fine 👍"] {
+        assert!(!json.contains(text), "{text} in {json}");
+    }
+    assert_eq!(after.log.len(), before.log.len() + 3, "a note, a correction, the withdrawal");
+
+    let refused = trial.conductor.timeline(Role::Researcher, session, 10).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the participant withdrew")), "{refused}");
+    let refused = trial.conductor.to_play(Role::Researcher, session).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the participant withdrew")), "{refused}");
+    let refused = correct(note("another")).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("the participant withdrew")), "{refused}");
+
+    // A withdrawal is a participant's: whose it is can be put right.
+    let back = FieldChange::Participant { old: "S-02".to_owned(), new: PARTICIPANT.to_owned() };
+    correct(back).await.unwrap();
 }
 
 #[tokio::test]

@@ -123,6 +123,46 @@ async fn erased_words_are_nowhere_in_the_files_nor_in_a_new_backup_and_the_chain
     assert_eq!(holding(&data, "Mustermann"), NOWHERE);
 }
 
+#[tokio::test]
+async fn all_words_of_a_withdrawn_session_are_erased_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let mut trial = Trial::start(&data).await;
+    let (session, comment) = session(&mut trial).await;
+    let note = FieldChange::Note { record: comment.key, old: String::new(), new: words("note on") };
+    let note = NewCorrection { change: note, reason: "reason of Frau Mustermann".to_owned() };
+    trial.conductor.correct(Role::Researcher, session, note).await.unwrap();
+    trial.conductor.erase(Role::Researcher, session, erasure(Erasable::Comment, comment.key)).await.unwrap();
+
+    let all = async |by: Role| trial.conductor.erase_all_words(by, session, "the participant asks".to_owned()).await;
+    let refused = all(Role::Researcher).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("only of a withdrawn")), "{refused}");
+    let withdraw = Action::Withdraw { reason: "wants no part in it".to_owned() };
+    trial.conductor.act(Role::Researcher, session, withdraw).await.unwrap();
+    assert!(matches!(all(Role::Operator).await, Err(ConductError::Forbidden(_))));
+
+    let left = async || trial.conductor.session_detail(session).await.unwrap().withdrawal.unwrap().words_left;
+    assert_eq!(left().await, 60 + 1, "what was erased before is not counted again");
+    all(Role::Researcher).await.unwrap();
+    assert_eq!(left().await, 0);
+    assert_eq!(holding(&data, "Mustermann"), NOWHERE);
+    assert_eq!(holding(&data, "filler"), NOWHERE);
+    let refused = all(Role::Researcher).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("no words")), "{refused}");
+
+    let checks = verify_database(&data, None).await.unwrap();
+    assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 61, "the records stay");
+
+    // What a tablet still held is kept, and can be erased as well.
+    let late = NewComment { key: trial.key(), ..comment };
+    trial.conductor.comment(late).await.unwrap();
+    let detail = trial.conductor.session_detail(session).await.unwrap();
+    assert_eq!(detail.withdrawal.unwrap().words_left, 1);
+    trial.conductor.erase_all_words(Role::Researcher, session, "as before".to_owned()).await.unwrap();
+    assert_eq!(holding(&data, "Mustermann"), NOWHERE);
+}
+
 /// Reasons that name a patient: of an abort, and of an unblinding, which the study's audit trail repeats.
 #[tokio::test]
 async fn an_erased_reason_is_nowhere_and_the_event_stays() {

@@ -115,6 +115,11 @@ async fn pieces_are_kept_once_in_whatever_order_they_come_and_after_the_end_and_
     assert_eq!((told.missing, told.ended, told.seconds), (0, Some(Ending::Released), 4.0));
     let checks = verify_database(folder.path(), None).await.unwrap();
     assert_eq!(failed(&checks), [""; 0], "{checks:?}");
+
+    let withdraw = Action::Withdraw { reason: "wants no part in it".to_owned() };
+    trial.conductor.act(Role::Researcher, session, withdraw).await.unwrap();
+    let refused = trial.conductor.voice_audio(session, comment).await.unwrap_err();
+    assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("withdrew")), "{refused}");
 }
 
 #[tokio::test]

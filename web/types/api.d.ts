@@ -387,6 +387,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/researcher/sessions/{session}/erasures/all": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Erases all words of a withdrawn session for good: comments with their sound, answers in words, and notes. Once this
+         *     has answered, they are nowhere in the database; their records and hashes stay.
+         */
+        post: operations["researcher_erase_all"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/researcher/sessions/{session}/export.zip": {
         parameters: {
             query?: never;
@@ -501,7 +521,7 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Records that the participant withdrew: from now on the session's data stay out of exports. */
+        /** Records that the participant withdrew: from now on the session's data are not shown, analysed or exported. */
         post: operations["researcher_withdraw"];
         delete?: never;
         options?: never;
@@ -602,7 +622,10 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** How the latest export of a study stands. A finished one is kept for an hour. */
+        /**
+         * How the latest export of a study stands. A finished one is kept for an hour, unless a surgeon withdraws or words are
+         *     erased.
+         */
         get: operations["researcher_study_export"];
         put?: never;
         /**
@@ -1513,6 +1536,11 @@ export interface components {
          * @enum {string}
          */
         Erasable: "answer" | "comment" | "correction" | "event" | "study-event";
+        /** @description Why all words of a session are erased. */
+        EraseAll: {
+            /** @description Kept with each erasure. It must not repeat the words. */
+            reason: string;
+        };
         /** @description A failure as programs get it. */
         ErrorBody: {
             /** @description What happened and what to do. */
@@ -1836,8 +1864,18 @@ export interface components {
         Outcome: {
             /** @description Which end is better, where that is known: `higher` or `lower`. */
             better?: string | null;
+            /**
+             * Format: double
+             * @description Its highest possible value, where there is one.
+             */
+            highest?: number | null;
             /** @description What it is, for reading. */
             label: string;
+            /**
+             * Format: double
+             * @description Its lowest possible value, where there is one.
+             */
+            lowest?: number | null;
             /** @description Its name: question and measure, or what of the focal power. */
             outcome: string;
             /** @description Its unit or scale. */
@@ -2176,13 +2214,13 @@ export interface components {
         SessionDetail: components["schemas"]["SessionLine"] & {
             /** @description Algorithm that drew the order. */
             algorithm: string;
-            /** @description Answers that count, in the order they were given. */
+            /** @description Answers that count, in the order they were given; none once the participant has withdrawn. */
             answers: components["schemas"]["AnswerLine"][];
             /** @description SHA-256 that commits to the order since the session was made. */
             commitment: string;
             /** @description What the participant consented to, oldest first; the latest counts. */
             consents: components["schemas"]["ConsentLine"][];
-            /** @description What was put right, oldest first. */
+            /** @description What was put right, oldest first; once the participant has withdrawn, only whose session it was. */
             corrections: components["schemas"]["CorrectionLine"][];
             /** @description Until when, by the server's clock, what arrives counts; none while the session is under way. */
             counts_until?: string | null;
@@ -2492,6 +2530,8 @@ export interface components {
         };
         /** @description A session of a study. */
         StudySession: {
+            /** @description The right code, where it was corrected. */
+            corrected_participant?: string | null;
             /** @description Participant's code. */
             participant: string;
             /** @description Its place in the list of both, from 1. */
@@ -2744,12 +2784,16 @@ export interface components {
         };
         /** @description A withdrawal for reading. */
         WithdrawalLine: {
+            /** @description The personal account of whoever recorded it, where somebody was signed in. */
+            account?: string | null;
             /** @description When, by the server's wall clock. */
             at: string;
             /** @description Who recorded it. */
             by: components["schemas"]["Role"];
             /** @description Why. */
             reason: string;
+            /** @description Comments, answers in words and notes that still stand in the database: nobody has erased them. */
+            words_left: number;
         };
         /** @description Something that was said. */
         Words: {
@@ -5229,7 +5273,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description The session is under way, what a surgeon wrote cannot be corrected, or somebody has corrected the same meanwhile */
+            /** @description The session is under way, its participant withdrew, what a surgeon wrote cannot be corrected, or somebody has corrected the same meanwhile */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -5365,6 +5409,15 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description Its participant withdrew */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description The server listens on a loopback address and was asked for by another name */
@@ -5550,6 +5603,147 @@ export interface operations {
             };
         };
     };
+    researcher_erase_all: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["schemas"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["EraseAll"];
+            };
+        };
+        responses: {
+            /** @description Erased */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The role is not held, or another site made the request */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No such session */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description It took too long */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The participant has not withdrawn, a session is under way, or no words are left */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The body is too long */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The body is not said to be application/json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The server listens on a loopback address and was asked for by another name */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description No reason was given */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The server failed; its log says more */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description Too many pages are open at once */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+            /** @description The disk or the database failed; nothing was changed */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                    "text/html": unknown;
+                };
+            };
+        };
+    };
     researcher_zip: {
         parameters: {
             query?: {
@@ -5612,7 +5806,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has not been unblinded */
+            /** @description It has not been unblinded, or its participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -5721,7 +5915,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has not been unblinded */
+            /** @description It has not been unblinded, or its participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -5838,7 +6032,7 @@ export interface operations {
                     "text/html": unknown;
                 };
             };
-            /** @description It has not been unblinded */
+            /** @description It has not been unblinded, or its participant withdrew */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -5944,6 +6138,15 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description Its participant withdrew */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description The server listens on a loopback address and was asked for by another name */
@@ -6206,6 +6409,15 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
                     "text/html": unknown;
+                };
+            };
+            /** @description The participant withdrew */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description It has no such part */

@@ -100,7 +100,9 @@ impl Reader {
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'completed') AS completed,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'aborted') AS aborted,
                  EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'unblinded') AS unblinded,
-                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'withdrawn') AS withdrawn
+                 EXISTS (SELECT 1 FROM events AS e WHERE e.session = m.session AND kind = 'withdrawn') AS withdrawn,
+                 (SELECT new_value FROM corrections AS c WHERE c.session = m.session AND field = 'participant'
+                     ORDER BY number DESC LIMIT 1) AS corrected_participant
              FROM study_sessions AS m JOIN sessions AS s USING (session) WHERE m.study = ? ORDER BY s.rowid",
         )
         .bind(study)
@@ -179,6 +181,7 @@ fn enrolled(row: &SqliteRow) -> Result<Enrolled, StoreError> {
     Ok(Enrolled {
         session: parsed(row, "session")?,
         participant: row.try_get("participant")?,
+        corrected_participant: row.try_get("corrected_participant")?,
         site: row.try_get("site")?,
         protocol: row.try_get("protocol")?,
         place: place(row)?,

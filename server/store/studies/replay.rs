@@ -23,12 +23,13 @@ enum Moment {
 }
 
 /// What happened to a session.
-#[derive(Clone, Copy)]
 enum Change {
     Completed,
     Aborted,
     Unblinded,
     Withdrawn,
+    /// It was another participant's.
+    Corrected(String),
 }
 
 /// Replays the course of `study`: nothing where every session took the place that its rules gave it, or what is wrong.
@@ -41,17 +42,17 @@ fn replay(study: &StoredStudy, moments: &[Moment]) -> Result<(), String> {
     let mut open = false;
     let mut sessions: Vec<Enrolled> = Vec::new();
     for moment in moments {
-        match *moment {
+        match moment {
             Moment::Opened => open = true,
             Moment::Closed => open = false,
             Moment::Made(session) => {
                 if !open {
                     return Err(format!("session {session} was made while the study was not open"));
                 }
-                sessions.push(made(study, &sessions, session)?);
+                sessions.push(made(study, &sessions, *session)?);
             }
             Moment::Changed(session, change) => {
-                let changed = sessions.iter_mut().find(|enrolled| enrolled.session == session);
+                let changed = sessions.iter_mut().find(|enrolled| enrolled.session == *session);
                 let enrolled =
                     changed.ok_or_else(|| format!("session {session} has events from before it was made"))?;
                 apply(enrolled, change);
@@ -84,31 +85,43 @@ fn made(study: &StoredStudy, earlier: &[Enrolled], session: SessionId) -> Result
         Err(refusal) => return Err(format!("session {session} should have been refused: {refusal}")),
     }
 
-    Ok(Enrolled { status: SessionStatus::UnderWay, unblinded: false, withdrawn: false, ..stored.clone() })
+    Ok(Enrolled {
+        corrected_participant: None,
+        status: SessionStatus::UnderWay,
+        unblinded: false,
+        withdrawn: false,
+        ..stored.clone()
+    })
 }
 
-const fn apply(enrolled: &mut Enrolled, change: Change) {
+fn apply(enrolled: &mut Enrolled, change: &Change) {
     match change {
         Change::Completed => enrolled.status = SessionStatus::Completed,
         Change::Aborted => enrolled.status = SessionStatus::Aborted,
         Change::Unblinded => enrolled.unblinded = true,
         Change::Withdrawn => enrolled.withdrawn = true,
+        Change::Corrected(participant) => enrolled.corrected_participant = Some(participant.clone()),
     }
 }
 
 /// What happened to study `study` and its sessions, in the order of the chain.
 async fn moments(snapshot: &Reader, study: &str) -> Result<Vec<Moment>, StoreError> {
     let rows = sqlx::query(
-        "SELECT c.number AS moment, e.kind AS kind, NULL AS session FROM study_events AS e
+        "SELECT c.number AS moment, e.kind AS kind, NULL AS session, NULL AS participant FROM study_events AS e
              JOIN chain AS c ON c.kind = 'study-event' AND c.key = e.study || '/' || e.number
              WHERE e.study = ?1 AND e.kind IN ('opened', 'closed')
          UNION ALL
-         SELECT c.number, 'made', m.session FROM study_sessions AS m
+         SELECT c.number, 'made', m.session, NULL FROM study_sessions AS m
              JOIN chain AS c ON c.kind = 'study-session' AND c.key = m.session WHERE m.study = ?1
          UNION ALL
-         SELECT c.number, e.kind, e.session FROM study_sessions AS m JOIN events AS e USING (session)
+         SELECT c.number, e.kind, e.session, NULL FROM study_sessions AS m JOIN events AS e USING (session)
              JOIN chain AS c ON c.kind = 'event' AND c.key = e.session || '/' || e.number
              WHERE m.study = ?1 AND e.kind IN ('completed', 'aborted', 'unblinded', 'withdrawn')
+         UNION ALL
+         SELECT c.number, 'corrected', k.session, k.new_value
+             FROM study_sessions AS m JOIN corrections AS k USING (session)
+             JOIN chain AS c ON c.kind = 'correction' AND c.key = CAST(k.number AS TEXT)
+             WHERE m.study = ?1 AND k.field = 'participant'
          ORDER BY moment",
     )
     .bind(study)
@@ -124,6 +137,7 @@ async fn moments(snapshot: &Reader, study: &str) -> Result<Vec<Moment>, StoreErr
             "completed" => Change::Completed,
             "aborted" => Change::Aborted,
             "unblinded" => Change::Unblinded,
+            "corrected" => Change::Corrected(Row::try_get(row, "participant")?),
             _ => Change::Withdrawn,
         };
         Ok(Moment::Changed(parsed(row, "session")?, change))

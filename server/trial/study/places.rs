@@ -12,8 +12,10 @@ use crate::trial::phase::SessionStatus;
 pub struct Enrolled {
     /// The session.
     pub session: SessionId,
-    /// Its participant's code.
+    /// Its participant's code, as it was recorded.
     pub participant: String,
+    /// The right code, where it was corrected.
+    pub corrected_participant: Option<String>,
     /// Its site.
     pub site: String,
     /// Its protocol.
@@ -29,6 +31,12 @@ pub struct Enrolled {
 }
 
 impl Enrolled {
+    /// Whose session it was: the code as it was corrected.
+    #[must_use]
+    pub fn surgeon(&self) -> &str {
+        self.corrected_participant.as_ref().unwrap_or(&self.participant)
+    }
+
     /// What becomes of its place; none where the session stands.
     const fn replacement(&self, rules: PlaceRules) -> Option<Replacement> {
         let rule = match (self.withdrawn, self.status) {
@@ -62,7 +70,7 @@ pub fn next_place(
     participant: &str,
 ) -> Result<usize, StudyRefusal> {
     let rules = definition.rules;
-    if sessions.iter().any(|session| session.participant == participant && session.withdrawn) {
+    if sessions.iter().any(|session| session.surgeon() == participant && session.withdrawn) {
         return Err(StudyRefusal::Withdrew { participant: participant.to_owned() });
     }
 
@@ -71,7 +79,7 @@ pub fn next_place(
     // A surgeon who works at two sites is one surgeon.
     let repeats = sessions
         .iter()
-        .any(|session| session.participant == participant && session.protocol == protocol && session.stands(rules));
+        .any(|session| session.surgeon() == participant && session.protocol == protocol && session.stands(rules));
     if repeats && rules.repeated == Repetition::Refuse {
         return Err(StudyRefusal::Repeated { participant: participant.to_owned() });
     }
@@ -117,6 +125,6 @@ fn spares_opened(list: &[&Enrolled], rules: PlaceRules) -> usize {
 
     let mut standing = BTreeSet::new();
     let standing_sessions = list.iter().filter(|session| session.stands(rules));
-    let repeated = standing_sessions.filter(|session| !standing.insert(session.participant.as_str())).count();
+    let repeated = standing_sessions.filter(|session| !standing.insert(session.surgeon())).count();
     replaced + repeated
 }

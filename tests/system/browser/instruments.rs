@@ -102,6 +102,7 @@ async fn second_setting(theatre: &Theatre) {
     let surgeon = &theatre.surgeon;
     theatre.tap_notice(2).await;
     theatre.say("Frau Mustermann bleeds", 1).await;
+    theatre.say("The edge is sharp now", 2).await;
     theatre.finish().await;
     surgeon.sees("#panel h2", "a few questions").await;
     mark(surgeon, "[data-question=effort]", 0.75).await;
@@ -175,9 +176,19 @@ async fn researcher(theatre: &Theatre) {
     page.click("#withdraw").await;
     page.type_into("#reason", "wants no part in it").await;
     page.click("#reason-go").await;
-    page.sees("main", "The data of this session stay out of exports").await;
+    page.sees("main", "no longer shown, analysed or exported").await;
+    page.sees("#words-left", "Texts that still stand in the database: 1").await;
+    for gone in ["#timeline", "#comment-list", ".answers", ".closing"] {
+        assert_eq!(page.count(gone).await, 0, "{gone}");
+    }
+    assert!(!page.text(".corrections").await.contains("the hand slipped"), "nor what was put right in an answer");
     page.to_top().await;
     shoot(page, "researcher-9-withdrawn").await;
+
+    page.click("#erase-all").await;
+    page.type_into("#reason", "the participant asks for it").await;
+    page.click("#reason-go").await;
+    page.sees("#words-left", "No words of this session are left").await;
 
     page.click_labelled(".events", "Erase reason…").await;
     page.type_into("#reason", "it says why somebody left").await;

@@ -3,6 +3,7 @@
 
 mod accessible;
 mod aftermath;
+mod analysis_page;
 mod bad_day;
 mod blinding;
 mod by_hand;

@@ -1,10 +1,14 @@
 //! A study on the pages: planned, opened, used by the operator, closed, locked, unblinded by its statistician.
 
+use std::io::Cursor;
+
+use serde_json::json;
+
 use super::driver::{Browser, Driver};
 use super::screenshots::shoot;
 use super::theatre::operator;
 use super::wait::until;
-use crate::http::studies::{definition, server};
+use crate::http::studies::{act, definition, new_session, post, server};
 use crate::support::{PASSPHRASE, Server};
 
 async fn researcher(driver: &Driver, server: &Server) -> Browser {
@@ -79,6 +83,34 @@ async fn a_session(operator: &Browser) {
     operator.sees("#new-session", "Prepare session").await;
 }
 
+/// Another session in the study, of S-02, that is aborted.
+async fn another_session(server: &mut Server) {
+    let token = server.sign_in("operator").await;
+    server.use_key("operator", &token);
+    post(server, "operator", "/api/operator/participants", json!({"code": "S-02"})).await;
+    let made = post(server, "operator", "/api/operator/sessions", new_session("S-02")).await;
+    let session = made["session"].clone();
+    act(server, "operator", json!({"session": session, "action": "abort", "reason": "The light failed again"})).await;
+    post(server, "operator", "/api/operator/dismissals", json!({"session": session})).await;
+}
+
+/// Exports the unblinded study, whose page is open, with its policies.
+async fn export_with_policies(page: &Browser, server: &mut Server) {
+    page.click("#export-unblinded").await;
+    page.sees("#export-told", "The export with policies is ready: 1 session").await;
+    page.sees("#export-ready", "Download the package").await;
+    page.sees_no("#export-progress").await;
+    shoot(page, "study-5-exported").await;
+
+    let link = page.attribute("#export-download", "href").await.unwrap();
+    assert!(page.start_of(&link).await.starts_with("200 PK"));
+    let token = server.sign_in("statistician").await;
+    server.use_key("researcher", &token);
+    let package = server.get_as("researcher", &link).send().await.unwrap().bytes().await.unwrap();
+    let package = zip::ZipArchive::new(Cursor::new(package)).unwrap();
+    assert!(package.file_names().any(|name| name.unwrap().ends_with("allocation.csv")), "which policy ran is in it");
+}
+
 /// Exports the study, whose page is open. The package is there when the page is opened again.
 async fn export(page: &Browser) {
     page.sees_no("#export-ready").await;
@@ -95,12 +127,14 @@ async fn export(page: &Browser) {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_study_is_led_from_the_pages() {
     let driver = Driver::start();
-    let (_protocols, server) = server();
+    let (_protocols, mut server) = server();
     server.add_account("lead", "lead", "Dr Lead");
     server.add_account("operator", "operator", "Nurse Op");
     let operator = operator(&driver, &server).await;
     operator.sees("#new-session", "Prepare session").await;
     operator.sees_no("#study-choice").await;
+    // Whoever wants a single session never reads the word.
+    assert!(!operator.text("body").await.to_lowercase().contains("study"));
 
     let page = researcher(&driver, &server).await;
     page.sees("nav", "Studies").await;
@@ -138,11 +172,18 @@ async fn a_study_is_led_from_the_pages() {
     page.reload().await;
     page.sees("main", "aborted").await;
     shoot(&page, "study-3-open").await;
+    assert_eq!(page.count("#export-unblinded").await, 0, "not before the study is unblinded");
     export(&page).await;
     page.click_labelled("td", "Withdraw").await;
     sign(&page, "The surgeon asked for it").await;
     page.sees("td .badge.warn", "withdrawn").await;
     assert_eq!(page.count("#export").await, 0, "no session is left to export");
+
+    // The package that was ready still has that session: it is handed out no more.
+    another_session(&mut server).await;
+    page.reload().await;
+    page.sees("#export-trouble", "a surgeon has withdrawn").await;
+    page.sees_no("#export-ready").await;
 
     page.click("#close").await;
     sign(&page, "The last surgeon was here").await;
@@ -176,6 +217,7 @@ async fn a_study_is_led_from_the_pages() {
     page.sees("#stage", "unblinded").await;
     page.sees(".study-events", "Study unblinded: The analysis begins").await;
     shoot(&page, "study-5-unblinded").await;
+    export_with_policies(&page, &mut server).await;
 
     page.open(&server.url("/researcher")).await;
     page.sees("tbody", "scope-2026").await;

@@ -123,6 +123,7 @@ fn doors(session: &str) -> Vec<(&'static str, String, Option<Value>)> {
         ("researcher", of("/export.zip"), None),
         ("researcher", of("/corrections"), Some(note)),
         ("researcher", of("/erasures"), Some(json!({"subject": "comment", "record": "x", "reason": "because"}))),
+        ("researcher", of("/erasures/all"), Some(reason.clone())),
         ("researcher", of("/withdraw"), Some(reason.clone())),
         ("researcher", of("/unblind"), Some(reason)),
         ("researcher", "/researcher/studies/scope-2026".to_owned(), None),

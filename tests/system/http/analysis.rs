@@ -19,7 +19,8 @@ use super::studies::take_session_link;
 use crate::support::{PASSPHRASE, Server, client};
 
 const PROTOCOL: &str = include_str!("analysed.toml");
-const STUDY: &str = "focus-2026";
+/// The study's name.
+pub const STUDY: &str = "focus-2026";
 const API: &str = "/api/researcher/studies/focus-2026/analysis";
 const PAGE: &str = "/researcher/studies/focus-2026/analysis";
 

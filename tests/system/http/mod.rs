@@ -1,7 +1,7 @@
 //! The server over HTTP: who may do what, what every response carries, and how it starts and ends.
 
 mod accounts;
-mod analysis;
+pub mod analysis;
 mod blinding;
 mod checks;
 mod crowd;

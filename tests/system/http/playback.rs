@@ -116,6 +116,15 @@ async fn a_recording_is_played_to_the_researcher_alone_and_only_after_unblinding
     }
     let viewed = "SELECT count(*) FROM accesses WHERE kind = 'recording-viewed' AND role = 'researcher'";
     assert_eq!(number(&server, viewed).await, 1, "the look at it is recorded");
+
+    // A withdrawal ends it, also for whoever is playing it.
+    let withdraw = format!("/api/researcher/sessions/{session}/withdraw");
+    let withdraw = server.post_as("researcher", &withdraw).json(&json!({"reason": "wants no part in it"}));
+    assert_eq!(withdraw.send().await.unwrap().status(), StatusCode::NO_CONTENT);
+    for rest in ["recordings".to_owned(), frame(&session, 7, "cell"), "timeline".to_owned(), "course".to_owned()] {
+        let (status, said) = refusal(&server, &session, &rest).await;
+        assert!(status == StatusCode::CONFLICT && said.contains("the participant withdrew"), "{rest}: {said}");
+    }
 }
 
 #[tokio::test]

@@ -13,7 +13,10 @@ async fn post(server: &Server, role: &str, path: &str, body: &Value) -> (u16, St
     (status, said["error"].as_str().unwrap_or_default().to_owned())
 }
 
-/// A session that was aborted after one comment; its id and the comment's key.
+/// What the second comment of the session says.
+const OTHER: &str = "the edge of the liver is sharp";
+
+/// A session that was aborted after two comments; its id and the first one's key.
 async fn a_session(server: &Server) -> (String, &'static str) {
     const KEY: &str = "00000000-0000-4000-8000-000000000001";
     post(server, "operator", "/api/operator/participants", &json!({"code": "S-05"})).await;
@@ -23,6 +26,9 @@ async fn a_session(server: &Server) -> (String, &'static str) {
     let session = made["session"].as_str().unwrap().to_owned();
     let comment = json!({"key": KEY, "session": session, "kind": "text", "text": "Mustermann"});
     assert_eq!(post(server, "surgeon", "/api/surgeon/comments", &comment).await.0, 204);
+    let other =
+        json!({"key": "00000000-0000-4000-8000-000000000002", "session": session, "kind": "text", "text": OTHER});
+    assert_eq!(post(server, "surgeon", "/api/surgeon/comments", &other).await.0, 204);
     let abort = json!({"session": session, "action": "abort", "reason": "enough"});
     assert_eq!(post(server, "operator", "/api/operator/actions", &abort).await.0, 200);
     (session, KEY)
@@ -53,14 +59,34 @@ async fn records_are_put_right_by_the_researcher_alone() {
         assert_eq!((status, said.as_str()), (204, ""), "{path}");
     }
     let (status, said) = post(&server, "researcher", &format!("{base}/corrections"), &note).await;
-    assert_eq!(status, 204, "the note was erased with the comment: {said}");
+    assert!(status == 409 && said.contains("the participant withdrew"), "{said}");
 
     let export = server.get_as("researcher", &format!("{base}/export.zip")).send().await.unwrap();
     assert_eq!(export.status(), 409);
     assert!(export.text().await.unwrap().contains("was withdrawn by the researcher"));
     let page = server.get_as("researcher", &format!("/researcher/sessions/{session}")).send().await.unwrap();
     let page = page.text().await.unwrap();
-    assert!(page.contains("The data of this session stay out of exports") && !page.contains("Mustermann"), "{page}");
+    assert!(page.contains("no longer shown, analysed or exported") && !page.contains("Mustermann"), "{page}");
+    assert!(
+        page.contains("by the researcher: wants no part in it") && page.contains("Session aborted: enough"),
+        "{page}"
+    );
+    for rest in ["", "/course", "/timeline"] {
+        let said = server.get_as("researcher", &format!("{base}{rest}")).send().await.unwrap();
+        assert_eq!(said.status(), if rest.is_empty() { 200 } else { 409 });
+        assert!(!said.text().await.unwrap().contains(OTHER), "{rest}");
+    }
+
+    // Its words can be erased all at once, by the researcher alone.
+    let all = format!("{base}/erasures/all");
+    let reason = json!({"reason": "the participant asks for it"});
+    assert_eq!(post(&server, "operator", &all, &reason).await.0, 403);
+    assert_eq!(post(&server, "researcher", &all, &json!({"reason": " "})).await.0, 422);
+    assert_eq!(post(&server, "researcher", &all, &reason).await.0, 204);
+    let (status, said) = post(&server, "researcher", &all, &reason).await;
+    assert!(status == 409 && said.contains("no words of this session are left"), "{said}");
+    let database = std::fs::read(server.data.path().join("parfocal.db")).unwrap();
+    assert!(!database.windows(OTHER.len()).any(|window| window == OTHER.as_bytes()));
 }
 
 #[tokio::test]

@@ -8,6 +8,7 @@ use parfocal::ids::SessionId;
 use parfocal::store::export::{ExportError, export};
 use parfocal::store::{Reader, StoreError};
 use parfocal::trial::action::Action;
+use parfocal::trial::correction::{FieldChange, NewCorrection};
 use parfocal::trial::remark::{NewComment, Origin, Said};
 use parfocal::trial::role::Role;
 use parfocal::trial::study::refusal::StudyRefusal;
@@ -322,6 +323,69 @@ async fn sessions_of_an_earlier_version_are_outside_any_study() {
     assert_eq!(detail.commitment, before);
     assert!(trial.conductor.studies().lines().await.unwrap().is_empty());
 
+    let checks = parfocal::store::verify_database(folder.path(), None).await.unwrap();
+    assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
+}
+
+#[tokio::test]
+async fn an_open_study_of_the_version_before_accounts_goes_on_with_its_orders_and_sessions() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("pair.toml"), PROTOCOL).unwrap();
+    let mut trial = Trial::start_with(folder.path(), Some(folder.path()), 5).await;
+    plan(&trial, definition()).await.unwrap();
+    // That version opened studies without accounts. This one goes with the tables of accounts again, below.
+    let pool = crate::storage::raw(folder.path()).await;
+    let account = "INSERT INTO accounts VALUES ('nobody', 'Nobody', 'lead', 0, 64, 1, '', '')";
+    sqlx::query(account).execute(&pool).await.unwrap();
+    change(&trial, Change::Open).await.unwrap();
+    let session = whole(&mut trial, PARTICIPANT, "leeds").await;
+    let line = detail(&trial).await.commitment_line;
+    let before = trial.conductor.session_detail(session).await.unwrap();
+    trial.store.close().await;
+    drop(trial);
+    parfocal::store::MIGRATOR.undo(&pool, 10).await.unwrap();
+    pool.close().await;
+
+    let mut trial = a_trial(folder.path()).await;
+    let study = detail(&trial).await;
+    assert_eq!((study.line.stage, study.commitment_line), (Stage::Open, line));
+    let after = trial.conductor.session_detail(session).await.unwrap();
+    assert_eq!((&after.commitment, &after.answers), (&before.commitment, &before.answers));
+    assert_eq!(trial.store.reader().comments(session).await.unwrap().len(), 2);
+    whole(&mut trial, "S-02", "leeds").await;
+    let places: Vec<usize> = detail(&trial).await.study_sessions.iter().map(|session| session.place).collect();
+    assert_eq!(places, [1, 2]);
+
+    // Every order is the one that was committed to before.
+    to_the_end(&trial).await;
+    let out = folder.path().join("export");
+    export(&trial.recorder(), session, &out, true).await.unwrap();
+    let checks = parfocal::store::export::verify::verify(&out, None);
+    assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
+    let checks = parfocal::store::verify_database(folder.path(), None).await.unwrap();
+    assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
+}
+
+#[tokio::test]
+async fn a_session_under_the_wrong_code_counts_for_the_right_surgeon_once_it_is_corrected() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let session = whole(&mut trial, "S-02", "leeds").await;
+    assert!(refusal(prepare(&trial, "S-02", "leeds").await).contains("S-02"));
+    let change_to_s03 = FieldChange::Participant { old: "S-02".to_owned(), new: "S-03".to_owned() };
+    let correction = NewCorrection { change: change_to_s03, reason: "the wrong code was chosen".to_owned() };
+    trial.conductor.correct(Role::Researcher, session, correction).await.unwrap();
+
+    assert!(refusal(prepare(&trial, "S-03", "leeds").await).contains("S-03"));
+    whole(&mut trial, "S-02", "leeds").await;
+    let sessions = detail(&trial).await.study_sessions;
+    let told: Vec<_> = sessions.iter().map(|line| (line.corrected_participant.as_deref(), line.place)).collect();
+    assert_eq!(told, [(Some("S-03"), 1), (None, 2)]);
+
+    // Who withdraws is the one who had the session.
+    change(&trial, Change::Withdraw { session }).await.unwrap();
+    assert_eq!(detail(&trial).await.log.last().unwrap().text, "S-03 withdrew");
+    assert!(refusal(prepare(&trial, "S-03", "leeds").await).contains("withdrew"));
     let checks = parfocal::store::verify_database(folder.path(), None).await.unwrap();
     assert_eq!(crate::exports::failed(&checks), [""; 0], "{checks:?}");
 }

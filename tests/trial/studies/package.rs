@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use parfocal::study_export::{Progress, StudyExportState, StudyExports};
+use parfocal::trial::erasure::{Erasable, NewErasure};
 use serde_json::Value;
 
 use super::*;
@@ -177,6 +178,17 @@ async fn a_package_proves_itself_and_tells_what_was_changed() {
     }
     assert!(verified.contains("3 exports are as they were exported"), "{verified}");
 
+    // A head that was noted: of the row before the last of some export, and one that no export has.
+    let session = std::fs::read_dir(package.join("sessions")).unwrap().next().unwrap().unwrap().path();
+    let rows: Vec<_> =
+        rows(&session, "chain").into_iter().map(|row| (row["number"].clone(), row["hash"].clone())).collect();
+    let [.., (number, hash), _] = rows.as_slice() else { panic!("{rows:?}") };
+    let noted = done(&["verify", text(&package), "--head", &format!("{number}:{}", &hash[..32])]);
+    assert!(noted.lines().any(|line| line.starts_with("head") && line.contains("the history of site")), "{noted}");
+    let output = parfocal(&["verify", text(&package), "--head", &format!("{number}:{}", "0".repeat(32))]);
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.code() == Some(1) && told.contains("no export in it has the row"), "{told}");
+
     // Whoever changes a table and its checksum cannot change what the exports prove.
     let changed = package.join("comments.csv");
     let before = std::fs::read_to_string(&changed).unwrap();
@@ -295,7 +307,8 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
 
     let exports = StudyExports::new(folder.path());
     assert!(!left.exists());
-    assert_eq!(exports.state(STUDY), StudyExportState::None);
+    let reader = trial.store.reader().clone();
+    assert_eq!(exports.state(&reader, STUDY).await.unwrap(), StudyExportState::None);
 
     // Nothing is done between the two: the test has not waited yet.
     let first = exports.start(trial.recorder(), STUDY, false);
@@ -305,7 +318,7 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
 
     let mut told = Vec::new();
     let ready = loop {
-        match exports.state(STUDY) {
+        match exports.state(&reader, STUDY).await.unwrap() {
             StudyExportState::Running { progress, .. } => told.push(progress),
             ended => break ended,
         }
@@ -314,13 +327,50 @@ async fn a_second_wish_for_a_studys_export_waits_for_the_first() {
     assert_eq!(ready, StudyExportState::Ready { unblinded: false, sessions: 1 });
     assert!(told.is_sorted_by_key(|progress| (progress.exported, progress.joined)), "{told:?}");
 
-    let made = exports.made(STUDY).unwrap();
+    let made = exports.made(&reader, STUDY).await.unwrap().unwrap();
     let export = made.folder.join("sessions").join(session.to_string());
     let accesses = rows(&export, "accesses");
     assert_eq!(accesses.len(), 1, "one export: {accesses:?}");
 
     // The next one takes its place, once nobody downloads it any more.
     let _ = exports.start(trial.recorder(), STUDY, false);
-    assert!(exports.made(STUDY).is_none());
+    assert!(exports.made(&reader, STUDY).await.unwrap().is_none());
     assert!(made.folder.is_dir(), "it is being downloaded");
+}
+
+#[tokio::test]
+async fn a_package_that_was_made_before_something_was_taken_back_is_handed_out_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trial = opened(folder.path()).await;
+    let kept = whole(&mut trial, "S-02", "leeds").await;
+    let withdrawn = whole(&mut trial, "S-03", "leeds").await;
+    let reader = trial.store.reader().clone();
+    let exports = StudyExports::new(folder.path());
+    let make = async || {
+        let _ = exports.start(trial.recorder(), STUDY, false);
+        loop {
+            match exports.state(&reader, STUDY).await.unwrap() {
+                StudyExportState::Running { .. } => tokio::time::sleep(std::time::Duration::from_millis(1)).await,
+                ended => break ended,
+            }
+        }
+    };
+    let given_up = async || {
+        assert!(exports.made(&reader, STUDY).await.unwrap().is_none());
+        let state = exports.state(&reader, STUDY).await.unwrap();
+        let StudyExportState::Failed { reason, .. } = state else { panic!("{state:?}") };
+        assert!(reason.contains("a surgeon has withdrawn or words were erased"), "{reason}");
+    };
+
+    assert_eq!(make().await, StudyExportState::Ready { unblinded: false, sessions: 2 });
+    change(&trial, Change::Withdraw { session: withdrawn }).await.unwrap();
+    given_up().await;
+
+    assert_eq!(make().await, StudyExportState::Ready { unblinded: false, sessions: 1 });
+    let (_, comment) = reader.comments(kept).await.unwrap().remove(0);
+    let reason = "names a patient".to_owned();
+    let erasure = NewErasure { subject: Erasable::Comment, record: comment.key.to_string(), reason };
+    trial.conductor.erase(Role::Researcher, kept, erasure).await.unwrap();
+    given_up().await;
+    assert_eq!(make().await, StudyExportState::Ready { unblinded: false, sessions: 1 });
 }

@@ -22,6 +22,7 @@ fn completed(participant: &str, place: usize) -> Enrolled {
     Enrolled {
         session: SessionId(Uuid::from_u128(place as u128)),
         participant: participant.to_owned(),
+        corrected_participant: None,
         site: "leeds".to_owned(),
         protocol: "pair".to_owned(),
         place,
@@ -142,4 +143,17 @@ fn a_second_session_of_a_surgeon_is_what_the_study_says() {
     let once = [aborted("S-01", 1)];
     assert_eq!(next(&with_rules("next-spare", "keep", "refuse"), &once, "S-01"), Ok(2));
     assert!(matches!(next(&with_rules("keep", "keep", "refuse"), &once, "S-01"), Err(StudyRefusal::Repeated { .. })));
+}
+
+#[test]
+fn a_session_counts_for_the_surgeon_whose_it_was() {
+    let study = with_rules("next-spare", "next-spare", "refuse");
+    let of_another = |session: Enrolled| Enrolled { corrected_participant: Some("S-02".to_owned()), ..session };
+
+    let sessions = [of_another(completed("S-01", 1))];
+    assert_eq!(next(&study, &sessions, "S-01"), Ok(2));
+    assert!(matches!(next(&study, &sessions, "S-02"), Err(StudyRefusal::Repeated { .. })));
+    let sessions = [of_another(withdrawn("S-01", 1))];
+    assert_eq!(next(&study, &sessions, "S-01"), Ok(2));
+    assert!(matches!(next(&study, &sessions, "S-02"), Err(StudyRefusal::Withdrew { .. })));
 }

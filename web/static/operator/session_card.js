@@ -155,7 +155,7 @@ export class SessionCard {
     askReason({
       heading: "The participant withdraws",
       consequence:
-        "From now on this session’s data stay out of exports and analyses. That it was withdrawn remains on record. " +
+        "From now on this session’s data are not shown, analysed or exported. That it was withdrawn remains on record. " +
         "This cannot be undone.",
       go: "Withdraw session",
       danger: true,

@@ -167,6 +167,26 @@ export function askErasure(session, subject, key) {
 }
 
 /**
+ * Asks whether all words of a withdrawn session are to be erased.
+ *
+ * @param {string} session
+ */
+export function askErasureOfAll(session) {
+  askReason({
+    heading: "Erase all words of this session",
+    consequence:
+      "Every comment with its sound, every answer in words and every note leaves the database for good. Backups and " +
+      "exports made earlier still hold them. The records stay, and say that their words were erased, by whom and why.",
+    go: "Erase all for good",
+    danger: true,
+    done: async (reason) => {
+      await post("/api/researcher/sessions/{session}/erasures/all", { reason }, { session });
+      location.reload();
+    },
+  });
+}
+
+/**
  * Asks whether the reason of an event is to be erased.
  *
  * @param {string} session
@@ -205,8 +225,8 @@ export function askWithdrawal(session) {
   askReason({
     heading: "The participant withdraws",
     consequence:
-      "From now on this session’s data stay out of exports and analyses. That it was withdrawn remains on record. " +
-      "This cannot be undone. Words can be erased one by one as well.",
+      "From now on this session’s data are not shown, analysed or exported. That it was withdrawn remains on record. " +
+      "This cannot be undone. Afterwards its words can be erased as well.",
     go: "Withdraw session",
     danger: true,
     done: async (reason) => {

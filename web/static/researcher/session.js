@@ -1,33 +1,20 @@
-// One session as the researcher sees it: the timeline, its recording and the list of comments move
-// together; unblinding asks for a reason.
+// One session over time as the researcher sees it: the timeline, its recording and the list of comments move together.
 
-import { get, inWords, post } from "../shared/api.js";
-import { askConfirmed, askReason } from "../shared/dialogs.js";
+import { get, inWords } from "../shared/api.js";
 import { byId, make, setText } from "../shared/dom.js";
-import "../shared/sign_in.js";
 import { clockText } from "../shared/text.js";
-import {
-  askErasure,
-  askErasureOfReason,
-  askNote,
-  askTranscript,
-  askWithdrawal,
-  correctAnswer,
-  correctParticipant,
-} from "./corrections.js";
+import { askErasure, askNote, askTranscript } from "./corrections.js";
 import { drawMetric } from "./metric_drawing.js";
 import { Player } from "./player.js";
 import { lastComment, lengthOf, Scale } from "./timeline.js";
 import { drawTimeline } from "./timeline_drawing.js";
-import { commentWords, outstandingWords, setAsideWords } from "./timeline_words.js";
+import { commentWords, setAsideWords } from "./timeline_words.js";
 import { voicePlayer } from "./voice.js";
 
 const page = byId("session").dataset;
 const session = page.session ?? "";
 const ended = page.ended === "true";
 const unblinded = page.unblinded === "true";
-/** Empty where the session is outside any study. */
-const study = page.study ?? "";
 
 /** @type {Api.Timeline | null} */
 let timeline = null;
@@ -284,61 +271,6 @@ function showKey(shown) {
   byId("key-recorded").hidden = player === null;
 }
 
-/** @param {string} moment */
-function timeOfDay(moment) {
-  return new Date(moment).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
-}
-
-/** What a surgeon's tablet may still hold, in words; null where nothing may be outstanding. */
-async function outstandingNow() {
-  try {
-    const { outstanding } = await get("/api/researcher/sessions/{session}", { session });
-    return outstandingWords(outstanding, timeOfDay);
-  } catch {
-    // Where the server does not answer now, it will ask when it is told to unblind.
-    return null;
-  }
-}
-
-async function unblind() {
-  const open = await outstandingNow();
-  const late = open
-    ? ` ${open} What arrives after unblinding is kept and marked late, but does not count.`
-    : "";
-  const usual =
-    "You and everyone with this page will see which policy ran in which setting. This cannot be undone. " +
-    `The audit trail and every export will say so.${late}`;
-  const emergency =
-    "The session is still under way. Unblinding now is an emergency measure. The audit trail and every " +
-    "export will always say so. The surgeon’s and operator’s pages still do not show the policies.";
-
-  const ofStudy =
-    `This session belongs to study ${study}, which stays blinded. To unblind one session alone is an emergency ` +
-    `measure. Who did it and why stands in every export: name no policy in the reason.${late}`;
-
-  const isEmergency = !ended || study !== "";
-  const asked = {
-    heading: isEmergency ? "Emergency unblinding" : "Unblind this session",
-    consequence: study ? ofStudy : ended ? usual : emergency,
-    confirm: open ? "Unblind anyway" : undefined,
-    go: isEmergency ? "Unblind now" : "Unblind",
-    danger: true,
-  };
-
-  /**
-   * @param {string} reason
-   * @param {string} [passphrase] asked for once more
-   */
-  async function done(reason, passphrase) {
-    const path = "/api/researcher/sessions/{session}/unblind";
-    await post(path, { reason, passphrase, despite_outstanding: open !== null }, { session });
-    location.reload();
-  }
-
-  if (study) askConfirmed({ ...asked, done });
-  else askReason({ ...asked, done: (reason) => done(reason) });
-}
-
 byId("show-path").onclick = async () => {
   try {
     timeline = await withFocalPath();
@@ -350,30 +282,4 @@ byId("show-path").onclick = async () => {
   }
 };
 
-// A session that is unblinded already has no such button.
-document.getElementById("unblind")?.addEventListener("click", unblind);
-
-// Nor has one that is under way, or was withdrawn, these.
-document.getElementById("withdraw")?.addEventListener("click", () => askWithdrawal(session));
-document.getElementById("correct-participant")?.addEventListener("click", () => {
-  correctParticipant(session, page.participant ?? "", (page.participants ?? "").split(" ").filter(Boolean));
-});
-document.getElementById("correct-answer")?.addEventListener("click", async () => {
-  try {
-    await correctAnswer(session);
-  } catch (error) {
-    setText(byId("timeline-trouble"), inWords(error));
-  }
-});
-for (const button of document.querySelectorAll(
-  "button[data-note], button[data-erase], button[data-erase-reason]",
-)) {
-  if (!(button instanceof HTMLButtonElement)) continue;
-  const { note, noted, erase, eraseReason } = button.dataset;
-  button.onclick = () => {
-    if (note) askNote(session, note, noted ?? "");
-    if (erase) askErasure(session, "answer", erase);
-    if (eraseReason) askErasureOfReason(session, eraseReason);
-  };
-}
 load();
