@@ -101,6 +101,7 @@ static ASSETS: &[Asset] = &assets![
     "surgeon/confirm_button.js",
     "surgeon/device.js",
     "surgeon/drafts.js",
+    "surgeon/grip.js",
     "surgeon/holding.js",
     "surgeon/instrument_form.js",
     "surgeon/last_view.js",
