@@ -12,10 +12,17 @@ use targets::{TARGETS, Target};
 
 #[path = "../../tests/fuzz/backup.rs"]
 mod backup;
+#[path = "../../tests/trial/fixture.rs"]
+#[allow(dead_code, reason = "the trial's tests use more of it")]
+mod fixture;
 #[path = "../../tests/fuzz/folders.rs"]
 mod folders;
 #[path = "../../tests/fuzz/lessons.rs"]
 mod lessons;
+#[path = "../../tests/fuzz/packages.rs"]
+mod packages;
+#[path = "../../tests/fuzz/server.rs"]
+mod server;
 #[path = "../../tests/fuzz/targets.rs"]
 mod targets;
 

@@ -2,13 +2,11 @@
 //! the tablet to scan, and, loudly, what is simulated.
 
 use std::fmt::Write;
-use std::net::SocketAddr;
 
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
 use crate::control::ControlStatus;
-use crate::doctor::outward;
 use crate::http::Reach;
 use crate::http::error::role_name;
 use crate::http::keys::{Keys, ROLES};
@@ -23,7 +21,8 @@ pub fn announcement(
     calibration: &Calibration,
     terminal: bool,
 ) -> String {
-    let link = |role| reach.link(keys.of(role));
+    let host = reach.host();
+    let link = |role| reach.link_by(&host, keys.of(role));
     let mut text = String::new();
 
     // Writing to a string cannot fail.
@@ -55,13 +54,13 @@ pub fn announcement(
 /// What to know of the connection to the server.
 fn advice(reach: &Reach) -> String {
     let mut advice = Vec::new();
-    if reach.loopback_only {
+    if reach.loopback_only() {
         advice.push("Only this machine can connect. For a tablet, start with --bind 0.0.0.0:8080 --tls.".to_owned());
-    } else if !reach.encrypted {
+    } else if !reach.encrypted() {
         advice.push("The connection is not encrypted (--insecure): use a network that you trust.".to_owned());
     }
 
-    if let (Some(page), Some(authority)) = (reach.trust_page(), &reach.authority) {
+    if let (Some(page), Some(authority)) = (reach.trust_page_by(&reach.host()), reach.authority()) {
         advice.push(format!("Each tablet and laptop must trust this server once. To do so, open {page} on it."));
         advice.push(format!("Compare the fingerprint (SHA-256) there: {}", authority.fingerprint));
     }
@@ -88,10 +87,4 @@ fn simulated(status: &ControlStatus) -> Option<String> {
         (false, false) => return None,
     };
     Some(format!("{what} SIMULATED: this is not a real instrument"))
-}
-
-/// An address that others can open: for "every address", the one that this machine would talk to the world from.
-pub fn reachable(listening: SocketAddr) -> SocketAddr {
-    let outward = if listening.ip().is_unspecified() { outward() } else { None };
-    SocketAddr::new(outward.unwrap_or(listening.ip()), listening.port())
 }

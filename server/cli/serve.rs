@@ -17,7 +17,7 @@ use tokio::task::JoinHandle;
 use tokio::time::timeout;
 use tracing_subscriber::EnvFilter;
 
-use super::announce::{announcement, reachable};
+use super::announce::announcement;
 use super::encryption::Encryption;
 use super::library::protocols;
 use super::output::Failure;
@@ -213,7 +213,7 @@ async fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let ending = conductor.clone();
     let (end, shutdown) = watch::channel(false);
 
-    let reach = reach(address, certificates.as_deref());
+    let reach = Reach::new(address, certificates);
     let app = Arc::new(App {
         accounts: Accounts::of_server(&store, Arc::clone(&clock), Cost::default()),
         clock,
@@ -279,17 +279,6 @@ async fn end_recording_and_devices(
     let stopping = tokio::task::spawn_blocking(move || (control_loop.stop(), imaging.join()));
     if timeout(DEVICES, stopping).await.is_err() {
         tracing::error!("the control loop does not stop; exiting without it");
-    }
-}
-
-/// How others reach a server that listens on `address`.
-fn reach(address: SocketAddr, certificates: Option<&Certificates>) -> Reach {
-    let reachable = reachable(address);
-    Reach {
-        host: certificates.map_or_else(|| reachable.to_string(), |certificates| certificates.host(reachable)),
-        encrypted: certificates.is_some(),
-        loopback_only: address.ip().is_loopback(),
-        authority: certificates.and_then(Certificates::authority).cloned(),
     }
 }
 

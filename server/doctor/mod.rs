@@ -2,6 +2,7 @@
 //! right first, each with what to do.
 
 mod calibration;
+mod certificate;
 mod devices;
 mod finding;
 mod folder;
@@ -13,6 +14,7 @@ mod tablet;
 use std::path::Path;
 
 pub use calibration::{calibration, unreadable_calibration};
+pub use certificate::certificate;
 pub use devices::{camera_in_use, lens_in_use};
 pub use finding::{Finding, Verdict};
 pub use folder::LEAST_ROOM;

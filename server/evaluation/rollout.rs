@@ -38,6 +38,12 @@ impl Path {
         self.focal_power.iter().zip(&self.optimum).map(|(f, best)| (f - best).abs())
     }
 
+    /// Whether it has an optimum for each focal power, and both are on the scale of 0 to 1.
+    pub(super) fn is_plausible(&self) -> bool {
+        let are_powers = |values: &[f64]| values.iter().all(|value| (0.0..=1.0).contains(value));
+        self.focal_power.len() == self.optimum.len() && are_powers(&self.focal_power) && are_powers(&self.optimum)
+    }
+
     /// This path cut into `count` stretches of the same length, to within a frame.
     #[must_use]
     pub fn parts(&self, count: usize) -> Vec<Self> {

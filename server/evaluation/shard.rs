@@ -14,6 +14,9 @@ use crate::scans::FocalTimeScan;
 use crate::scans::detail::{NothingToFocusOn, warning};
 
 const FORMAT: &str = "parfocal-evaluation-shard";
+/// Into so many stretches a path is cut at most.
+const MOST_STRETCHES: usize = 1000;
+
 const SOFTWARE: &str = concat!("parfocal ", env!("CARGO_PKG_VERSION"));
 
 /// One of several parts of a set of scans: with n parts each n-th scan, so that every part has scans of all kinds.
@@ -33,6 +36,11 @@ impl Part {
     #[must_use]
     pub fn scans(self, count: usize) -> Vec<usize> {
         (self.index.saturating_sub(1)..count).step_by(self.of.max(1)).collect()
+    }
+
+    /// How many of `count` scans are its own.
+    fn size(self, count: usize) -> usize {
+        count.saturating_sub(self.index.saturating_sub(1)).div_ceil(self.of.max(1))
     }
 
     /// Name of the file of its findings.
@@ -144,13 +152,20 @@ impl Shard {
         Self { format: FORMAT.to_owned(), software: SOFTWARE.to_owned(), part, subject, without_detail, outcomes }
     }
 
-    /// Whether it holds a path for each policy and each of its scans.
+    /// Whether it holds a path for each policy and each of its scans. It comes from another machine, perhaps damaged on
+    /// the way: nothing of it is worked with before.
     fn is_whole(&self) -> bool {
-        let scans = self.part.scans(self.subject.count).len();
+        let scans = self.part.size(self.subject.count);
         let Part { index, of } = self.part;
+        let is_whole = |outcome: &Outcome| {
+            outcome.paths.len() == scans
+                && (1..=MOST_STRETCHES).contains(&outcome.parts)
+                && outcome.paths.iter().all(Path::is_plausible)
+        };
         self.format == FORMAT
             && (1..=of).contains(&index)
-            && self.outcomes.iter().all(|outcome| outcome.paths.len() == scans)
+            && self.without_detail <= scans
+            && self.outcomes.iter().all(is_whole)
     }
 
     /// Names the first thing in which this shard's evaluation differs from that of `other`.
@@ -246,6 +261,8 @@ mod tests {
     fn parts_hold_every_scan_once() {
         let parts = ["1/3", "2/3", "3/3"].map(|text| part(text).scans(7));
         assert_eq!(parts, [vec![0, 3, 6], vec![1, 4], vec![2, 5]]);
+        assert_eq!(["1/3", "2/3", "3/3"].map(|text| part(text).size(7)), [3, 2, 2]);
+        assert_eq!(part("5/5").size(3), 0);
 
         for wrong in ["0/3", "4/3", "1", "1/0", "a/b", ""] {
             assert!(wrong.parse::<Part>().is_err(), "{wrong}");

@@ -42,8 +42,11 @@ async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>
     });
 
     let mut findings = machine.await.map_err(|_| Error::Internal)?;
+    let now = app.clock.wall();
+    let local = app.reach.authority().is_some();
+    findings.extend(app.reach.certificate_until().map(|until| doctor::certificate(until, local, now)));
     findings.extend(devices(&app));
-    Ok(Json(Checks { at: app.clock.wall(), findings }))
+    Ok(Json(Checks { at: now, findings }))
 }
 
 fn devices(app: &App) -> Vec<Finding> {

@@ -20,12 +20,12 @@ pub fn surgeon_link(app: &App, headers: &HeaderMap, signed_in: bool) -> String {
         Some(session) if signed_in => app.keys.of_session(session),
         _ => app.keys.of(Role::Surgeon).to_owned(),
     };
-    app.reach.link_by(host, &key)
+    app.reach.link_by(&host, &key)
 }
 
 /// The page on which a tablet learns to trust the server, if it must.
 pub(super) fn trust_page(app: &App, headers: &HeaderMap) -> Option<String> {
-    app.reach.trust_page_by(tablets_host(app, headers))
+    app.reach.trust_page_by(&tablets_host(app, headers))
 }
 
 /// The name that a request came by.
@@ -34,8 +34,9 @@ pub(super) fn asked_host(headers: &HeaderMap) -> Option<&str> {
 }
 
 /// The name that a request came by, unless that leads nowhere from a tablet.
-fn tablets_host<'a>(app: &'a App, headers: &'a HeaderMap) -> &'a str {
-    asked_host(headers).filter(|host| !is_loopback_name(host)).unwrap_or(&app.reach.host)
+fn tablets_host(app: &App, headers: &HeaderMap) -> String {
+    let asked = asked_host(headers).filter(|host| !is_loopback_name(host));
+    asked.map_or_else(|| app.reach.host(), str::to_owned)
 }
 
 /// `link` as the inside of a page: an `<svg>` element.

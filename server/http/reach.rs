@@ -1,49 +1,128 @@
 //! How others reach the server: the host in links, and whether connections are encrypted.
 
-use crate::tls::PublicAuthority;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use crate::doctor::outward;
+use crate::tls::{Certificates, PublicAuthority};
 
 /// How others reach the server.
 #[derive(Debug, Clone)]
 pub struct Reach {
-    /// Host and port, as links name them.
-    pub host: String,
-    /// Whether connections are encrypted by the server itself.
-    pub encrypted: bool,
-    /// Whether the server listens on the machine itself alone, where no tablet reaches it.
-    pub loopback_only: bool,
-    /// The local authority that signed the server's certificate, and that each device must trust.
-    pub authority: Option<PublicAuthority>,
+    /// Where it listens.
+    listening: SocketAddr,
+    /// The certificate that it shows; none where it does not encrypt.
+    certificates: Option<Arc<Certificates>>,
 }
 
 impl Reach {
+    /// A server that listens on `listening`, and encrypts where it has `certificates`.
+    #[must_use]
+    pub const fn new(listening: SocketAddr, certificates: Option<Arc<Certificates>>) -> Self {
+        Self { listening, certificates }
+    }
+
+    /// Host and port, as links name them. Asked for each time: the machine gets another address when it joins another
+    /// network or its cable is plugged in, and a link to the old one leads nowhere.
+    #[must_use]
+    pub fn host(&self) -> String {
+        let outward = if self.listening.ip().is_unspecified() { outward() } else { None };
+        self.host_from(outward)
+    }
+
+    /// The same, for a machine that talks to the world from the address `outward`.
+    fn host_from(&self, outward: Option<IpAddr>) -> String {
+        let ip = match outward {
+            Some(address) => address,
+            // In no network only this machine itself reaches the server.
+            None if self.listening.ip().is_unspecified() => Ipv4Addr::LOCALHOST.into(),
+            None => self.listening.ip(),
+        };
+        let address = SocketAddr::new(ip, self.listening.port());
+        self.certificates.as_ref().map_or_else(|| address.to_string(), |certificates| certificates.host(address))
+    }
+
+    /// Whether connections are encrypted by the server itself.
+    #[must_use]
+    pub const fn encrypted(&self) -> bool {
+        self.certificates.is_some()
+    }
+
+    /// Whether the server listens on the machine itself alone, where no tablet reaches it.
+    #[must_use]
+    pub const fn loopback_only(&self) -> bool {
+        self.listening.ip().is_loopback()
+    }
+
+    /// The local authority that signed the server's certificate, and that each device must trust.
+    #[must_use]
+    pub fn authority(&self) -> Option<&PublicAuthority> {
+        self.certificates.as_ref()?.authority()
+    }
+
+    /// When the certificate ends that the server shows.
+    #[must_use]
+    pub fn certificate_until(&self) -> Option<Timestamp> {
+        self.certificates.as_ref().map(|certificates| certificates.until())
+    }
+
     /// How links to the server begin.
     #[must_use]
     pub const fn scheme(&self) -> &'static str {
-        if self.encrypted { "https" } else { "http" }
+        if self.encrypted() { "https" } else { "http" }
     }
 
-    /// The link that lets a browser in with `key`.
-    #[must_use]
-    pub fn link(&self, key: &str) -> String {
-        self.link_by(&self.host, key)
-    }
-
-    /// The same, by another of the server's names.
+    /// The link that lets a browser in with `key`, by one of the server's names.
     #[must_use]
     pub fn link_by(&self, host: &str, key: &str) -> String {
         format!("{}://{host}/enter?key={key}", self.scheme())
     }
 
-    /// The page on which a device learns to trust the server, if it must. Not encrypted: a device that does not trust
-    /// the server yet can open it without a warning.
-    #[must_use]
-    pub fn trust_page(&self) -> Option<String> {
-        self.trust_page_by(&self.host)
-    }
-
-    /// The same, by another of the server's names.
+    /// The page on which a device learns to trust the server, if it must, by one of the server's names. Not encrypted: a
+    /// device that does not trust the server yet can open it without a warning.
     #[must_use]
     pub fn trust_page_by(&self, host: &str) -> Option<String> {
-        self.authority.as_ref().map(|_| format!("http://{host}/trust"))
+        self.authority().map(|_| format!("http://{host}/trust"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reach(listening: &str) -> Reach {
+        Reach::new(listening.parse().unwrap(), None)
+    }
+
+    fn from(address: &str) -> Option<IpAddr> {
+        Some(address.parse().unwrap())
+    }
+
+    #[test]
+    fn links_follow_the_machines_address() {
+        let everywhere = reach("0.0.0.0:8080");
+        assert_eq!(everywhere.host_from(from("10.0.0.5")), "10.0.0.5:8080");
+        assert_eq!(everywhere.host_from(from("192.168.7.9")), "192.168.7.9:8080");
+        assert_eq!(everywhere.host_from(None), "127.0.0.1:8080", "in no network");
+        assert_eq!(reach("[::]:8080").host_from(from("10.0.0.5")), "10.0.0.5:8080");
+    }
+
+    #[test]
+    fn a_server_on_one_address_is_linked_to_there() {
+        assert_eq!(reach("10.0.0.5:8080").host(), "10.0.0.5:8080");
+        assert_eq!(reach("127.0.0.1:8080").host(), "127.0.0.1:8080");
+    }
+
+    #[test]
+    fn an_encrypted_server_links_to_its_present_address_too() {
+        let data = tempfile::tempdir().unwrap();
+        let listening: SocketAddr = "0.0.0.0:8443".parse().unwrap();
+        let now = "2026-06-01T00:00:00Z".parse().unwrap();
+        let certificates = Certificates::local(data.path(), Ipv4Addr::LOCALHOST.into(), now).unwrap();
+        let reach = Reach::new(listening, Some(Arc::new(certificates)));
+        assert_eq!(reach.link_by(&reach.host_from(from("10.0.0.5")), "k"), "https://10.0.0.5:8443/enter?key=k");
+        assert_eq!(reach.link_by(&reach.host_from(from("10.0.0.6")), "k"), "https://10.0.0.6:8443/enter?key=k");
     }
 }

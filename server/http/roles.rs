@@ -215,7 +215,7 @@ async fn enter(State(app): State<AppState>, Query(query): Query<EnterQuery>) -> 
         (None, Some(_)) => return Err(Error::SessionOver),
         (None, None) => return Err(Error::WrongKey),
     };
-    let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.reach.encrypted);
+    let cookie = set_cookie(cookie_name(role), &token, COOKIE_SECONDS, app.reach.encrypted());
 
     // The door opens on a full disk, too: the log then tells of it alone.
     match app.conductor.recorder(role).record(&Access::Entered).await {

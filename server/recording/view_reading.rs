@@ -83,10 +83,10 @@ impl ViewRecording {
         &self.rows
     }
 
-    /// Bytes of its pictures.
+    /// Bytes of its pictures, as its index says. Any row but the last may be damaged and say anything.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.rows.iter().map(|row| row.length).sum()
+        self.rows.iter().fold(0, |sum, row| sum.saturating_add(row.length))
     }
 
     /// Picture `number`, from 0, as JPEG.

@@ -29,7 +29,7 @@ const RETRY: Duration = Duration::from_secs(1);
 /// Batches between two checkpoints: about every 16 s.
 const CHECKPOINT_BATCHES: u32 = 64;
 
-/// Latest steps kept beside those of settings: eleven hours at 50 a second, some 200 MB.
+/// Latest steps kept beside those of settings: eleven hours at 50 a second, some 110 MB.
 pub const KEPT_OUTSIDE: i64 = 2_000_000;
 /// Steps looked at between two checkpoints for whether they can be forgotten: more than come in that time, and few
 /// enough to hold up no comment.

@@ -98,9 +98,11 @@ impl Certificates {
         let shown = self.shown.load();
         let names = &shown.facts.names;
         let name = names.hosts.iter().find(|host| !host.starts_with('*'));
+        // A machine that has just got another address: within a minute its local certificate holds that too.
+        let is_new = matches!(self.source, Source::Local { .. }) && !shown.wanted.addresses.contains(&address.ip());
 
         match name {
-            Some(name) if !names.addresses.contains(&address.ip()) && !address.ip().is_loopback() => {
+            Some(name) if !names.addresses.contains(&address.ip()) && !address.ip().is_loopback() && !is_new => {
                 format!("{name}:{}", address.port())
             }
             _ => address.to_string(),

@@ -1,10 +1,6 @@
 //! A backup or a database, which is verified before it is used. An input is a place in the file, four bytes, and what
 //! is written over the file's content there: so the file stays a database, and what its rows say is wrong.
 
-#[path = "../trial/fixture.rs"]
-#[allow(dead_code, reason = "the trial's tests use more of it")]
-mod fixture;
-
 use std::fs;
 
 use parfocal::store::verify_database;
@@ -13,7 +9,7 @@ use parfocal::trial::role::Role;
 use tempfile::TempDir;
 use tokio::runtime::{Builder, Runtime};
 
-use fixture::Trial;
+use super::fixture::Trial;
 
 /// Bytes of the file that a seed holds.
 const PIECE: usize = 64;

@@ -3,16 +3,21 @@
 
 use std::cell::LazyCell;
 use std::fs;
+use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use jiff::Timestamp;
 use parfocal::camera::calibration::tables;
 use parfocal::clock::Moment;
 use parfocal::http::keys::Keys;
 use parfocal::imaging::{Calibration, MosaicFrame};
 use parfocal::lens::FocalPower;
-use parfocal::recording::{FORMAT, Header, Recorder, Recording, Shot, VERSION, Writer};
+use parfocal::recording::{
+    Ended, FORMAT, Header, Recorder, Recording, Shot, VERSION, VIEW_FORMAT, VIEW_VERSION, ViewHeader, ViewRecording,
+    ViewWriter, Writer, of_session,
+};
 use parfocal::store::export::verify::verify;
 use parfocal::tls::Certificates;
 use tempfile::TempDir;
@@ -37,6 +42,11 @@ impl Folder {
         Self { root, files }
     }
 
+    /// The file that an input replaces whose first byte is `which`.
+    pub fn file(&self, which: u8) -> &Path {
+        &self.files[usize::from(which) % self.files.len()].0
+    }
+
     /// Looks at the folder with `input` in the place of one file.
     pub fn with(&self, input: &[u8], look: impl FnOnce(&Path)) {
         let Some((&which, content)) = input.split_first() else { return };
@@ -48,6 +58,7 @@ impl Folder {
 
     /// Each file as an input.
     pub fn seeds(&self) -> Vec<Vec<u8>> {
+        assert!(self.files.len() <= 256, "a byte says which file");
         let numbered = self.files.iter().enumerate();
         numbered.map(|(number, (_, content))| [&[number as u8], content.as_slice()].concat()).collect()
     }
@@ -74,6 +85,8 @@ thread_local! {
         }
     }));
     static RECORDING: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(make_recording));
+    static VIEW: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(make_view));
+    static AUTHORITY: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(make_authority));
     static CERTIFICATE: LazyCell<Folder> = LazyCell::new(|| Folder::made_by(make_certificate));
     static ALONE: LazyCell<TempDir> = LazyCell::new(|| tempfile::tempdir().unwrap());
 }
@@ -106,12 +119,41 @@ pub fn recording_files() -> Vec<Vec<u8>> {
     RECORDING.with(|recording| recording.seeds())
 }
 
+/// A recording of the view that is opened and read, with one of its files replaced.
+pub fn view(bytes: &[u8]) {
+    VIEW.with(|view| {
+        view.with(bytes, |folder| {
+            let Ok(view) = ViewRecording::open(&folder.join("view")) else { return };
+            let _ = (view.bytes(), view.check());
+            let _ = of_session(folder, "00000000-0000-4000-8000-000000000002");
+        });
+    });
+}
+
+/// The files of a recording of the view.
+pub fn view_files() -> Vec<Vec<u8>> {
+    VIEW.with(|view| view.seeds())
+}
+
+/// The local authority as it is kept, in any state.
+pub fn authority(bytes: &[u8]) {
+    AUTHORITY.with(|authority| {
+        authority.with(bytes, |folder| {
+            let _ = Certificates::local(folder, IpAddr::V4(Ipv4Addr::LOCALHOST), now());
+        });
+    });
+}
+
+/// Its files.
+pub fn authorities() -> Vec<Vec<u8>> {
+    AUTHORITY.with(|authority| authority.seeds())
+}
+
 /// A certificate and its key, one of them replaced.
 pub fn certificate(bytes: &[u8]) {
-    let now = "2026-06-01T00:00:00Z".parse().unwrap();
     CERTIFICATE.with(|certificate| {
         certificate.with(bytes, |folder| {
-            let _ = Certificates::given(folder.join("certificate.pem"), folder.join("key.pem"), now);
+            let _ = Certificates::given(folder.join("certificate.pem"), folder.join("key.pem"), now());
         });
     });
 }
@@ -174,6 +216,36 @@ fn make_recording(folder: &Path) {
         });
     }
     assert_eq!(recorder.stop().lost, 0);
+}
+
+/// A recording of the view of three pictures.
+fn make_view(folder: &Path) {
+    let header = ViewHeader {
+        format: VIEW_FORMAT.to_owned(),
+        version: VIEW_VERSION,
+        software: "a test".to_owned(),
+        started: "2026-03-01T12:00:00Z".parse().unwrap(),
+        camera: "a test's".to_owned(),
+        session: Some("00000000-0000-4000-8000-000000000002".to_owned()),
+        run: Some(1),
+        monotonic_ns: Some(0),
+        ended: None,
+    };
+    let mut writer = ViewWriter::create(&folder.join("view"), header).unwrap();
+    for number in 0..3 {
+        writer.add(number, number * 20_000_000, (8, 8), b"\xFF\xD8 a picture \xFF\xD9").unwrap();
+    }
+    writer.finish(Ended::Stopped).unwrap();
+}
+
+/// The moment at which certificates are looked at.
+fn now() -> Timestamp {
+    "2026-06-01T00:00:00Z".parse().unwrap()
+}
+
+/// The files of a local authority.
+fn make_authority(folder: &Path) {
+    Certificates::local(folder, IpAddr::V4(Ipv4Addr::LOCALHOST), now()).unwrap();
 }
 
 /// A certificate that it signed itself, and its key.

@@ -1,4 +1,4 @@
-//! What training and evaluation read: weights of a network, recorded scans and focal stacks.
+//! What training and evaluation read: weights of a network, recorded scans, focal stacks, and parts of an evaluation.
 
 use std::fmt::Write;
 use std::fs;
@@ -6,6 +6,7 @@ use std::path::Path;
 
 use parfocal::autofocus::weights;
 use parfocal::camera::recorded::{FORMAT, Header, Order, Recording, ScanFolder, Shot, VERSION};
+use parfocal::evaluation::shard::{Shard, merge};
 use parfocal::imaging::{GrayImage, PatchArea};
 use parfocal::lens::FocalPower;
 use parfocal::scans::recorded::{RecordedScan, evenly_spread};
@@ -38,6 +39,18 @@ pub fn network_weights(bytes: &[u8]) {
 /// Weights of the same network.
 pub fn whole_weights() -> Vec<Vec<u8>> {
     vec![weights::save(&network(), "a test").unwrap()]
+}
+
+/// The findings of an evaluation on a part of its scans, as another machine sends them, alone and with the other part.
+pub fn shard(bytes: &[u8]) {
+    let Ok(shard) = serde_json::from_slice::<Shard>(bytes) else { return };
+    let seed = serde_json::from_slice::<Shard>(include_bytes!("../../fuzz/corpus/shard/seed-2-of-2.json")).unwrap();
+    for shards in [vec![shard.clone()], vec![shard, seed]] {
+        let named = shards.into_iter().enumerate().map(|(number, shard)| (number.to_string(), shard)).collect();
+        if let Ok((report, _)) = merge(named) {
+            let _ = report.markdown();
+        }
+    }
 }
 
 /// A recorded scan, with one of its files replaced, is read whole or refused.

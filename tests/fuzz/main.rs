@@ -6,9 +6,14 @@
 //! The same targets can be run by libFuzzer, which follows the code that an input reaches: see `fuzz/`.
 
 mod backup;
+#[path = "../trial/fixture.rs"]
+#[allow(dead_code, reason = "the trial's tests use more of it")]
+mod fixture;
 mod folders;
 mod lessons;
 mod mutation;
+mod packages;
+mod server;
 mod targets;
 
 use std::fs;

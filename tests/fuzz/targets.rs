@@ -19,7 +19,7 @@ use parfocal::trial::protocol::Protocol;
 use parfocal::trial::remark::{Holding, NewAnswer, NewComment};
 use parfocal::trial::study::definition::Definition;
 
-use super::{ROOT, backup, folders, lessons};
+use super::{ROOT, backup, folders, lessons, packages, server};
 
 /// Something that takes bytes from outside.
 pub struct Target {
@@ -32,24 +32,32 @@ pub struct Target {
 }
 
 /// All of them.
-pub static TARGETS: [Target; 18] = [
+pub static TARGETS: [Target; 26] = [
+    Target { name: "authority", take: folders::authority, more_seeds: folders::authorities },
     Target { name: "backup", take: backup::backup, more_seeds: backup::pieces },
     Target { name: "calibration", take: calibration, more_seeds: Vec::new },
     Target { name: "calibration-table", take: folders::calibration_table, more_seeds: Vec::new },
     Target { name: "certificate", take: folders::certificate, more_seeds: folders::certificates },
+    Target { name: "door", take: server::door, more_seeds: server::knocks },
     Target { name: "export", take: folders::export, more_seeds: folders::export_files },
     Target { name: "json", take: json, more_seeds: Vec::new },
     Target { name: "keys", take: folders::keys, more_seeds: Vec::new },
     Target { name: "lens-dynamics", take: lens_dynamics, more_seeds: Vec::new },
+    Target { name: "live", take: server::live, more_seeds: server::messages },
     Target { name: "options", take: options, more_seeds: Vec::new },
     Target { name: "optotune", take: optotune, more_seeds: Vec::new },
+    Target { name: "package", take: packages::package, more_seeds: packages::packages },
     Target { name: "picture", take: picture, more_seeds: Vec::new },
     Target { name: "protocol", take: protocol, more_seeds: shipped_protocols },
     Target { name: "recipe", take: recipe, more_seeds: shipped_recipes },
     Target { name: "recording", take: folders::recording, more_seeds: folders::recording_files },
+    Target { name: "request", take: server::request, more_seeds: server::requests },
     Target { name: "scan", take: lessons::scan, more_seeds: lessons::scan_files },
+    Target { name: "shard", take: lessons::shard, more_seeds: Vec::new },
     Target { name: "stack", take: lessons::stack, more_seeds: lessons::stack_files },
     Target { name: "study", take: study, more_seeds: Vec::new },
+    Target { name: "view", take: folders::view, more_seeds: folders::view_files },
+    Target { name: "voice", take: server::voice, more_seeds: server::voices },
     Target { name: "weights", take: lessons::network_weights, more_seeds: lessons::whole_weights },
 ];
 

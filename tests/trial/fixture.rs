@@ -39,6 +39,7 @@ pub struct Trial {
     pub store: Store,
     pub conductor: Conductor,
     pub clock: Arc<ManualClock>,
+    pub control: ControlHandle,
     pub commands: mpsc::UnboundedReceiver<Command>,
     keys: ChaCha12Rng,
 }
@@ -79,7 +80,7 @@ impl Trial {
         let (control, commands) = listener();
         let conductor = Conductor::open(Parts {
             store: store.clone(),
-            control,
+            control: control.clone(),
             library: Library::load(protocols, &known()).unwrap(),
             registry: Registry::standard(),
             clock: clock.clone(),
@@ -91,7 +92,7 @@ impl Trial {
 
         conductor.add_participant(Role::Operator, PARTICIPANT).await.unwrap();
         let keys = ChaCha12Rng::seed_from_u64(seed + u64::try_from(store.run()).unwrap() * 1000);
-        Self { store, conductor, clock, commands, keys }
+        Self { store, conductor, clock, control, commands, keys }
     }
 
     pub fn key(&mut self) -> IdempotencyKey {

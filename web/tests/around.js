@@ -42,6 +42,28 @@ export function fakeStore() {
   };
 }
 
+/**
+ * What a device has on its disk; `full` makes every write fail.
+ *
+ * @template {{ id: string }} Thing
+ */
+export class FakeDisk {
+  full = false;
+  /** @type {Map<string, Thing>} */
+  kept = new Map();
+
+  all = async () => [...this.kept.values()];
+
+  put = async (/** @type {Thing} */ thing) => {
+    if (!this.full) this.kept.set(thing.id, thing);
+    return !this.full;
+  };
+
+  remove = async (/** @type {string} */ id) => {
+    this.kept.delete(id);
+  };
+}
+
 /** Both clocks of a page, and its timers. Nothing moves unless a test says so. */
 export class FakeTime {
   pageMillis = 1_000;

@@ -20,7 +20,7 @@ const PHASES = /** @type {const} */ ([
 const HEARD_AT = new Date(2026, 0, 5, 14, 1).getTime();
 
 const SURGEON = { known: true, missed: false, heardAt: HEARD_AT, unsent: false, unsaved: false };
-const OPERATOR = { known: true, missed: false, heardAt: HEARD_AT, working: true };
+const OPERATOR = { known: true, missed: false, heardAt: HEARD_AT, working: true, wrong: false };
 
 /** @param {Partial<Api.OperatorView>} told @returns {Api.OperatorView} */
 function operatorView(told) {
@@ -71,7 +71,9 @@ test("before the server has said what is under way, nothing is asked of anybody"
   assert.match(operatorWords({ ...OPERATOR, known: false, view: null }), /^Connecting/);
 });
 
-test("the operator sees to devices, consent and the disk first", () => {
+test("the operator sees to devices, checks, consent and the disk first", () => {
+  assert.match(operatorWords({ ...OPERATOR, wrong: true, view: null }), /Ready for a trial/);
+  assert.match(operatorWords({ ...OPERATOR, wrong: true, view: operatorView({}) }), /surgeon is looking/);
   assert.match(operatorWords({ ...OPERATOR, working: false, view: null }), /camera or the lens/);
   const ready = operatorView({ phase: "ready", consent_required: "3" });
   assert.match(operatorWords({ ...OPERATOR, view: ready }), /consent/);

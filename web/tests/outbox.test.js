@@ -4,18 +4,25 @@ import { test } from "node:test";
 import { Refused } from "../static/shared/api.js";
 import { Origins } from "../static/surgeon/origin.js";
 import { Outbox } from "../static/surgeon/outbox.js";
-import { countedIds, FakeServer, FakeTime, fakeStore, settle } from "./around.js";
+import { countedIds, FakeDisk, FakeServer, FakeTime, fakeStore, settle } from "./around.js";
 
 const fullDisk = () => new Refused(507, "the disk is full", true);
 const noNetwork = () => new TypeError("Failed to fetch");
 
-/** A page on `store`: an outbox, its server and its time. */
-function openPage(store = fakeStore(), time = new FakeTime(), newId = countedIds()) {
+/** @typedef {import("../static/surgeon/outbox.js").Entry} Entry */
+
+/** A page on `store` and `spare`: an outbox, its server and its time. */
+function openPage(
+  store = fakeStore(),
+  time = new FakeTime(),
+  newId = countedIds(),
+  spare = /** @type {FakeDisk<Entry>} */ (new FakeDisk()),
+) {
   const server = new FakeServer();
   const origins = new Origins(store, time, newId);
   const open = () =>
-    new Outbox({ store, origins, send: server.send, newId, wall: time.wall, later: time.later });
-  return { store, time, server, origins, newId, open };
+    new Outbox({ store, spare, origins, send: server.send, newId, wall: time.wall, later: time.later });
+  return { store, spare, time, server, origins, newId, open };
 }
 
 /** @param {FakeServer} server */
@@ -77,6 +84,59 @@ test("a reload sends what was left, in the order in which it was said", async ()
   await settle();
   assert.deepEqual(texts(later.server), ["one", "two"], "also with a clock that was set back between them");
   assert.equal(keptEntries(page.store), 0);
+});
+
+test("what a tablet forgot when it lost its power is sent from the spare copy, in order", async () => {
+  const page = openPage();
+  const first = page.open();
+  page.server.answers = [noNetwork(), noNetwork(), noNetwork()];
+  first.add("/comments", { session: "s", text: "one" });
+  first.add("/comments", { session: "s", text: "two" });
+  await settle();
+
+  // Only what was said some seconds before had come to the disk.
+  const forgotten = page.store.names("parfocal.outbox.").sort().at(-1) ?? "";
+  page.store.kept.delete(forgotten);
+  const later = openPage(page.store, page.time, page.newId, page.spare);
+  later.server.answers = [noNetwork()];
+  const outbox = later.open();
+  await outbox.ready;
+  await settle();
+  assert.equal(outbox.waiting.length, 2);
+  assert.equal(outbox.held("s"), 2);
+  assert.equal(keptEntries(page.store), 2, "another tab sees it again");
+
+  outbox.nudge();
+  await settle();
+  assert.deepEqual(texts(later.server).slice(-2), ["one", "two"]);
+  assert.equal(keptEntries(page.store), 0);
+  assert.equal(page.spare.kept.size, 0, "what is saved is taken off both copies");
+});
+
+test("what this page or another tab has in hand is not taken from the spare copy", async () => {
+  const page = openPage();
+  page.server.answers = Array.from({ length: 9 }, noNetwork);
+  const first = page.open();
+  first.add("/comments", { session: "s", text: "one" });
+  await settle();
+
+  const other = page.open();
+  first.add("/comments", { session: "s", text: "two" });
+  await other.ready;
+  await settle();
+  assert.equal(other.waiting.length, 1, "the first tab sends what was said in it since");
+});
+
+test("after a loss of power no number is given twice, so that the last answer is the last", () => {
+  const page = openPage();
+  page.origins.stamp();
+  const kept = new Map(page.store.kept);
+  const said = [page.origins.stamp(), page.origins.stamp()].map(({ sequence }) => sequence ?? 0);
+
+  page.store.kept.clear();
+  for (const [name, text] of kept) page.store.kept.set(name, text);
+  const next = openPage(page.store, page.time, page.newId).origins.stamp().sequence ?? 0;
+  assert.ok(next > Math.max(...said), `${next} after ${said}`);
 });
 
 test("what one entry meets does not stop the others, unless nobody answers", async () => {

@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { Grip } from "../static/surgeon/grip.js";
 import { loudness, MicrophoneTrouble, refusalWords } from "../static/surgeon/microphone.js";
 import { LIMIT_MS, Talk } from "../static/surgeon/talk.js";
 import { isTalkKey } from "../static/surgeon/talk_keys.js";
@@ -105,6 +106,58 @@ test("a pedal held for an hour ends after two minutes, told before, and talks ag
   await page.time.pass(3_600_000);
   page.talk.release();
   assert.equal(page.talk.state, "idle");
+});
+
+test("a pedal on which something lies does not keep a finger from talking", async () => {
+  const page = openPage();
+  const grip = new Grip(page.talk);
+  /** The microphone opens, and the recording begins. */
+  const record = async () => {
+    page.microphone.opened();
+    await settle();
+    page.microphone.heard?.started();
+  };
+
+  grip.press("key F13");
+  await record();
+  grip.press("pointer 1");
+  assert.equal(grip.release("pointer 1"), false, "one at a time");
+  await page.time.pass(LIMIT_MS);
+  page.microphone.heard?.stopped();
+  await settle();
+  grip.press("key F13");
+  assert.equal(page.talk.state, "idle", "it was never let go");
+
+  grip.press("pointer 1");
+  await record();
+  assert.equal(grip.release("key F13"), false);
+  assert.equal(page.talk.state, "recording", "the pedal ends nobody else's recording");
+  assert.equal(grip.release("pointer 1"), true);
+  page.microphone.heard?.stopped();
+  await settle();
+  assert.deepEqual(page.kept, ["begin 7", "1 120000 limit", "begin 7", "1 0 released"]);
+
+  grip.press("key F13");
+  await record();
+  assert.equal(page.talk.state, "recording", "let go and pressed anew, it talks");
+});
+
+test("something that comes in front of the page ends the recording, and the surgeon reads why", async () => {
+  const page = openPage();
+  const grip = new Grip(page.talk);
+  grip.press("pointer 1");
+  page.microphone.opened();
+  await settle();
+  page.microphone.heard?.started();
+  page.microphone.heard?.piece(SOUND);
+  grip.leave();
+  page.microphone.heard?.stopped();
+  await settle();
+  assert.equal(page.kept.at(-1), "2 0 left");
+  assert.match(page.talk.trouble, /in front of this page\. What you said until then is kept\. Press again/);
+
+  page.talk.press();
+  assert.equal(page.talk.trouble, "");
 });
 
 test("a microphone that is taken away ends the recording, and what was said is kept", async () => {

@@ -4,33 +4,19 @@ import { test } from "node:test";
 import { Refused } from "../static/shared/api.js";
 import { Origins } from "../static/surgeon/origin.js";
 import { VoiceOutbox } from "../static/surgeon/voice_outbox.js";
-import { countedIds, FakeTime, fakeStore, settle } from "./around.js";
+import { countedIds, FakeDisk, FakeTime, fakeStore, settle } from "./around.js";
 
 const PLACE = { session: "s", segment: "g", frame: 7, run: 1 };
 const noNetwork = () => new TypeError("Failed to fetch");
 
-/** What a device keeps of recordings; `full` makes every write fail. */
-function fakeVoiceStore() {
-  /** @type {Map<string, import("../static/surgeon/voice_outbox.js").Step>} */
-  const kept = new Map();
-  return {
-    full: false,
-    kept,
-    all: async () => [...kept.values()],
-    /** @param {import("../static/surgeon/voice_outbox.js").Step} step */
-    async put(step) {
-      if (!this.full) kept.set(step.id, step);
-      return !this.full;
-    },
-    /** @param {string} id */
-    async remove(id) {
-      kept.delete(id);
-    },
-  };
-}
+/** @typedef {import("../static/surgeon/voice_outbox.js").Step} Step */
 
 /** A page on `store`, before a server whose answers a test gives. */
-function openPage(store = fakeVoiceStore(), time = new FakeTime(), newId = countedIds()) {
+function openPage(
+  store = /** @type {FakeDisk<Step>} */ (new FakeDisk()),
+  time = new FakeTime(),
+  newId = countedIds(),
+) {
   /** What the server was sent, in short. @type {string[]} */
   const got = [];
   /** What it throws, in turn; null takes what was sent. @type {(Error | null)[]} */

@@ -5,6 +5,7 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpStream};
 use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::Arc;
 use std::time::Duration;
 
 use fantoccini::actions::{InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
@@ -15,7 +16,9 @@ use fantoccini::wd::{TimeoutConfiguration, WebDriverCompatibleCommand, WindowHan
 use fantoccini::{Client, ClientBuilder, Locator};
 use hyper_util::client::legacy::connect::HttpConnector;
 use reqwest::{Method, Url};
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::{Value, json};
+use tempfile::TempDir;
 
 use super::wait::until;
 
@@ -85,8 +88,26 @@ impl Driver {
         self.browser_as(&[], json!({ "webkit.webprefs.default_font_size": 32 })).await
     }
 
+    /// The browser of a tablet that has lost its power and is switched on again: `browser` ends at once, without writing
+    /// anything more, and another begins on what is on its disk.
+    pub async fn after_power_cut(&self, browser: &Browser, options: &[String]) -> Browser {
+        // Chromium's lock on its profile names its process.
+        let lock = std::fs::read_link(browser.profile.path().join("SingletonLock")).unwrap();
+        let process = lock.to_str().and_then(|lock| lock.rsplit('-').next()?.parse().ok()).and_then(Pid::from_raw);
+        let process = process.expect("the lock ends with a process's number");
+        kill_process(process, Signal::KILL).unwrap();
+        // A process that ended stays listed, as a zombie, until its parent has asked for it.
+        let stat = format!("/proc/{process}/stat");
+        let is_gone = || std::fs::read_to_string(&stat).map_or(true, |stat| stat.contains(") Z "));
+        until("the browser to be gone", || async { is_gone() }).await;
+        self.browser_on(Arc::clone(&browser.profile), options, json!({})).await
+    }
+
     async fn browser_as(&self, options: &[String], preferences: Value) -> Browser {
-        let profile = tempfile::tempdir().unwrap();
+        self.browser_on(Arc::new(tempfile::tempdir().unwrap()), options, preferences).await
+    }
+
+    async fn browser_on(&self, profile: Arc<TempDir>, options: &[String], preferences: Value) -> Browser {
         let mut arguments = ARGUMENTS.map(str::to_owned).to_vec();
         arguments.extend_from_slice(options);
         arguments.push(format!("--user-data-dir={}", profile.path().display()));
@@ -104,7 +125,7 @@ impl Driver {
 
         let timeouts = TimeoutConfiguration::new(Some(Duration::from_mins(1)), Some(Duration::from_mins(1)), None);
         client.update_timeouts(timeouts).await.unwrap();
-        Browser { client, _profile: profile }
+        Browser { client, profile }
     }
 }
 

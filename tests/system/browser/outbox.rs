@@ -11,6 +11,9 @@ const OUTBOX: &str = r#"
     localStorage.clear();
     const page = document.querySelector('script[src$="surgeon/page.js"]').src;
     const { openOutbox } = await import(page.replace("page.js", "device.js"));
+    const { diskStoreOn } = await import(page.replace("page.js", "disk_store.js"));
+    const spare = diskStoreOn(() => indexedDB, "parfocal.outbox");
+    for (const { id } of await spare.all()) await spare.remove(id);
     const posted = [];
     const bodies = [];
     const answers = [];

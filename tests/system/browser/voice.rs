@@ -316,6 +316,39 @@ async fn a_reload_while_speaking_keeps_all_but_the_last_moment() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_tablet_that_loses_its_power_in_the_middle_of_a_word_has_all_but_the_last_moment_on_its_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let driver = Driver::start();
+    let mut theatre = speaking(&driver, &folder).await;
+    let page = &theatre.surgeon;
+
+    // It has no network either, so that all of it is on the tablet alone.
+    page.cut_all().await;
+    key(page, "keyDown", "F13", false).await;
+    page.sees("#talk-label", "Recording 0:04").await;
+    theatre.write("sharper on the left").await;
+    page.type_into("#comment", "\u{e007}").await;
+    page.sees("#comment-state", "Saved here, not sent yet: 1 comment.").await;
+    assert_eq!(recorded(&theatre).await, []);
+
+    let tone = folder.path().join("tone.wav");
+    theatre.surgeon = driver.after_power_cut(&theatre.surgeon, &hears(&tone)).await;
+    let link = format!("http://{}/enter?key={}", theatre.proxy.address, theatre.server.key("surgeon"));
+    theatre.surgeon.open(&link).await;
+    theatre.sees_saved(2).await;
+    until("the pieces of the first three seconds", || async {
+        let kept = recorded(&theatre).await;
+        kept.first().is_some_and(|(_, count, ..)| *count >= 3)
+    })
+    .await;
+    all_pieces(&theatre).await;
+    assert!(recorded(&theatre).await[0].3 >= 2500, "of four seconds no more than two are lost");
+
+    open_session(&theatre).await;
+    theatre.operator.sees("#comment-list", "sharper on the left").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_microphone_that_is_refused_or_missing_is_said_in_a_sentence_and_typing_goes_on() {
     let driver = Driver::start();
     let device = ["--use-fake-device-for-media-stream".to_owned()];

@@ -80,7 +80,12 @@ pub fn request(server: &Server, role: &str, method: &str, path: &str, body: Byte
 
 /// A connection that speaks HTTP/2.
 pub async fn http2(server: &Server) -> http2::SendRequest<Full<Bytes>> {
-    let stream = Trust::of(server, &["h2", "http/1.1"]).connect(server.address, "127.0.0.1").await.unwrap();
+    http2_trusting(&Trust::of(server, &["h2", "http/1.1"]), server).await
+}
+
+/// The same of a client that trusts somebody else than the server's own authority.
+pub async fn http2_trusting(trust: &Trust, server: &Server) -> http2::SendRequest<Full<Bytes>> {
+    let stream = trust.connect(server.address, "127.0.0.1").await.unwrap();
     assert_eq!(protocol(&stream), "h2");
     let (sender, connection) = http2::handshake(TokioExecutor::new(), TokioIo::new(stream)).await.unwrap();
     tokio::spawn(connection);

@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
 use parfocal::clock::{Clock, SystemClock};
 use parfocal::tls::{Certificates, Names};
 use rcgen::{CertificateParams, KeyPair};
+use serde_json::Value;
 use time::OffsetDateTime;
 
-use super::client::Trust;
+use super::client::{Trust, get_as, http2_trusting, text};
 use crate::support::{Server, refused};
 
 const DAY: i64 = 24;
@@ -100,6 +102,40 @@ async fn files_renewed_while_the_server_runs_are_used_and_bad_ones_are_not() {
     site.renew(&["localhost"], -DAY, 300 * DAY);
     assert!(certificates.refresh(now, Names::of_machine).unwrap());
     assert!(certificates.until() > until);
+}
+
+#[tokio::test]
+async fn a_certificate_that_ends_while_the_server_runs_is_shown_until_its_files_are_renewed() {
+    let site = Site::new();
+    let now = SystemClock.wall();
+    let certificates = Certificates::given(site.certificate(), site.key(), now).unwrap();
+    let afterwards = now + SignedDuration::from_hours(31 * DAY);
+    assert!(certificates.until() < afterwards);
+    assert!(!certificates.refresh(afterwards, Names::of_machine).unwrap(), "the server goes on");
+
+    site.renew(&["localhost"], 30 * DAY, 300 * DAY);
+    assert!(certificates.refresh(afterwards, Names::of_machine).unwrap(), "and needs no restart");
+    assert!(certificates.until() > afterwards);
+}
+
+#[tokio::test]
+async fn the_operator_reads_when_the_certificate_ends() {
+    let site = Site::new();
+    site.renew(&["localhost", "127.0.0.1"], -DAY, 10 * DAY);
+    let arguments = site.arguments();
+    let server = Server::with(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+
+    let trust = Trust::in_authority(&site.certificate(), &["h2"]);
+    let request = get_as(&server, "operator", "/api/operator/checks");
+    let answer = http2_trusting(&trust, &server).await.send_request(request).await.unwrap();
+    let told: Value = serde_json::from_str(&text(answer).await).unwrap();
+    let findings = told["findings"].as_array().unwrap();
+    let finding = findings.iter().find(|finding| finding["subject"] == "certificate").unwrap();
+
+    let day = (SystemClock.wall() + SignedDuration::from_hours(10 * DAY)).to_zoned(TimeZone::system()).date();
+    assert_eq!(finding["verdict"], "advice");
+    assert!(finding["found"].as_str().unwrap().contains(&format!("ends on {day}")), "{finding}");
+    assert!(finding["advice"].as_str().unwrap().contains("within a minute"), "{finding}");
 }
 
 #[test]

@@ -10,6 +10,9 @@ import { heading, passed, shown, sorted, summary } from "./checks_words.js";
 
 const button = byId("check-again", HTMLButtonElement);
 
+/** Hears whether something is to be put right before a trial. @type {(wrong: boolean) => void} */
+let told = () => {};
+
 /** @param {Finding} finding */
 function line(finding) {
   const { mark, words, level } = shown(finding);
@@ -36,6 +39,7 @@ function draw(findings) {
   redraw(byId("checks-well"), well.map(line));
   setText(byId("checks-passed"), passed(well.length));
   byId("checks-details").hidden = well.length === 0;
+  told(open.some(({ verdict }) => verdict === "wrong"));
 }
 
 async function check() {
@@ -52,8 +56,13 @@ async function check() {
   }
 }
 
-/** Checks now, and when the operator asks for it. */
-export function followChecks() {
+/**
+ * Checks now, and when the operator asks for it.
+ *
+ * @param {(wrong: boolean) => void} found hears whether something is to be put right before a trial
+ */
+export function followChecks(found) {
+  told = found;
   button.addEventListener("click", check);
   check();
 }

@@ -15,19 +15,21 @@ import { isOver, lacksConsent } from "./session_words.js";
  * @property {boolean} missed whether the server is not heard
  * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
  * @property {boolean} working whether camera and lens work, as far as is known
+ * @property {boolean} wrong whether the checks found something to put right before a trial
  */
 
 /** @param {Facts} facts */
-export function nowWords({ view, known, missed, heardAt, working }) {
+export function nowWords({ view, known, missed, heardAt, working, wrong }) {
   if (missed) {
     const since = heardAt === null ? "" : ` since ${minuteText(heardAt)}`;
     return `The server cannot be reached${since}. Check that it runs and that this device is on its network.`;
   }
   if (!known) return "Connecting to the server…";
   if (!working) return "See to the camera or the lens first. The warning below says what is wrong.";
-  return view === null
-    ? "Choose a participant and a protocol, then prepare the session."
-    : sessionWords(view);
+  if (view !== null) return sessionWords(view);
+  return wrong
+    ? "Put right first what the card “Ready for a trial?” shows with a cross."
+    : "Choose a participant and a protocol, then prepare the session.";
 }
 
 /** @param {View} view */

@@ -33,6 +33,8 @@ let session = null;
 let status = null;
 let framesWithoutBelief = BELIEF_FRAMES;
 
+/** Whether the checks found something to put right before a trial. */
+let wrong = false;
 /** Whether the server has said what is under way. */
 let known = false;
 const contact = new Contact({ page: () => performance.now(), wall: () => Date.now() }, null);
@@ -60,6 +62,7 @@ function drawNow() {
     missed: contact.isMissed,
     heardAt: contact.heardAt,
     working: status === null || (status.camera.working && status.lens.working),
+    wrong,
   };
   setText(byId("now"), nowWords(facts));
 }
@@ -110,7 +113,10 @@ followOverlayBoxes((name, on) => {
 
 offerLink();
 document.addEventListener("signed-in", () => followLink(session));
-followChecks();
+followChecks((found) => {
+  wrong = found;
+  drawNow();
+});
 followRecording();
 setInterval(() => {
   sessionCard.drawTime();

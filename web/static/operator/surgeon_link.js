@@ -6,6 +6,9 @@ import { tellTrouble } from "../shared/trouble.js";
 
 const TOLD_MS = 2000;
 
+/** The server may have another address by then, as after a change of the network. */
+const ASK_AGAIN_MS = 60_000;
+
 export function offerLink() {
   const button = byId("copy-link");
   const link = byId("surgeon-link", HTMLInputElement);
@@ -21,6 +24,27 @@ export function offerLink() {
     setText(button, "Copied");
     setTimeout(() => setText(button, "Copy link"), TOLD_MS);
   };
+  setInterval(askAgain, ASK_AGAIN_MS);
+}
+
+/** Shows the link by the server's present address. */
+async function askAgain() {
+  if (shownFor === null) return;
+  try {
+    draw(await get("/api/operator/surgeon-link"));
+  } catch {
+    // The one that is shown stays until the next time.
+  }
+}
+
+/** @param {Api.Schemas["SurgeonLink"]} told */
+function draw({ link, qr }) {
+  const field = byId("surgeon-link", HTMLInputElement);
+  // Somebody may be copying the one that is shown.
+  if (field.value === link) return;
+  field.value = link;
+  // The server's own picture, made from the link alone.
+  byId("qr").innerHTML = qr;
 }
 
 /** What the link was last asked for. @type {string | null} */
@@ -43,10 +67,7 @@ export function followLink(session) {
 async function showLink(ofSession) {
   const trouble = byId("link-trouble");
   try {
-    const { link, qr } = await get("/api/operator/surgeon-link");
-    byId("surgeon-link", HTMLInputElement).value = link;
-    // The server's own picture, made from the link alone.
-    byId("qr").innerHTML = qr;
+    draw(await get("/api/operator/surgeon-link"));
     setText(trouble, "");
   } catch (error) {
     // Asked for again when the session changes, or somebody has signed in.

@@ -3,13 +3,13 @@
 import { keep, keepAudio } from "../shared/api.js";
 import { storeOn } from "../shared/storage.js";
 import { uuid } from "../shared/uuid.js";
+import { diskStoreOn } from "./disk_store.js";
 import { Drafts } from "./drafts.js";
 import { LastView } from "./last_view.js";
 import { Origins } from "./origin.js";
 import { Outbox } from "./outbox.js";
 import { storageAdvice } from "./storage_words.js";
 import { VoiceOutbox } from "./voice_outbox.js";
-import { voiceStoreOn } from "./voice_store.js";
 
 const TAB = "parfocal.tab";
 
@@ -38,7 +38,9 @@ export function later(run, ms) {
 
 /** An outbox that follows this browser's network and its other tabs. */
 export function openOutbox() {
-  const outbox = new Outbox({ store, origins, send: keep, newId: uuid, wall: clock.wall, later });
+  /** @type {import("./disk_store.js").DiskStore<import("./outbox.js").Entry>} */
+  const spare = diskStoreOn(() => indexedDB, "parfocal.outbox");
+  const outbox = new Outbox({ store, spare, origins, send: keep, newId: uuid, wall: clock.wall, later });
 
   addEventListener("storage", ({ key, newValue }) => key && newValue === null && outbox.doneElsewhere(key));
   addEventListener("online", () => outbox.nudge());
@@ -52,7 +54,7 @@ export function openOutbox() {
 /** An outbox for what is said aloud, which follows this browser's network. */
 export function openVoiceOutbox() {
   const outbox = new VoiceOutbox({
-    store: voiceStoreOn(() => indexedDB),
+    store: diskStoreOn(() => indexedDB, "parfocal.voice"),
     origins,
     send: keep,
     sendAudio: keepAudio,

@@ -54,7 +54,7 @@ export function noticeDialog(box, accept) {
     setText(byId("change-title"), `Setting ${state.setting} of ${state.settings}`);
     setText(
       byId("change-what"),
-      `${change} Look around as you would in surgery, and write down what you notice.`,
+      `${change} Look around as you would in surgery, and say or write what you notice.`,
     );
     byId("change-practice").hidden = !state.practice;
     ask(TAP);

@@ -6,6 +6,12 @@ const DEVICE = "parfocal.device";
 const SEQUENCE = "parfocal.sequence";
 
 /**
+ * A tablet that loses its power forgets the numbers that it gave in its last seconds. Each load of the
+ * page leaves out so many, so that none is given twice.
+ */
+const LEFT_OUT = 1000;
+
+/**
  * The clocks of a hidden page may differ by this much. By more, the device slept, or its clock was
  * set.
  */
@@ -84,7 +90,9 @@ export class Origins {
   }
 
   #next() {
-    this.#latest = Math.max(this.#latest, Number(this.#store.read(SEQUENCE)) || 0) + 1;
+    const known = Number(this.#store.read(SEQUENCE)) || 0;
+    const isFirst = this.#latest === 0 && known > 0;
+    this.#latest = Math.max(this.#latest, known) + (isFirst ? LEFT_OUT : 1);
     this.#store.write(SEQUENCE, String(this.#latest));
     return this.#latest;
   }

@@ -1,5 +1,7 @@
 // Keeps what was said until the server says that it is saved. Every entry is first written to this
-// device, under a key of its own, so that a reload, a Wi-Fi gap or a second tab loses nothing. The
+// device, under a key of its own, so that a reload, a Wi-Fi gap or a second tab loses nothing. Browsers
+// bring localStorage to the disk some seconds later; a spare copy is there at once, so that a tablet
+// that loses its power loses nothing either. The
 // entry's idempotency key makes sending it twice harmless, and its origin makes the order of
 // sending harmless. What the server refuses stays on this device too, and is tried again when the
 // page is next opened.
@@ -39,7 +41,8 @@ const LONGEST_WAIT_MS = 8000;
 
 /**
  * @typedef {object} Surroundings
- * @property {import("../shared/storage.js").Store} store
+ * @property {import("../shared/storage.js").Store} store at hand at once, in every tab
+ * @property {import("./disk_store.js").DiskStore<Entry>} spare a copy that is on the disk itself
  * @property {import("./origin.js").Origins} origins
  * @property {(path: string, body: unknown) => Promise<void>} send resolves once the server has saved it
  * @property {() => string} newId
@@ -55,6 +58,9 @@ export class Outbox {
    */
   trouble = null;
 
+  /** Settles once what only the spare copy has is here too. @type {Promise<void>} */
+  ready;
+
   #around;
   /** @type {Map<string, Entry>} */
   #entries = new Map();
@@ -66,13 +72,31 @@ export class Outbox {
   #wait = FIRST_WAIT_MS;
   #cancel = () => {};
   #latest = 0;
+  /** What this page has taken off the device, by id. @type {Set<string>} */
+  #done = new Set();
 
   /** @param {Surroundings} around */
   constructor(around) {
     this.#around = around;
-    for (const entry of this.#stored()) {
-      this.#entries.set(entry.id, entry);
-      this.#latest = Math.max(this.#latest, Number.parseInt(entry.id, 10) || 0);
+    for (const entry of this.#stored()) this.#take(entry);
+    this.ready = this.#restore();
+    this.nudge();
+  }
+
+  /** @param {Entry} entry */
+  #take(entry) {
+    this.#entries.set(entry.id, entry);
+    this.#latest = Math.max(this.#latest, Number.parseInt(entry.id, 10) || 0);
+  }
+
+  /** Takes what the device forgot when it lost its power. What was sent by then is known by its key. */
+  async #restore() {
+    for (const entry of await this.#around.spare.all()) {
+      const isElsewhere = this.#around.store.read(PREFIX + entry.id) !== null;
+      if (isElsewhere || this.#done.has(entry.id) || this.#entries.has(entry.id)) continue;
+      this.#take(entry);
+      entry.stored = this.#store(entry);
+      this.#tell(entry, "saving");
     }
     this.nudge();
   }
@@ -299,7 +323,9 @@ export class Outbox {
   forget(entry) {
     this.#entries.delete(entry.id);
     this.#refused.delete(entry.id);
+    this.#done.add(entry.id);
     this.#around.store.remove(PREFIX + entry.id);
+    this.#around.spare.remove(entry.id);
   }
 
   /**
@@ -316,6 +342,7 @@ export class Outbox {
 
   /** @param {Entry} entry */
   #store(entry) {
+    this.#around.spare.put({ ...entry, sending: false });
     return this.#around.store.write(PREFIX + entry.id, JSON.stringify(entry));
   }
 

@@ -241,7 +241,7 @@ function drawPanel() {
 function panelContent() {
   if (!known) return null;
   if (!state) {
-    const text = "The view is live. When the operator starts a trial, it begins here.";
+    const text = "You can look around. When the operator starts a trial, it begins here.";
     return card("aside", "No trial is under way", text);
   }
   if (state.paused && !isEnded(state)) return pausedCard(state);

@@ -186,7 +186,13 @@ export class Talk {
     held.ending = ending;
     held.cancel();
     if (ending === "limit") {
-      this.trouble = "The recording ended after two minutes. What you said is kept. Press again to go on.";
+      this.trouble =
+        "The recording ended after two minutes. What you said is kept. Let go and press again to go on.";
+    }
+    if (ending === "left" && held.comment !== null) {
+      this.trouble =
+        "The recording ended because something else came in front of this page. " +
+        "What you said until then is kept. Press again to go on.";
     }
     if (held.comment === null)
       this.trouble ||= "Nothing was recorded. Hold until it says “Recording”, then speak.";

@@ -1,6 +1,7 @@
 // The button that is held to talk, and the keys that do the same.
 
 import { byId, setText } from "../shared/dom.js";
+import { Grip } from "./grip.js";
 import { whyNoMicrophone } from "./microphone.js";
 import { focusOn, isTalkKey } from "./talk_keys.js";
 
@@ -15,9 +16,8 @@ export function talkButton(talk, outbox, allowed) {
   const button = byId("talk", HTMLButtonElement);
   const meter = byId("talk-level");
   const why = whyNoMicrophone(allowed);
+  const grip = new Grip(talk);
   let open = false;
-  /** What is held: a pointer, or a key. @type {string | null} */
-  let held = null;
   let drawing = 0;
 
   /** @param {Api.SurgeonView | null} state */
@@ -60,22 +60,11 @@ export function talkButton(talk, outbox, allowed) {
 
   /** @param {string} by */
   function press(by) {
-    if (!open || why !== "" || held !== null) return;
-    if (talk.press()) held = by;
+    if (open && why === "") grip.press(by);
   }
 
-  /** @param {string} by */
-  function release(by) {
-    if (held !== by) return;
-    held = null;
-    talk.release();
-  }
-
-  /** The page no longer hears whether something is held. */
   function leave() {
-    if (held === null) return;
-    held = null;
-    talk.release("left");
+    grip.leave();
   }
 
   button.addEventListener("pointerdown", (event) => {
@@ -88,7 +77,7 @@ export function talkButton(talk, outbox, allowed) {
   // Wherever the finger is by then.
   for (const end of ["pointerup", "pointercancel"]) {
     addEventListener(end, (event) => {
-      if (event instanceof PointerEvent) release(`pointer ${event.pointerId}`);
+      if (event instanceof PointerEvent) grip.release(`pointer ${event.pointerId}`);
     });
   }
   // A long press is not a wish for a menu.
@@ -103,10 +92,7 @@ export function talkButton(talk, outbox, allowed) {
     if (!event.repeat) press(`key ${event.code || event.key}`);
   });
   addEventListener("keyup", (event) => {
-    const by = `key ${event.code || event.key}`;
-    if (held !== by) return;
-    event.preventDefault();
-    release(by);
+    if (grip.release(`key ${event.code || event.key}`)) event.preventDefault();
   });
   addEventListener("blur", leave);
   addEventListener("pagehide", leave);

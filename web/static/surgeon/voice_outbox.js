@@ -45,7 +45,7 @@ const LONGEST_WAIT_MS = 8000;
 
 /**
  * @typedef {object} Surroundings
- * @property {import("./voice_store.js").VoiceStore} store
+ * @property {import("./disk_store.js").DiskStore<Step>} store
  * @property {import("./origin.js").Origins} origins
  * @property {(path: string, body: unknown) => Promise<void>} send sends JSON; resolves once the server has saved it
  * @property {(path: string, audio: ArrayBuffer, type: string) => Promise<void>} sendAudio

@@ -1,28 +1,32 @@
-// What this device keeps of recordings until the server has them: IndexedDB, because sound is too
-// much for localStorage. Where a browser has none, as in some private windows, nothing is kept over
-// a reload, and the page says so.
+// What this device keeps in IndexedDB, which can say when something is on the disk itself: a tablet
+// that loses its power has it still. Where a browser has none, as in some private windows, nothing is
+// kept, and the page says so.
 
-const NAME = "parfocal.voice";
-const STEPS = "steps";
+const KEPT = "steps";
 
 /**
- * Where steps of recordings are kept, by their ids.
+ * Where things are kept by their ids.
  *
- * @typedef {object} VoiceStore
- * @property {() => Promise<import("./voice_outbox.js").Step[]>} all
- * @property {(step: import("./voice_outbox.js").Step) => Promise<boolean>} put whether it is kept
+ * @template {{ id: string }} Thing
+ * @typedef {object} DiskStore
+ * @property {() => Promise<Thing[]>} all
+ * @property {(thing: Thing) => Promise<boolean>} put whether it is on the disk
  * @property {(id: string) => Promise<void>} remove
  */
 
 /**
+ * A store of this name.
+ *
+ * @template {{ id: string }} Thing
  * @param {() => IDBFactory} factory may throw where storage is switched off
- * @returns {VoiceStore}
+ * @param {string} name
+ * @returns {DiskStore<Thing>}
  */
-export function voiceStoreOn(factory) {
+export function diskStoreOn(factory, name) {
   /** @type {Promise<IDBDatabase> | null} */
   let opening = null;
   const open = () => {
-    opening ??= openDatabase(factory).catch((error) => {
+    opening ??= openDatabase(factory, name).catch((error) => {
       opening = null;
       throw error;
     });
@@ -33,17 +37,18 @@ export function voiceStoreOn(factory) {
     async all() {
       try {
         const database = await open();
-        return await done(database.transaction(STEPS).objectStore(STEPS).getAll());
+        return await done(database.transaction(KEPT).objectStore(KEPT).getAll());
       } catch {
         return [];
       }
     },
 
-    async put(step) {
+    async put(thing) {
       try {
         const database = await open();
-        const transaction = database.transaction(STEPS, "readwrite");
-        transaction.objectStore(STEPS).put(step);
+        // By default browsers leave it to the system when it reaches the disk.
+        const transaction = database.transaction(KEPT, "readwrite", { durability: "strict" });
+        transaction.objectStore(KEPT).put(thing);
         await ended(transaction);
         return true;
       } catch {
@@ -54,8 +59,8 @@ export function voiceStoreOn(factory) {
     async remove(id) {
       try {
         const database = await open();
-        const transaction = database.transaction(STEPS, "readwrite");
-        transaction.objectStore(STEPS).delete(id);
+        const transaction = database.transaction(KEPT, "readwrite");
+        transaction.objectStore(KEPT).delete(id);
         await ended(transaction);
       } catch {
         // Sent again after a reload, it is known by its key.
@@ -66,11 +71,12 @@ export function voiceStoreOn(factory) {
 
 /**
  * @param {() => IDBFactory} factory
+ * @param {string} name
  * @returns {Promise<IDBDatabase>}
  */
-async function openDatabase(factory) {
-  const request = factory().open(NAME, 1);
-  request.onupgradeneeded = () => request.result.createObjectStore(STEPS, { keyPath: "id" });
+async function openDatabase(factory, name) {
+  const request = factory().open(name, 1);
+  request.onupgradeneeded = () => request.result.createObjectStore(KEPT, { keyPath: "id" });
   return done(request);
 }
 

@@ -1,0 +1,418 @@
+//! A whole server, as bytes from the network reach it: requests, messages of the live view, pieces of voice, and what
+//! comes to the port of an encrypted server. Each thread has its own, on a folder of its own, in a session that asks for
+//! voice. It is made anew now and then, so that what earlier inputs changed does not add up.
+
+use std::cell::{Cell, RefCell};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::sync::{Arc, Once};
+use std::time::Duration;
+
+use parfocal::clock::Clock;
+use parfocal::health::HealthWatch;
+use parfocal::http::keys::Keys;
+use parfocal::http::{self, App, Equipment, Metrics, OpenTablets, Reach};
+use parfocal::ids::{IdempotencyKey, SegmentId, SessionId};
+use parfocal::imaging::{Calibration, Developer, Size};
+use parfocal::live;
+use parfocal::playback::Player;
+use parfocal::recorder::{Parts, Recordings};
+use parfocal::study_export::StudyExports;
+use parfocal::tls::Certificates;
+use parfocal::trial::action::Action;
+use parfocal::trial::remark::Said;
+use tempfile::TempDir;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::runtime::{Builder, Runtime};
+use tokio::sync::watch;
+use tokio::time::timeout;
+
+use super::fixture::Trial;
+
+/// Inputs that one server takes.
+const LIFE: u32 = 2000;
+
+/// An answer that has not ended by then waits for more of the request, which is then ended.
+const PATIENCE: Duration = Duration::from_millis(5);
+
+/// No connection lasts longer once the other end has said that nothing more comes.
+const LONGEST: Duration = Duration::from_secs(20);
+
+/// The roles' keys, the same in every server, so that seeds are let in.
+const KEYS: &str = include_str!("../../fuzz/corpus/keys/seed.toml");
+const SURGEON: &str = "0123456789abcdef0123456789abcdef";
+const OPERATOR: &str = "123456789abcdef0123456789abcdef0";
+const RESEARCHER: &str = "23456789abcdef0123456789abcdef01";
+
+const PROTOCOL: &str = include_str!("../system/browser/spoken.toml");
+
+thread_local! {
+    static SERVER: RefCell<Option<Server>> = const { RefCell::new(None) };
+    /// Panics on this thread, those included that the server catches.
+    static PANICS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// A server, and where it is reached.
+struct Server {
+    runtime: Runtime,
+    /// In the clear, every page.
+    open: SocketAddr,
+    /// Encrypted; in the clear, what leads there.
+    encrypted: SocketAddr,
+    /// Inputs that it has taken.
+    taken: u32,
+    trial: Trial,
+    /// Ends it when dropped.
+    _end: watch::Sender<bool>,
+    _folder: TempDir,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        // Ends the threads that wait for pictures.
+        self.trial.control.frames.close();
+    }
+}
+
+/// What seeds name: the same in every server.
+#[derive(Clone, Copy)]
+struct Names {
+    session: SessionId,
+    segment: SegmentId,
+    comment: IdempotencyKey,
+}
+
+/// Bytes to the port of an encrypted server: a handshake, or a request in the clear.
+pub fn door(bytes: &[u8]) {
+    ask(|server| server.encrypted, bytes);
+}
+
+/// Requests that are led to the encrypted pages or refused. A handshake of TLS is in the folder of seeds.
+pub fn knocks() -> Vec<Vec<u8>> {
+    let requests = [
+        "GET / HTTP/1.1\r\nHost: 10.0.0.5:8080\r\n\r\n",
+        "GET /surgeon?a=%20b HTTP/1.1\r\nHost: exoscope.local\r\nAccept: text/html\r\n\r\n",
+        "GET /trust HTTP/1.1\r\nHost: [fd00::7]:8080\r\nAccept: text/html\r\n\r\n",
+        "GET /trust/authority.mobileconfig HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        "GET http://elsewhere.example/trust/check HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        "POST /api/sign-in HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\n{}",
+        "HEAD /static/0/shared/api.js HTTP/1.0\r\n\r\n",
+        "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+    ];
+    requests.map(|request| request.as_bytes().to_vec()).to_vec()
+}
+
+/// Bytes to a server's port in the clear: requests to every page, by everyone.
+pub fn request(bytes: &[u8]) {
+    ask(|server| server.open, bytes);
+}
+
+/// Requests as pages and programs make them.
+pub fn requests() -> Vec<Vec<u8>> {
+    let Names { session, segment, comment } = names();
+    let (session, segment, comment) = (session.to_string(), segment.to_string(), comment.0.to_string());
+
+    let reads = [
+        (SURGEON, "/surgeon".to_owned()),
+        (SURGEON, "/api/surgeon/session".to_owned()),
+        (SURGEON, format!("/enter?key={SURGEON}")),
+        (OPERATOR, "/operator".to_owned()),
+        (OPERATOR, "/api/operator/surgeon-link".to_owned()),
+        (OPERATOR, "/api/operator/choices".to_owned()),
+        (RESEARCHER, "/researcher".to_owned()),
+        (RESEARCHER, format!("/researcher/sessions/{session}")),
+        (RESEARCHER, format!("/api/researcher/sessions/{session}/timeline")),
+        (RESEARCHER, format!("/api/researcher/sessions/{session}/voice/{comment}")),
+        (RESEARCHER, format!("/api/researcher/sessions/{session}/recordings/view/frames/3?fine=true")),
+        (RESEARCHER, "/sign-in?next=/researcher/studies".to_owned()),
+        (RESEARCHER, "/metrics".to_owned()),
+    ];
+    let reads = reads.into_iter().map(|(key, path)| {
+        let more = "Accept: text/html\r\nRange: bytes=1-3\r\nCookie: parfocal-surgeon=a; parfocal-account=b\r\n";
+        format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {key}\r\n{more}\r\n").into_bytes()
+    });
+
+    let said = |kind: &str, text: &str| {
+        format!(
+            r#"{{"key":"{}","session":"{session}","segment":"{segment}","frame":7,"run":1,"device":"{comment}",
+            "sequence":1,"client_millis":1772355600000,"waited_millis":12,"kind":"{kind}"{text}}}"#,
+            uuid::Uuid::from_u128(7)
+        )
+    };
+    let writes = [
+        (SURGEON, "surgeon/comments", said("text", r#","text":"sharp""#)),
+        (SURGEON, "surgeon/comments", said("voice", "")),
+        (SURGEON, "surgeon/holding", format!(r#"{{"session":"{session}","device":"{comment}","holding":2}}"#)),
+        (SURGEON, "surgeon/actions", act(&session, &format!(r#""finish-segment","segment":"{segment}""#))),
+        (OPERATOR, "operator/actions", act(&session, r#""pause","reason":"the patient""#)),
+        (OPERATOR, "operator/actions", act(&session, r#""resume""#)),
+        (OPERATOR, "operator/focus", r#"{"focal_power":0.5}"#.to_owned()),
+        (OPERATOR, "operator/participants", r#"{"code":"S-77"}"#.to_owned()),
+        (OPERATOR, "operator/sessions", r#"{"participant":"S-01","protocol":"practice"}"#.to_owned()),
+        (OPERATOR, "operator/camera", r#"{"setting":"gain","value":2.0}"#.to_owned()),
+        (OPERATOR, "sign-in", r#"{"account":"lead","passphrase":"four words and a number 7"}"#.to_owned()),
+        (
+            OPERATOR,
+            "operator/consents",
+            format!(
+                r#"{{"session":"{session}","version":"3","date":"2026-03-01","obtained_by":"AB","medium":"paper"}}"#
+            ),
+        ),
+        (RESEARCHER, "researcher/studies", r#"{"definition":"name = \"a\"","reason":"planned"}"#.to_owned()),
+    ];
+    let mut writes: Vec<_> = writes.iter().map(|(key, path, body)| post(key, path, "application/json", body)).collect();
+    let correction = r#"{"field":"participant","old":"S-01","new":"S-02","reason":"a misspelled code"}"#;
+    let corrections = format!("researcher/sessions/{session}/corrections");
+    writes.push(post(RESEARCHER, &corrections, "application/json", correction));
+
+    reads.chain(writes).chain(voices().iter().map(|voice| piece(voice))).collect()
+}
+
+/// A piece of a recording: the end of its address, its type, and then the sound, on a line each.
+pub fn voice(bytes: &[u8]) {
+    ask(|server| server.open, &piece(bytes));
+}
+
+/// Pieces of a recording, first and last.
+pub fn voices() -> Vec<Vec<u8>> {
+    let Names { session, comment, .. } = names();
+    let address = format!("{}/1?session={session}&through_ms=1000", comment.0);
+    let last = format!("{}/2?session={session}&through_ms=1200&ended=released", comment.0);
+    vec![
+        [format!("{address}\naudio/webm;codecs=opus\n").as_bytes(), b"\x1a\x45\xdf\xa3 sound"].concat(),
+        format!("{address}\naudio/mp4; codecs=\"mp4a.40.2\"\nsound").into_bytes(),
+        format!("{last}\naudio/webm;codecs=opus\n").into_bytes(),
+    ]
+}
+
+/// Messages of a page to the live view, one a line: the line's first byte says of what kind.
+pub fn live(bytes: &[u8]) {
+    let mut sent = upgrade();
+    for line in bytes.split(|byte| *byte == b'\n') {
+        let Some((kind, message)) = line.split_first() else { continue };
+        // Text, binary, ping, pong, and now and then whatever the byte says.
+        let opcode = match kind {
+            b't' => 0x81,
+            b'b' => 0x82,
+            b'?' => 0x89,
+            b'!' => 0x8A,
+            other => *other,
+        };
+        sent.extend(frame(opcode, message));
+    }
+    sent.extend(frame(0x88, &1000_u16.to_be_bytes()));
+    ask(|server| server.open, &sent);
+}
+
+/// What pages say.
+pub fn messages() -> Vec<Vec<u8>> {
+    let all = [
+        r#"t{"type":"drawn","frame":1}"#,
+        r#"t{"type":"screen","width":2048}"#,
+        r#"t{"type":"visible","visible":false}"#,
+        r#"t{"type":"visible","visible":true}"#,
+        "?are you there",
+        "bbytes",
+    ];
+    let apart = all.iter().map(|message| message.as_bytes().to_vec());
+    apart.chain([all[..4].join("\n").into_bytes()]).collect()
+}
+
+/// The request that makes a connection a WebSocket.
+fn upgrade() -> Vec<u8> {
+    let key = format!("Authorization: Bearer {SURGEON}\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n");
+    let what = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n";
+    format!("GET /live?role=surgeon HTTP/1.1\r\nHost: localhost\r\n{key}{what}\r\n").into_bytes()
+}
+
+/// A frame of a WebSocket (RFC 6455, 5.2) from a client, whose mask changes nothing.
+fn frame(opcode: u8, message: &[u8]) -> Vec<u8> {
+    let mut frame = vec![opcode];
+    match u16::try_from(message.len()) {
+        Ok(length @ 0..126) => frame.push(0x80 | length as u8),
+        Ok(length) => {
+            frame.push(0x80 | 126);
+            frame.extend(length.to_be_bytes());
+        }
+        Err(_) => {
+            frame.push(0x80 | 127);
+            frame.extend((message.len() as u64).to_be_bytes());
+        }
+    }
+    frame.extend([0; 4]);
+    frame.extend(message);
+    frame
+}
+
+fn act(session: &str, action: &str) -> String {
+    format!(r#"{{"session":"{session}","action":{action}}}"#)
+}
+
+fn post(key: &str, path: &str, media_type: &str, body: impl AsRef<[u8]>) -> Vec<u8> {
+    let body = body.as_ref();
+    let head = format!(
+        "POST /api/{path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {key}\r\nContent-Type: {media_type}\r\n\
+         Content-Length: {}\r\n\r\n",
+        body.len()
+    );
+    [head.as_bytes(), body].concat()
+}
+
+/// The request that sends a piece of a recording, of three lines.
+fn piece(bytes: &[u8]) -> Vec<u8> {
+    let mut lines = bytes.splitn(3, |byte| *byte == b'\n');
+    let [address, media_type, sound] = [(); 3].map(|()| lines.next().unwrap_or_default());
+    let [address, media_type] = [address, media_type].map(String::from_utf8_lossy);
+    post(SURGEON, &format!("surgeon/voice/{address}"), &media_type, sound)
+}
+
+/// What the seeds name, as every server has it.
+fn names() -> Names {
+    let folder = tempfile::tempdir().unwrap();
+    runtime().block_on(async { begin(&folder).await.1 })
+}
+
+/// Sends `bytes` to the server of this thread. Panics where that made anything in the server panic, or the server
+/// says that it failed.
+fn ask(address: impl FnOnce(&Server) -> SocketAddr, bytes: &[u8]) {
+    let mut kept = SERVER.take().filter(|server| server.taken < LIFE).unwrap_or_else(start);
+    kept.taken += 1;
+    let before = PANICS.get();
+    let address = address(&kept);
+    let answer = kept.runtime.block_on(exchange(address, bytes));
+
+    let panics = PANICS.get() - before;
+    // Dropped where the input did harm: the next one meets a new server.
+    assert!(panics == 0, "the server panicked");
+    let failed = b"HTTP/1.1 500";
+    assert!(!answer.windows(failed.len()).any(|part| part == failed), "{}", String::from_utf8_lossy(&answer));
+    SERVER.set(Some(kept));
+}
+
+/// Sends `bytes` on a connection of their own, and reads what comes back until its end.
+async fn exchange(address: SocketAddr, bytes: &[u8]) -> Vec<u8> {
+    let mut stream = TcpStream::connect(address).await.unwrap();
+    // A million connections would otherwise use up the ports of this machine, which stay taken for a while.
+    stream.set_zero_linger().unwrap();
+
+    // A server may end the connection before it has read everything.
+    let _ = stream.write_all(bytes).await;
+    let mut answer = Vec::new();
+    if timeout(PATIENCE, stream.read_to_end(&mut answer)).await.is_err() {
+        let _ = stream.shutdown().await;
+        let ended = timeout(LONGEST, stream.read_to_end(&mut answer)).await;
+        assert!(ended.is_ok(), "the connection never ended");
+    }
+    answer
+}
+
+fn runtime() -> Runtime {
+    Builder::new_current_thread().enable_all().build().unwrap()
+}
+
+/// A trial on `folder` in its first setting, of which the surgeon has begun to speak.
+async fn begin(folder: &TempDir) -> (Trial, Names) {
+    let protocols = folder.path().join("protocols");
+    std::fs::create_dir(&protocols).unwrap();
+    std::fs::write(protocols.join("spoken.toml"), PROTOCOL).unwrap();
+    std::fs::write(folder.path().join("keys.toml"), KEYS).unwrap();
+
+    let mut trial = Trial::start_with(folder.path(), Some(&protocols), 7).await;
+    let session = trial.begin("spoken").await;
+    let segment = trial.view().segment.unwrap();
+    trial.surgeon(Action::Acknowledge { segment }).await;
+    let mut comment = trial.comment("");
+    comment.said = Said::Voice;
+    trial.conductor.comment(comment.clone()).await.unwrap();
+    (trial, Names { session, segment, comment: comment.key })
+}
+
+fn start() -> Server {
+    count_panics();
+    let folder = tempfile::tempdir().unwrap();
+    let runtime = runtime();
+    let (end, shutdown) = watch::channel(false);
+    let (trial, [open, encrypted]) = runtime.block_on(async {
+        let (trial, _) = begin(&folder).await;
+        let addresses = serve(&trial, &folder, &shutdown).await;
+        (trial, addresses)
+    });
+    Server { runtime, open, encrypted, taken: 0, trial, _end: end, _folder: folder }
+}
+
+/// Serves `trial` in the clear and encrypted: where.
+async fn serve(trial: &Trial, folder: &TempDir, shutdown: &watch::Receiver<bool>) -> [SocketAddr; 2] {
+    let now = trial.clock.wall();
+    let local = IpAddr::V4(Ipv4Addr::LOCALHOST);
+    let certificates = Arc::new(Certificates::local(folder.path(), local, now).unwrap());
+    let settings = certificates.settings().unwrap();
+
+    let open = TcpListener::bind((local, 0)).await.unwrap();
+    let encrypted = TcpListener::bind((local, 0)).await.unwrap();
+    let addresses = [&open, &encrypted].map(|listener| listener.local_addr().unwrap());
+
+    let [in_the_clear, with_tls] = [(addresses[0], None), (addresses[1], Some(certificates))]
+        .map(|(address, certificates)| app(trial, folder, Reach::new(address, certificates), shutdown.clone()));
+    tokio::spawn(http::run(open, in_the_clear, None));
+    tokio::spawn(http::run(encrypted, with_tls, Some(settings)));
+    addresses
+}
+
+fn app(trial: &Trial, folder: &TempDir, reach: Reach, shutdown: watch::Receiver<bool>) -> Arc<App> {
+    let clock: Arc<dyn Clock> = trial.clock.clone();
+    let control = trial.control.clone();
+    let calibration = Arc::new(Calibration::default());
+    let (live, _) = live::start(control.clone(), &Developer::new(&calibration), Size::Full, &clock).unwrap();
+    let conductor = trial.conductor.clone();
+    let recordings = folder.path().join("recordings");
+
+    Arc::new(App {
+        accounts: trial.accounts(),
+        study_exports: StudyExports::new(folder.path()),
+        live: live.clone(),
+        store: trial.store.clone(),
+        health: HealthWatch::new(
+            Arc::clone(&clock),
+            control.status.clone(),
+            conductor.operator_view(),
+            trial.store.clone(),
+        ),
+        player: Player::new(conductor.clone(), recordings.clone()).unwrap(),
+        recordings: Recordings::new(Parts {
+            clock: Arc::clone(&clock),
+            run: trial.store.run(),
+            tap: control.tap.clone(),
+            status: control.status.clone(),
+            controls: control.camera.clone(),
+            live,
+            conductor: conductor.clone(),
+            folder: recordings,
+            calibration: Calibration::clone(&calibration),
+            size: None,
+        }),
+        surgeon_view: conductor.surgeon_view(),
+        operator_view: conductor.operator_view(),
+        conductor,
+        registry: parfocal::autofocus::Registry::standard(),
+        keys: Keys::load_or_create(folder.path()).unwrap(),
+        reach,
+        equipment: Equipment::new(None, calibration, None),
+        tablets: OpenTablets::default(),
+        metrics: Metrics::default(),
+        shutdown,
+        control: control.observer(),
+        clock,
+    })
+}
+
+/// Counts panics from now on: the server catches those of its handlers.
+fn count_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            PANICS.set(PANICS.get() + 1);
+            before(panic);
+        }));
+    });
+}
