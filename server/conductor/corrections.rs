@@ -23,8 +23,8 @@ impl Conductor {
     /// Corrects something of session `session`. When this returns, the correction is on disk; the original stays.
     ///
     /// # Errors
-    /// When `by` is not the researcher, the session is under way or withdrawn, the correction makes no sense or was made meanwhile,
-    /// or the disk failed.
+    /// When `by` is not the researcher, the session is under way or withdrawn, the correction makes no sense or was
+    /// made meanwhile, or the disk failed.
     pub async fn correct(
         &self,
         by: impl Into<Actor>,
