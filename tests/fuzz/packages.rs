@@ -10,6 +10,7 @@ use std::sync::{Arc, LazyLock};
 use parfocal::conductor::StudySite;
 use parfocal::package::{Sessions, Source, check, exports_of, left_out, write};
 use parfocal::study_export::export_study;
+use parfocal::trial::account::AccountRole;
 use parfocal::trial::action::Action;
 use parfocal::trial::protocol::Protocol;
 use parfocal::trial::remark::Said;
@@ -71,8 +72,12 @@ pub fn package(bytes: &[u8]) {
         let replaced = package.file(*which);
         package.with(bytes, |folder| {
             let resealed = reseal(replaced);
-            assert_eq!(check(folder).len(), 3);
-            let _ = joined(folder);
+            // Either takes as long as all other targets together.
+            if bytes.len().is_multiple_of(2) {
+                assert_eq!(check(folder, None).len(), 3);
+            } else {
+                let _ = joined(folder);
+            }
             if let Some((sums, before)) = resealed {
                 fs::write(sums, before).unwrap();
             }
@@ -131,6 +136,7 @@ async fn make(data: &Path, out: &Path) {
     fs::create_dir_all(&protocols).unwrap();
     fs::write(protocols.join("pair.toml"), PROTOCOL).unwrap();
     let mut trial = Trial::start_with(data, Some(&protocols), 5).await;
+    trial.account("lead", AccountRole::Lead, "Dr Lead").await;
     plan(&trial).await;
 
     for participant in ["S-02", "S-03"] {

@@ -18,6 +18,7 @@ use parfocal::playback::Player;
 use parfocal::recorder::{Parts, Recordings};
 use parfocal::study_export::StudyExports;
 use parfocal::tls::Certificates;
+use parfocal::trial::account::AccountRole;
 use parfocal::trial::action::Action;
 use parfocal::trial::remark::Said;
 use tempfile::TempDir;
@@ -150,12 +151,12 @@ pub fn requests() -> Vec<Vec<u8>> {
         (OPERATOR, "operator/participants", r#"{"code":"S-77"}"#.to_owned()),
         (OPERATOR, "operator/sessions", r#"{"participant":"S-01","protocol":"practice"}"#.to_owned()),
         (OPERATOR, "operator/camera", r#"{"setting":"gain","value":2.0}"#.to_owned()),
-        (OPERATOR, "sign-in", r#"{"account":"lead","passphrase":"four words and a number 7"}"#.to_owned()),
+        (OPERATOR, "sign-in", r#"{"name":"lead","passphrase":"four words and a number 7"}"#.to_owned()),
         (
             OPERATOR,
             "operator/consents",
             format!(
-                r#"{{"session":"{session}","version":"3","date":"2026-03-01","obtained_by":"AB","medium":"paper"}}"#
+                r#"{{"session":"{session}","text_version":"3","given_on":"2026-03-01","obtained_by":"AB","medium":"paper"}}"#
             ),
         ),
         (RESEARCHER, "researcher/studies", r#"{"definition":"name = \"a\"","reason":"planned"}"#.to_owned()),
@@ -272,9 +273,9 @@ fn names() -> Names {
     runtime().block_on(async { begin(&folder).await.1 })
 }
 
-/// Sends `bytes` to the server of this thread. Panics where that made anything in the server panic, or the server
-/// says that it failed.
-fn ask(address: impl FnOnce(&Server) -> SocketAddr, bytes: &[u8]) {
+/// What the server of this thread answers to `bytes`. Panics where that made anything in the server panic, or the
+/// server says that it failed.
+fn ask(address: impl FnOnce(&Server) -> SocketAddr, bytes: &[u8]) -> Vec<u8> {
     let mut kept = SERVER.take().filter(|server| server.taken < LIFE).unwrap_or_else(start);
     kept.taken += 1;
     let before = PANICS.get();
@@ -287,6 +288,7 @@ fn ask(address: impl FnOnce(&Server) -> SocketAddr, bytes: &[u8]) {
     let failed = b"HTTP/1.1 500";
     assert!(!answer.windows(failed.len()).any(|part| part == failed), "{}", String::from_utf8_lossy(&answer));
     SERVER.set(Some(kept));
+    answer
 }
 
 /// Sends `bytes` on a connection of their own, and reads what comes back until its end.
@@ -318,6 +320,7 @@ async fn begin(folder: &TempDir) -> (Trial, Names) {
     std::fs::write(folder.path().join("keys.toml"), KEYS).unwrap();
 
     let mut trial = Trial::start_with(folder.path(), Some(&protocols), 7).await;
+    trial.account("lead", AccountRole::Lead, "Dr Lead").await;
     let session = trial.begin("spoken").await;
     let segment = trial.view().segment.unwrap();
     trial.surgeon(Action::Acknowledge { segment }).await;
@@ -415,4 +418,26 @@ fn count_panics() {
             before(panic);
         }));
     });
+}
+
+#[test]
+fn a_panic_that_the_server_survives_is_seen() {
+    let server = SERVER.take().unwrap_or_else(start);
+    server.runtime.spawn(async { panic!("in a task of the server") });
+    SERVER.set(Some(server));
+    let asked = std::panic::catch_unwind(|| request(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+    assert!(asked.is_err());
+}
+
+#[test]
+fn seeds_are_let_in_and_understood() {
+    let refused = ["400", "401", "403", "413", "415", "422", "500"];
+    for seed in requests() {
+        let answer = ask(|server| server.open, &seed);
+        // A page that takes long is not waited for.
+        let status = answer.get(9..12).map(String::from_utf8_lossy).unwrap_or_default();
+        // Only who is signed in plans a study.
+        let is_plan = seed.starts_with(b"POST /api/researcher/studies");
+        assert!(is_plan || !refused.contains(&&*status), "{status} to {}", String::from_utf8_lossy(&seed));
+    }
 }

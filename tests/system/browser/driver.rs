@@ -191,7 +191,8 @@ impl Area {
 /// A browser with a profile of its own.
 pub struct Browser {
     client: Client,
-    _profile: tempfile::TempDir,
+    /// The folder in which Chromium keeps what a tablet has on its disk; removed with the last browser on it.
+    profile: Arc<TempDir>,
 }
 
 /// Pages and tabs.

@@ -56,7 +56,8 @@ fn ends_with_itself(folder: &Path, last: Option<Found>, head: &Head) -> Result<(
     }
 
     let exports = rows(folder, "accesses")?;
-    let is_export = |key: &str| exports.iter().any(|row| row["number"] == key && row["kind"] == "exported");
+    let has = |row: &Cells, column: &str, value: &str| row.get(column).is_some_and(|cell| cell == value);
+    let is_export = |key: &str| exports.iter().any(|row| has(row, "number", key) && has(row, "kind", "exported"));
     match last {
         Some(Found::Whole(entry, _)) if entry.kind == "access" && is_export(&entry.key) => Ok(()),
         _ => Err("chain: its last row is not that of an export: what came after it was cut off".to_owned()),
@@ -172,8 +173,8 @@ fn rows(folder: &Path, name: &str) -> Result<Vec<Cells>, String> {
 /// The records of the tables that exports of this format have, by kind and key.
 fn records(folder: &Path, format: u64) -> Result<BTreeMap<(&'static str, String), Record>, String> {
     let unblinded = folder.join("allocation.json").exists();
-    let unblinding = if unblinded { json(folder, "allocation.json")?["unblinding_reason"].take() } else { Value::Null };
-    let unblinding = unblinding.as_str();
+    let allocation = if unblinded { json(folder, "allocation.json")? } else { Value::Null };
+    let unblinding = allocation.get("unblinding_reason").and_then(Value::as_str);
 
     let mut found = BTreeMap::new();
     // An export tells of no participant but by the session's code.
