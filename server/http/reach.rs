@@ -96,17 +96,17 @@ mod tests {
         Reach::new(listening.parse().unwrap(), None)
     }
 
-    fn from(address: &str) -> Option<IpAddr> {
-        Some(address.parse().unwrap())
+    fn ip(address: &str) -> IpAddr {
+        address.parse().unwrap()
     }
 
     #[test]
     fn links_follow_the_machines_address() {
         let everywhere = reach("0.0.0.0:8080");
-        assert_eq!(everywhere.host_from(from("10.0.0.5")), "10.0.0.5:8080");
-        assert_eq!(everywhere.host_from(from("192.168.7.9")), "192.168.7.9:8080");
+        assert_eq!(everywhere.host_from(Some(ip("10.0.0.5"))), "10.0.0.5:8080");
+        assert_eq!(everywhere.host_from(Some(ip("192.168.7.9"))), "192.168.7.9:8080");
         assert_eq!(everywhere.host_from(None), "127.0.0.1:8080", "in no network");
-        assert_eq!(reach("[::]:8080").host_from(from("10.0.0.5")), "10.0.0.5:8080");
+        assert_eq!(reach("[::]:8080").host_from(Some(ip("10.0.0.5"))), "10.0.0.5:8080");
     }
 
     #[test]
@@ -122,7 +122,7 @@ mod tests {
         let now = "2026-06-01T00:00:00Z".parse().unwrap();
         let certificates = Certificates::local(data.path(), Ipv4Addr::LOCALHOST.into(), now).unwrap();
         let reach = Reach::new(listening, Some(Arc::new(certificates)));
-        assert_eq!(reach.link_by(&reach.host_from(from("10.0.0.5")), "k"), "https://10.0.0.5:8443/enter?key=k");
-        assert_eq!(reach.link_by(&reach.host_from(from("10.0.0.6")), "k"), "https://10.0.0.6:8443/enter?key=k");
+        assert_eq!(reach.link_by(&reach.host_from(Some(ip("10.0.0.5"))), "k"), "https://10.0.0.5:8443/enter?key=k");
+        assert_eq!(reach.link_by(&reach.host_from(Some(ip("10.0.0.6"))), "k"), "https://10.0.0.6:8443/enter?key=k");
     }
 }

@@ -232,11 +232,11 @@ fn frame(opcode: u8, message: &[u8]) -> Vec<u8> {
     match u16::try_from(message.len()) {
         Ok(length @ 0..126) => frame.push(0x80 | length as u8),
         Ok(length) => {
-            frame.push(0x80 | 126);
+            frame.push(0xFE);
             frame.extend(length.to_be_bytes());
         }
         Err(_) => {
-            frame.push(0x80 | 127);
+            frame.push(0xFF);
             frame.extend((message.len() as u64).to_be_bytes());
         }
     }

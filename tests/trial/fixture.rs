@@ -39,6 +39,7 @@ pub struct Trial {
     pub store: Store,
     pub conductor: Conductor,
     pub clock: Arc<ManualClock>,
+    #[allow(dead_code, reason = "the fuzz targets serve its pages")]
     pub control: ControlHandle,
     pub commands: mpsc::UnboundedReceiver<Command>,
     keys: ChaCha12Rng,
