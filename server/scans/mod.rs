@@ -8,7 +8,7 @@ pub mod detail;
 pub mod footage;
 pub mod pictures;
 pub mod planes;
-pub mod reach;
+mod reach;
 pub mod recorded;
 pub mod recording;
 pub mod relief;

@@ -64,8 +64,8 @@ impl PlaneStack {
 
         let positions: Vec<f32> = pictures.iter().map(|picture| picture.0).collect();
         let sharpness: Vec<Vec<f32>> = pictures.iter().map(|(_, picture)| sharpness(picture)).collect();
-        let places = 0..sharpness[0].len();
-        let curves: Vec<f32> = places.flat_map(|place| sharpness.iter().map(move |plane| plane[place])).collect();
+        let corners = 0..sharpness[0].len();
+        let curves: Vec<f32> = corners.flat_map(|place| sharpness.iter().map(move |plane| plane[place])).collect();
         let sharpest = curves.chunks_exact(positions.len()).map(|curve| peak(&positions, curve)).collect();
 
         let bytes = |picture: &GrayImage| picture.data.iter().map(|value| value.round() as u8).collect();

@@ -126,7 +126,9 @@ impl Following {
         };
 
         for _ in 0..LEAD {
-            crop.iter_mut().for_each(|walk| walk.advance(course));
+            for walk in crop.iter_mut() {
+                walk.advance(course);
+            }
             following.push(stack, corner(crop));
         }
         following
