@@ -44,7 +44,7 @@ pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
 /// site's up to itself.
 fn head(sources: &[Source], expected: &Head) -> Result<Verdict, String> {
     for source in sources {
-        let column = |name| read_cells(&source.folder, "chain.csv", name).map_err(|error| error.to_string());
+        let column = |name| read_cells(&source.folder, "chain.csv", name);
         let hashes = column("hash")?;
         let numbers = column("number")?;
         let row = numbers.iter().position(|number| number.parse() == Ok(expected.number));
