@@ -2,8 +2,11 @@
 
 use super::lanes::{LANES, Lanes};
 
-/// Values beside a row, on either side, that filters may read.
-pub(super) const MARGIN: usize = LANES / 2;
+/// Values beside a row, on either side, that filters may read: a whole vector, so that rows begin where a vector does.
+pub(super) const MARGIN: usize = LANES;
+
+/// Bytes of a cache line. Vectors that lie across two of them take twice as long to read.
+const LINE: usize = 64;
 
 /// The latest rows of a picture that is made from top to bottom.
 ///
@@ -12,6 +15,8 @@ pub(super) const MARGIN: usize = LANES / 2;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ring<T> {
     values: Vec<T>,
+    /// Values before the first row, which begins where a line of the cache does.
+    skipped: usize,
     width: usize,
     rows: usize,
 }
@@ -21,10 +26,12 @@ impl<T: Copy + Default> Ring<T> {
     pub(super) fn resize(&mut self, width: usize, rows: usize) {
         self.width = width;
         self.rows = rows;
-        self.values.resize(self.stride() * rows, T::default());
+        let spare = LINE / size_of::<T>();
+        self.values.resize(self.stride() * rows + spare, T::default());
+        self.skipped = self.values.as_ptr().align_offset(LINE).min(spare);
     }
 
-    /// Values from one row to the next: whole vectors, and half a vector on either side.
+    /// Values from one row to the next: whole vectors, and one on either side.
     const fn stride(&self) -> usize {
         self.whole() + 2 * MARGIN
     }
@@ -85,7 +92,7 @@ impl<T: Copy + Default> Ring<T> {
 
     fn four_rows_mut(&mut self, y: usize) -> [&mut [T]; 4] {
         let stride = self.stride();
-        let rows = &mut self.values[y % self.rows * stride..][..4 * stride];
+        let rows = &mut self.values[self.skipped + y % self.rows * stride..][..4 * stride];
 
         let (upper, lower) = rows.split_at_mut(2 * stride);
         let (first, second) = upper.split_at_mut(stride);
@@ -95,12 +102,12 @@ impl<T: Copy + Default> Ring<T> {
 
     fn padded(&self, y: usize) -> &[T] {
         let stride = self.stride();
-        &self.values[y % self.rows * stride..][..stride]
+        &self.values[self.skipped + y % self.rows * stride..][..stride]
     }
 
     fn padded_mut(&mut self, y: usize) -> &mut [T] {
         let stride = self.stride();
-        &mut self.values[y % self.rows * stride..][..stride]
+        &mut self.values[self.skipped + y % self.rows * stride..][..stride]
     }
 
     /// Fills the margins of row `y` with the row's first and last `period` values, over and over.

@@ -58,15 +58,15 @@ async fn line(page: &Browser, css: &str) -> f64 {
 /// A session of two settings with a comment in each, recorded, which has ended.
 async fn session(theatre: &Theatre) {
     theatre.begin("S-08", "filmed").await;
-    for (setting, comment) in [(1_u32, "Sharp where I look"), (2, "It wanders")] {
-        theatre.tap_notice(setting as usize).await;
-        // Long enough for three seconds before the comment.
+    for (setting, comment) in [(1, "Sharp where I look"), (2, "It wanders")] {
+        theatre.tap_notice(setting).await;
+        // Long enough for three seconds before the comment to lie in its own setting.
+        let before = recorded_seconds(&theatre.operator.text("#recording-now").await);
         until("some seconds of recording", || async {
-            let said = theatre.operator.text("#recording-now").await;
-            said.contains("frames") && recorded_seconds(&said) >= 5.0 * f64::from(setting)
+            recorded_seconds(&theatre.operator.text("#recording-now").await) >= before + 5.0
         })
         .await;
-        theatre.say(comment, setting as usize).await;
+        theatre.say(comment, setting).await;
         theatre.finish().await;
     }
     theatre.operator.sees("#phase", "Completed").await;
