@@ -42,7 +42,7 @@ const SHARE: f32 = 8192.0;
 const ENCODED: f32 = ENCODED_WHITE * 65_536.0 / SHARE;
 
 /// Level, below black, from which light is counted: ratios would be noise in the dark.
-const FLOOR: f32 = BLACK as f32 - 0.004 * SPAN;
+const FLOOR: f32 = (BLACK - 31) as f32;
 
 /// Luma and both chromas.
 const COMPONENTS: usize = 3;
@@ -55,8 +55,9 @@ pub(super) struct Colour {
     step: usize,
     /// Levels of a row of cells, brought to their cells' means: four rows one after another.
     levelled: Vec<u16>,
-    /// How much to subtract from each level for that.
-    excess: Vec<i16>,
+    /// For each pixel of a row its cell's mean, and how much to subtract from its level to bring it there.
+    of_cell: Ring<u16>,
+    excess: Ring<i16>,
     /// Pixels and gray values of a row of cells.
     rgb: Vec<u8>,
     gray: Vec<f32>,
@@ -79,7 +80,8 @@ impl Colour {
             mixes: Mixes::new(weights(calibration), &levels(BLACK), &levels(WHITE)),
             step: 1,
             levelled: Vec::new(),
-            excess: Vec::new(),
+            of_cell: Ring::default(),
+            excess: Ring::default(),
             rgb: Vec::new(),
             gray: Vec::new(),
             colours: Default::default(),
@@ -97,7 +99,8 @@ impl Colour {
         self.step = step;
         let width = cells * per_cell;
         self.levelled.resize(CELL * CELL * cells, 0);
-        self.excess.resize(width, 0);
+        self.of_cell.resize(width, 1);
+        self.excess.resize(width, 1);
         self.rgb.resize(3 * cells, 0);
         self.gray.resize(cells, 0.0);
         self.colours.iter_mut().for_each(|line| line.resize(cells, 0.0));
@@ -125,14 +128,17 @@ impl Colour {
         encoder: &Encoder,
     ) {
         let width = CELL * means.len();
+        repeat(means, per_cell, self.of_cell.row_mut(0));
         for (row, levelled) in self.levelled.chunks_exact_mut(width).enumerate() {
             // With two by two pixels a cell, two rows of samples share one row of pixels.
+            let of_pixels = luminance.lanes((CELL * y + row) * per_cell / CELL);
+            excess_row(of_pixels, self.of_cell.lanes(0), self.excess.lanes_mut(0));
+
+            let levels = levels.row(CELL * y + row);
             if per_cell == CELL {
-                excess_of_four(luminance.row(CELL * y + row), means, &mut self.excess);
-                level_singles(levels.row(CELL * y + row), &self.excess, levelled);
+                level_singles(levels, self.excess.row(0), levelled);
             } else {
-                excess_of_two(luminance.row(2 * y + row / 2), means, &mut self.excess);
-                level_pairs(levels.row(CELL * y + row), &self.excess, levelled);
+                level_pairs(levels, self.excess.row(0), levelled);
             }
         }
 
@@ -208,29 +214,29 @@ fn colour_cells(
     picture_row(mixes, rows, encoder, colours, rgb, gray);
 }
 
+/// Gives each of a cell's `per_cell` pixels, 2 or 4, the cell's mean.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn repeat(means: &[u16], per_cell: usize, out: &mut [u16]) {
+    if per_cell == 4 {
+        out.as_chunks_mut().0.iter_mut().zip(means).for_each(|(out, &mean)| *out = [mean; 4]);
+    } else {
+        out.as_chunks_mut().0.iter_mut().zip(means).for_each(|(out, &mean)| *out = [mean; 2]);
+    }
+}
+
 /// How far the luminance of each pixel lies from its cell's mean, where that is far.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn excess_of_four(luminance: &[i16], means: &[u16], excess: &mut [i16]) {
-    excess_of(luminance.as_chunks::<4>().0, means, excess.as_chunks_mut::<4>().0);
-}
+fn excess_row(luminance: &[Lanes<i16>], means: &[Lanes<u16>], excess: &mut [Lanes<i16>]) {
+    for ((excess, luminance), means) in excess.iter_mut().zip(luminance).zip(means) {
+        for lane in 0..LANES {
+            let above_black = means[lane].saturating_sub(BLACK);
+            // Three sixteenths: more than noise and most texture.
+            let limit = ((above_black >> 3) + (above_black >> 4)) as i16;
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn excess_of_two(luminance: &[i16], means: &[u16], excess: &mut [i16]) {
-    excess_of(luminance.as_chunks::<2>().0, means, excess.as_chunks_mut::<2>().0);
-}
-
-#[inline(always)]
-fn excess_of<const PER_CELL: usize>(luminance: &[[i16; PER_CELL]], means: &[u16], excess: &mut [[i16; PER_CELL]]) {
-    for ((excess, luminance), &mean) in excess.iter_mut().zip(luminance).zip(means) {
-        let above_black = mean.saturating_sub(BLACK);
-        // Three sixteenths: more than noise and most texture.
-        let limit = ((above_black >> 3) + (above_black >> 4)) as i16;
-
-        for (excess, &luminance) in excess.iter_mut().zip(luminance) {
-            let difference = luminance - mean as i16;
+            let difference = luminance[lane] - means[lane] as i16;
             let size = difference.abs();
             let left_alone = size.min(limit).min((3 * limit - size).max(0));
-            *excess = if difference < 0 { left_alone - size } else { size - left_alone };
+            excess[lane] = if difference < 0 { left_alone - size } else { size - left_alone };
         }
     }
 }
@@ -265,8 +271,8 @@ fn share_cells(rgb: &[u8], gray: &[f32], cells: [&mut [i16]; COMPONENTS]) {
         let [red, green, blue] = pixel.map(f32::from);
         let luma = LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue;
 
-        let light = (gray * (SPAN / 255.0) + f32::from(BLACK) - FLOOR).max(0.0);
-        let beside = SHARE / ENCODED_WHITE * f32::from(PARTS) / encoding(light);
+        let level = (gray * (SPAN / 255.0) + f32::from(BLACK)).max(FLOOR);
+        let beside = SHARE / ENCODED_WHITE * f32::from(PARTS) / encoding(level, 1.0, 0.0);
         *luma_share = nearest(beside * (luma + f32::from(ENCODING_OFFSET)));
         *blue_share = nearest(beside * CHROMA[0] * (blue - luma));
         *red_share = nearest(beside * CHROMA[1] * (red - luma));
@@ -278,16 +284,24 @@ fn nearest(share: f32) -> i16 {
     (share.clamp(-32_767.0, 32_767.0) + 1.5 * LOW_BITS).to_bits() as i16
 }
 
-/// x^(1/2.4) of light above [`FLOOR`], 1 for white: a quotient of two quadratics that is within
-/// 1.1 % of it from 1/250 of white on, and 0.06 for no light. What error it has in common at a
-/// cell and at a pixel cancels out.
+/// x^(1/2.4) of a level's light above [`FLOOR`], which it must not be below; 1 for white. That `times` as much, and `plus`.
+///
+/// A quotient of two quadratics that is within 1.1 % of it from 1/250 of white on, and 0.06 for no light. What error it
+/// has in common at a cell and at a pixel cancels out. It is divided out, so that the numerator is linear, and written
+/// for levels instead of light: fewer steps for the same number.
 #[inline(always)]
-fn encoding(light: f32) -> f32 {
-    const ABOVE: [f32; 3] = [0.061_615, 13.9994 / SPAN, 70.8435 / (SPAN * SPAN)];
-    const BELOW: [f32; 3] = [1.0, 42.9598 / SPAN, 41.1044 / (SPAN * SPAN)];
+fn encoding(level: f32, times: f32, plus: f32) -> f32 {
+    // (a + b x + c x^2) / (d + e x + f x^2) of light x, white 1.
+    const ABOVE: [f32; 3] = [0.061_615, 13.9994, 70.8435];
+    const BELOW: [f32; 3] = [1.0, 42.9598, 41.1044];
 
-    let quadratic = |[a, b, c]: [f32; 3]| (c * light + b) * light + a;
-    quadratic(ABOVE) / quadratic(BELOW)
+    const LIMIT: f32 = ABOVE[2] / BELOW[2];
+    const SLOPE: f32 = (ABOVE[1] - LIMIT * BELOW[1]) / BELOW[2] * SPAN;
+    const OFFSET: f32 = (ABOVE[0] - LIMIT * BELOW[0]) / BELOW[2] * SPAN * SPAN - SLOPE * FLOOR;
+    const MIDDLE: f32 = BELOW[1] / BELOW[2] * SPAN - 2.0 * FLOOR;
+    const LEAST: f32 = BELOW[0] / BELOW[2] * SPAN * SPAN - BELOW[1] / BELOW[2] * SPAN * FLOOR + FLOOR * FLOOR;
+
+    (times * SLOPE * level + times * OFFSET) / ((level + MIDDLE) * level + LEAST) + (times * LIMIT + plus)
 }
 
 /// Luma of a row of pixels: the cells' share of it, enlarged, times the pixels' own encodings, which
@@ -341,8 +355,8 @@ fn luma_vector<const EIGHTHS: u8>(
     const OFFSET: i16 = PARTS * ENCODING_OFFSET - PARTS / 2;
 
     for lane in 0..LANES {
-        let light = (f32::from(luminance[lane]) - FLOOR).max(0.0);
-        encoded[lane] = (ENCODED * encoding(light) + LOW_BITS).to_bits() as i16;
+        let level = luminance[lane].max(FLOOR as i16);
+        encoded[lane] = encoding(level.into(), ENCODED, LOW_BITS).to_bits() as i16;
     }
     for lane in 0..LANES {
         let lit = upper_half(mixed::<EIGHTHS>(own[lane], near[lane]), encoded[lane]);

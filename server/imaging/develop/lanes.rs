@@ -20,6 +20,18 @@ pub(super) fn mixed<const EIGHTHS: u8>(own: i16, near: i16) -> i16 {
     }
 }
 
+/// The mean of two values, rounded up: an instruction of its own.
+#[inline(always)]
+pub(super) fn halfway(one: u16, other: u16) -> u16 {
+    ((u32::from(one) + u32::from(other) + 1) >> 1) as u16
+}
+
+/// The mean of three values, the middle one of which counts twice, to the nearest whole number or the one above it.
+#[inline(always)]
+pub(super) fn weighted([left, middle, right]: [u16; 3]) -> u16 {
+    halfway(halfway(left, right), middle)
+}
+
 /// The upper half of a product, rounded down.
 #[inline(always)]
 pub(super) fn upper_half(one: i16, other: i16) -> i16 {

@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use super::lanes::{LANES, Lanes};
+use super::lanes::{LANES, Lanes, upper_half};
 use super::ring::Ring;
 use crate::imaging::calibration::{BANDS, Calibration};
 use crate::imaging::frame::{CELL, GrayImage, MosaicFrame};
@@ -46,15 +46,18 @@ pub(super) struct Levels {
 }
 
 /// A vector's balance by references per band, in whole numbers: a level is
-/// `((min(sample, most) - least) * factor * gain >> 16) + summand`.
+/// `(((min(sample, most) - least) * factor - 2^15) * gain >> 16) + summand`.
+///
+/// 2^15 is subtracted because there is an instruction for the upper half of a product of signed numbers that compilers
+/// find, and none of unsigned ones that they do; the summand makes up for it.
 #[derive(Debug, Clone, Copy)]
 struct BandBalance {
     most: Lanes<u16>,
     least: Lanes<u16>,
     /// A power of two that brings the samples to 16 bits.
     factor: Lanes<u16>,
-    gain: Lanes<u16>,
-    summand: Lanes<u16>,
+    gain: Lanes<i16>,
+    summand: Lanes<i16>,
 }
 
 impl BandBalance {
@@ -74,14 +77,18 @@ impl BandBalance {
             let most = ((highest - offset) / gain).clamp(f32::from(least), 65_535.0).floor() as u16;
             let span = (most - least).max(1);
 
+            let factor = 1_u16 << span.leading_zeros();
+            let whole_gain = (gain * 65_536.0 / f32::from(factor)).round().min(f32::from(i16::MAX));
+
             // The product is rounded down, on average by half a level.
             let summand = (f32::from(least) * gain + offset + 0.5).clamp(0.0, highest);
+            let subtracted = whole_gain / 2.0;
 
             balance.least[lane] = least;
             balance.most[lane] = most;
-            balance.factor[lane] = 1 << span.leading_zeros();
-            balance.gain[lane] = (gain * 65_536.0 / f32::from(balance.factor[lane])).round() as u16;
-            balance.summand[lane] = summand.round() as u16;
+            balance.factor[lane] = factor;
+            balance.gain[lane] = whole_gain as i16;
+            balance.summand[lane] = (summand + subtracted).round() as i16;
         }
         balance
     }
@@ -127,9 +134,9 @@ impl Levels {
                     let (gains, offsets) = balance.row(CELL * y + row);
                     balance_pixels(rows(row), gains, offsets, levels.row_mut(CELL * y + row));
                 }
-                cut_rows(levels.four_mut(CELL * y), self.of_gray.lanes_mut(0), self.sums.lanes_mut(0));
+                cut_rows(levels.rows_mut(CELL * y), self.of_gray.lanes_mut(0), self.sums.lanes_mut(0));
             }
-            None => self.balance_bands([0, 1, 2, 3].map(rows), levels.four_mut(CELL * y)),
+            None => self.balance_bands([0, 1, 2, 3].map(rows), levels.rows_mut(CELL * y)),
         }
         for row in 0..CELL {
             levels.fill_margins(CELL * y + row, CELL);
@@ -208,8 +215,8 @@ fn balance_vector(
 ) {
     for lane in 0..LANES {
         let above = samples[lane].min(balance.most[lane]).saturating_sub(balance.least[lane]);
-        let scaled = above.wrapping_mul(balance.factor[lane]);
-        let level = ((u32::from(scaled) * u32::from(balance.gain[lane])) >> 16) as u16 + balance.summand[lane];
+        let scaled = above.wrapping_mul(balance.factor[lane]).wrapping_sub(1 << 15) as i16;
+        let level = (upper_half(scaled, balance.gain[lane]) + balance.summand[lane]) as u16;
         of_gray[lane] += level;
         levels[lane] = level.min(HIGHEST);
         sums[lane] += levels[lane];

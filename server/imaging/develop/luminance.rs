@@ -3,7 +3,7 @@
 //! A sample senses one band, so its level must be turned into the mean that all bands would have
 //! there. The samples of the same band around it, and the mean of all bands at those places, tell
 //! how the two go together: where a surface is only lit more or less, they stay in proportion;
-//! where something white is added, they differ by a constant. [`SHARE_OF_MEAN`] stands between the
+//! where something white is added, they differ by a constant. [`SHARES`] stands between the
 //! two.
 //!
 //! That is wrong where bands change quickly beside one another, at the edge between two colours:
@@ -16,24 +16,23 @@
 
 use multiversion::multiversion;
 
-use super::lanes::{LANES, Lanes, between, mixed, upper_half};
+use super::lanes::{LANES, Lanes, between, halfway, mixed, upper_half, weighted};
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
 use super::ring::{Ring, same_bands};
 
-/// How much of the mean of all bands stands beside a band's own mean as that to which a band's
-/// deviation is in proportion. At 0 a band deviates in proportion to its level; at infinity all
-/// bands deviate by the same amount.
-const SHARE_OF_MEAN: f32 = 0.5;
+/// How a band's own mean and that of all bands share in that to which a band's deviation is in proportion. With the first
+/// alone a band deviates in proportion to its level; with the second alone all bands deviate by the same amount.
+const SHARES: [i16; 2] = [2, 1];
 
-/// Least level above black by which a deviation is divided.
-const LEAST: f32 = 64.0;
+/// Least by which a deviation is divided: so many [`SHARES`] of a level above black.
+const LEAST: i16 = 128;
 
 /// A sample from here on may be saturated, so that it cannot tell that its place is darker than the
 /// places around it.
 const SATURATED: u16 = WHITE - 16;
 
 /// Largest detail, so that four of them fit 16 bits.
-const MOST_DETAIL: f32 = 8191.0;
+const MOST_DETAIL: i16 = 8191;
 
 /// Mean detail that noise alone makes, in levels.
 const NOISE: f32 = SPAN / 1000.0;
@@ -126,7 +125,7 @@ impl Luminance {
         if cell == 4 {
             let first = 4 * y as isize - 2;
             let near = |by: isize| levels.padded_lanes(same_bands(first + by, self.height, cell));
-            sum_rows([0, 1, 2, 3, 4, 5, 6, 7].map(near), sums.four_padded_mut(0));
+            sum_rows([0, 1, 2, 3, 4, 5, 6, 7].map(near), sums.padded_rows_mut(0));
         }
 
         for row in cell * y..cell * (y + 1) {
@@ -165,15 +164,21 @@ impl Luminance {
     pub(super) fn part(&mut self, y: usize) {
         let cell = self.cell;
         let Lines { coarse, fine, cells, .. } = &mut self.lines;
-        coarse.lanes_mut(0).fill([0; LANES]);
-        fine.lanes_mut(0).fill([0; LANES]);
+        let sums = (coarse.lanes_mut(0), fine.lanes_mut(0));
 
-        for row in cell * y..cell * (y + 1) {
-            let near = [row.saturating_sub(1), row, (row + 1).min(self.height - 1)];
-            let around = near.map(|row| self.smooth_detail.lanes(row));
-            let parts = (self.coarse.lanes_mut(row), self.fine.lanes_mut(row));
-            let sums = (coarse.lanes_mut(0), fine.lanes_mut(0));
-            part_row(around, self.detail.lanes(row), self.mean.lanes(row), parts, sums);
+        let first = cell * y;
+        let near = |row: usize| {
+            self.smooth_detail.lanes((first + row).saturating_sub(1).min(self.height - 1))
+        };
+        let detail = |row: usize| self.detail.lanes(first + row);
+        let mean = |row: usize| self.mean.lanes(first + row);
+        if cell == 4 {
+            let parts = (self.coarse.rows_mut(first), self.fine.rows_mut(first));
+            let rows = [0, 1, 2, 3];
+            part_four([0, 1, 2, 3, 4, 5].map(near), rows.map(detail), rows.map(mean), parts, sums);
+        } else {
+            let parts = (self.coarse.rows_mut(first), self.fine.rows_mut(first));
+            part_two([0, 1, 2, 3].map(near), [0, 1].map(detail), [0, 1].map(mean), parts, sums);
         }
 
         let count = self.width / cell;
@@ -257,7 +262,7 @@ fn sum_rows(near: [&[Lanes<u16>]; 8], out: [&mut [Lanes<u16>]; 4]) {
 /// The mean of five values, given the sum of the inner three.
 #[inline(always)]
 fn mean_of(first: u16, inner: u16, last: u16) -> u16 {
-    (((first + last + 1) >> 1) + inner + 2) >> 2
+    (halfway(first, last) + inner + 2) >> 2
 }
 
 /// The mean of three values, the middle one of which counts twice. Of neighbours it covers two
@@ -267,7 +272,7 @@ fn smooth(near: [&[Lanes<u16>]; 3], out: &mut [Lanes<u16>]) {
     let near = near.map(|values| &values[..out.len()]);
     for (x, out) in out.iter_mut().enumerate() {
         for lane in 0..LANES {
-            out[lane] = (near[0][x][lane] + 2 * near[1][x][lane] + near[2][x][lane] + 2) >> 2;
+            out[lane] = weighted([near[0][x][lane], near[1][x][lane], near[2][x][lane]]);
         }
     }
 }
@@ -306,26 +311,20 @@ fn detail_row(
     for (x, detail) in detail.iter_mut().enumerate() {
         for lane in 0..LANES {
             let level = levels[x][lane];
-            let of_band = smooth_level([band[0][x][lane], band[1][x][lane], band[2][x][lane]]);
-            let of_all = smooth_level([all[0][x][lane], all[1][x][lane], all[2][x][lane]]);
+            let of_band = weighted([band[0][x][lane], band[1][x][lane], band[2][x][lane]]) as i16;
+            let of_all = weighted([all[0][x][lane], all[1][x][lane], all[2][x][lane]]) as i16;
 
-            let deviation = f32::from(level as i16 - of_band);
-            let light_of_band = f32::from(of_band - BLACK as i16);
-            let light = f32::from(of_all - BLACK as i16);
-            let divisor = (light_of_band + SHARE_OF_MEAN * light).max(LEAST);
-            let here = (1.0 + SHARE_OF_MEAN) * light * deviation / divisor;
-            let found = here + f32::from(of_all - around[x][lane] as i16);
+            let light = of_all - BLACK as i16;
+            let divisor = (SHARES[0] * (of_band - BLACK as i16) + SHARES[1] * light).max(LEAST);
+            let deviation = (SHARES[0] + SHARES[1]) * (level as i16 - of_band);
+            let here = f32::from(light) * f32::from(deviation) / f32::from(divisor);
 
-            let least = if level >= SATURATED { 0.0 } else { -MOST_DETAIL };
-            detail[lane] = rounded(found.clamp(-MOST_DETAIL, MOST_DETAIL).max(least));
+            let most = f32::from(MOST_DETAIL);
+            let found = rounded(here.clamp(-most, most)) + (of_all - around[x][lane] as i16);
+            let least = if level >= SATURATED { 0 } else { -MOST_DETAIL };
+            detail[lane] = found.clamp(least, MOST_DETAIL);
         }
     }
-}
-
-/// The mean of three levels, the middle one of which counts twice.
-#[inline(always)]
-fn smooth_level([above, here, below]: [u16; 3]) -> i16 {
-    ((above + 2 * here + below + 2) >> 2) as i16
 }
 
 /// The nearest whole number to one within 16 bits, without the cost of a cast, which must handle
@@ -336,32 +335,67 @@ fn rounded(value: f32) -> i16 {
     (value + 1.5 * LOW_BITS).to_bits() as i16
 }
 
-/// Parts a row's detail into a smooth part, added to the mean, and the rest, and adds the absolute
-/// values of both to `sums`. `around` is the detail smoothed across, in the rows above, here and
-/// below.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn part_row(
-    around: [&[Lanes<i16>]; 3],
-    detail: &[Lanes<i16>],
-    mean: &[Lanes<u16>],
-    (coarse, fine): (&mut [Lanes<i16>], &mut [Lanes<i16>]),
+/// Parts the detail of a row of cells, `ROWS` rows of values, into a smooth part, added to the mean, and the rest, and sums
+/// the absolute values of both down the columns. `around` is the detail smoothed across, in those rows and in the one
+/// above and below them: `AROUND` rows.
+#[inline(always)]
+fn part_rows<const ROWS: usize, const AROUND: usize>(
+    around: [&[Lanes<i16>]; AROUND],
+    detail: [&[Lanes<i16>]; ROWS],
+    mean: [&[Lanes<u16>]; ROWS],
+    (coarse, fine): ([&mut [Lanes<i16>]; ROWS], [&mut [Lanes<i16>]; ROWS]),
     (coarse_sum, fine_sum): (&mut [Lanes<u16>], &mut [Lanes<u16>]),
 ) {
-    let count = coarse.len();
+    let count = coarse_sum.len();
     let around = around.map(|values| &values[..count]);
-    let (detail, mean, fine) = (&detail[..count], &mean[..count], &mut fine[..count]);
-    let (coarse_sum, fine_sum) = (&mut coarse_sum[..count], &mut fine_sum[..count]);
+    let detail = detail.map(|values| &values[..count]);
+    let mean = mean.map(|values| &values[..count]);
+    let mut coarse = coarse.map(|values| &mut values[..count]);
+    let mut fine = fine.map(|values| &mut values[..count]);
+    let fine_sum = &mut fine_sum[..count];
 
     for x in 0..count {
-        for lane in 0..LANES {
-            let smooth = smooth_of([around[0][x][lane], around[1][x][lane], around[2][x][lane]]);
-            let rest = detail[x][lane] - smooth;
-            coarse[x][lane] = mean[x][lane] as i16 + smooth;
-            fine[x][lane] = rest;
-            coarse_sum[x][lane] += smooth.unsigned_abs();
-            fine_sum[x][lane] += rest.unsigned_abs();
+        let mut sums = [[0; LANES]; 2];
+        for row in 0..ROWS {
+            let near = [around[row][x], around[row + 1][x], around[row + 2][x]];
+            let (detail, mean) = (detail[row][x], mean[row][x]);
+            let mut parts = [[0; LANES]; 2];
+            for lane in 0..LANES {
+                let smooth = smooth_of([near[0][lane], near[1][lane], near[2][lane]]);
+                let rest = detail[lane] - smooth;
+                parts[0][lane] = mean[lane] as i16 + smooth;
+                parts[1][lane] = rest;
+                sums[0][lane] += smooth.unsigned_abs();
+                sums[1][lane] += rest.unsigned_abs();
+            }
+            [coarse[row][x], fine[row][x]] = parts;
         }
+        [coarse_sum[x], fine_sum[x]] = sums;
     }
+}
+
+/// [`part_rows`] of cells of four by four values.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn part_four(
+    around: [&[Lanes<i16>]; 6],
+    detail: [&[Lanes<i16>]; 4],
+    mean: [&[Lanes<u16>]; 4],
+    parts: ([&mut [Lanes<i16>]; 4], [&mut [Lanes<i16>]; 4]),
+    sums: (&mut [Lanes<u16>], &mut [Lanes<u16>]),
+) {
+    part_rows(around, detail, mean, parts, sums);
+}
+
+/// [`part_rows`] of cells of two by two values.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn part_two(
+    around: [&[Lanes<i16>]; 4],
+    detail: [&[Lanes<i16>]; 2],
+    mean: [&[Lanes<u16>]; 2],
+    parts: ([&mut [Lanes<i16>]; 2], [&mut [Lanes<i16>]; 2]),
+    sums: (&mut [Lanes<u16>], &mut [Lanes<u16>]),
+) {
+    part_rows(around, detail, mean, parts, sums);
 }
 
 /// How far fine detail is trusted in each cell, of 32767: the energy of the coarse detail beside

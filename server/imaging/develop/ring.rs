@@ -5,6 +5,9 @@ use super::lanes::{LANES, Lanes};
 /// Values beside a row, on either side, that filters may read: a whole vector, so that rows begin where a vector does.
 pub(super) const MARGIN: usize = LANES;
 
+/// Values of a margin that filters do read, and that are filled: more than the side of a mosaic cell.
+const FILLED: usize = 8;
+
 /// Bytes of a cache line. Vectors that lie across two of them take twice as long to read.
 const LINE: usize = 64;
 
@@ -78,26 +81,22 @@ impl<T: Copy + Default> Ring<T> {
         self.padded_mut(y).as_chunks_mut().0
     }
 
-    /// The vectors of the four rows from `y` on. Both `y` and the ring's number of rows are
-    /// multiples of four.
-    pub(super) fn four_mut(&mut self, y: usize) -> [&mut [Lanes<T>]; 4] {
+    /// The vectors of the `N` rows from `y` on. Both `y` and the ring's number of rows are multiples of `N`.
+    pub(super) fn rows_mut<const N: usize>(&mut self, y: usize) -> [&mut [Lanes<T>]; N] {
         let whole = self.whole();
-        self.four_rows_mut(y).map(|row| row[MARGIN..][..whole].as_chunks_mut().0)
+        self.some_mut(y).map(|row| row[MARGIN..][..whole].as_chunks_mut().0)
     }
 
     /// The same with their margins.
-    pub(super) fn four_padded_mut(&mut self, y: usize) -> [&mut [Lanes<T>]; 4] {
-        self.four_rows_mut(y).map(|row| row.as_chunks_mut().0)
+    pub(super) fn padded_rows_mut<const N: usize>(&mut self, y: usize) -> [&mut [Lanes<T>]; N] {
+        self.some_mut(y).map(|row| row.as_chunks_mut().0)
     }
 
-    fn four_rows_mut(&mut self, y: usize) -> [&mut [T]; 4] {
+    fn some_mut<const N: usize>(&mut self, y: usize) -> [&mut [T]; N] {
         let stride = self.stride();
-        let rows = &mut self.values[self.skipped + y % self.rows * stride..][..4 * stride];
-
-        let (upper, lower) = rows.split_at_mut(2 * stride);
-        let (first, second) = upper.split_at_mut(stride);
-        let (third, fourth) = lower.split_at_mut(stride);
-        [first, second, third, fourth]
+        let rows = &mut self.values[self.skipped + y % self.rows * stride..][..N * stride];
+        let mut rows = rows.chunks_exact_mut(stride);
+        std::array::from_fn(|_| rows.next().unwrap_or_default())
     }
 
     fn padded(&self, y: usize) -> &[T] {
@@ -112,13 +111,13 @@ impl<T: Copy + Default> Ring<T> {
 
     /// Fills the margins of row `y` with the row's first and last `period` values, over and over.
     ///
-    /// `period` divides [`MARGIN`]. With the side of a mosaic cell as its period, a place in the margin gets a value of the band
+    /// `period` divides [`FILLED`]. With the side of a mosaic cell as its period, a place in the margin gets a value of the band
     /// that would be there.
     pub(super) fn fill_margins(&mut self, y: usize, period: usize) {
         let end = MARGIN + self.width;
         let row = self.padded_mut(y);
-        for place in (0..MARGIN).step_by(period) {
-            row.copy_within(MARGIN..MARGIN + period, place);
+        for place in (0..FILLED).step_by(period) {
+            row.copy_within(MARGIN..MARGIN + period, MARGIN - FILLED + place);
             row.copy_within(end - period..end, end + place);
         }
     }
