@@ -90,9 +90,9 @@ fn true_colours(scene: &Scene) -> Vec<[u8; 3]> {
     colours
 }
 
-/// Colour differences: the median to the enlarged cell picture; and of hue and chroma to the truth,
-/// which 1 place in 20 exceeds, of the enlarged cell picture and of the developed one.
-fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 3] {
+/// Colour differences: the median to the enlarged cell picture, of the developed picture and of the truth; and of hue and
+/// chroma to the truth, which 1 place in 20 exceeds, of the enlarged cell picture and of the developed one.
+fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 4] {
     let mosaic = scene.mosaic(seed);
     let cells = developed(&mosaic, Size::Cell).0.data;
     let channel = |component: usize| {
@@ -107,16 +107,18 @@ fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 3] {
     let enlarged: Vec<[f64; 3]> =
         (0..SIDE * SIDE).map(|place| lab([0, 1, 2].map(|k| channels[k][place].round() as u8))).collect();
 
-    let to_cells = found.iter().zip(&enlarged).map(|(one, other)| ciede2000(*one, *other)).collect();
+    let to_cells = |of: &[[f64; 3]]| {
+        quantile(of.iter().zip(&enlarged).map(|(one, other)| ciede2000(*one, *other)).collect(), 0.5)
+    };
     let fringe = |of: &[[f64; 3]]| {
         // Of the truth's lightness, so that only hue and chroma differ.
         let differences = of.iter().zip(&truth).map(|(one, truth)| ciede2000([truth[0], one[1], one[2]], *truth));
         quantile(differences.collect(), 0.95)
     };
 
-    let quality = [quantile(to_cells, 0.5), fringe(&enlarged), fringe(&found)];
-    let [median, before, after] = quality;
-    println!("{name}: {median:.2} to the cells; fringes {before:.1} -> {after:.1}");
+    let quality = [to_cells(&found), to_cells(&truth), fringe(&enlarged), fringe(&found)];
+    let [median, of_truth, before, after] = quality;
+    println!("{name}: {median:.2} to the cells, the truth {of_truth:.2}; fringes {before:.1} -> {after:.1}");
     quality
 }
 
@@ -166,10 +168,10 @@ fn colours_are_those_of_the_cells_without_fringes_at_edges() {
         ("brain 206", Scene::brain(206)),
     ];
     for (name, scene) in scenes {
-        let [to_cells, before, after] = colour_quality(name, &scene, 7);
-        // The leaves have strong detail nearly everywhere, which the cell picture lacks.
-        let limit = if name.starts_with("brain") { 2.0 } else { 3.0 };
-        assert!(to_cells < limit, "{name}: {to_cells}");
+        let [to_cells, of_truth, before, after] = colour_quality(name, &scene, 7);
+        // The leaves have strong detail nearly everywhere, which the cell picture lacks: there the truth itself is further
+        // away from the cells.
+        assert!(to_cells < of_truth.max(2.0), "{name}: {to_cells} {of_truth}");
         assert!(after < 0.85 * before, "{name}: {before} {after}");
     }
 }
