@@ -107,9 +107,8 @@ fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 4] {
     let enlarged: Vec<[f64; 3]> =
         (0..SIDE * SIDE).map(|place| lab([0, 1, 2].map(|k| channels[k][place].round() as u8))).collect();
 
-    let to_cells = |of: &[[f64; 3]]| {
-        quantile(of.iter().zip(&enlarged).map(|(one, other)| ciede2000(*one, *other)).collect(), 0.5)
-    };
+    let to_cells =
+        |of: &[[f64; 3]]| quantile(of.iter().zip(&enlarged).map(|(one, other)| ciede2000(*one, *other)).collect(), 0.5);
     let fringe = |of: &[[f64; 3]]| {
         // Of the truth's lightness, so that only hue and chroma differ.
         let differences = of.iter().zip(&truth).map(|(one, truth)| ciede2000([truth[0], one[1], one[2]], *truth));

@@ -10,7 +10,9 @@ use parfocal::evaluation::shard::{Shard, merge};
 use parfocal::imaging::{GrayImage, PatchArea};
 use parfocal::lens::FocalPower;
 use parfocal::scans::recorded::{RecordedScan, evenly_spread};
+use parfocal::scans::recording::{self, Imported};
 use parfocal::scans::stack::{FocalStack, check};
+use parfocal::training::run::checkpoint::{self, Checkpoint};
 use tch::{Device, nn};
 
 use super::folders::Folder;
@@ -25,6 +27,8 @@ const LIST: &str = "positions.csv";
 thread_local! {
     static SCAN: Folder = Folder::made_by(make_scan);
     static STACK: Folder = Folder::made_by(make_stack);
+    static IMPORTED: Folder = Folder::made_by(make_pictures);
+    static CHECKPOINT: Folder = Folder::made_by(make_checkpoint);
     static NETWORK: nn::VarStore = network();
 }
 
@@ -89,6 +93,42 @@ pub fn stack_files() -> Vec<Vec<u8>> {
     STACK.with(Folder::seeds)
 }
 
+/// Pictures from another program that become a scan, one of them replaced.
+pub fn import(bytes: &[u8]) {
+    IMPORTED.with(|pictures| {
+        pictures.with(bytes, |folder| {
+            let out = tempfile::tempdir().unwrap();
+            let imported = Imported::look(folder).unwrap();
+            let _ = recording::import(&imported, "a test's", &out.path().join("scan"), &|| {});
+        });
+    });
+}
+
+/// Those pictures.
+pub fn import_files() -> Vec<Vec<u8>> {
+    IMPORTED.with(Folder::seeds)
+}
+
+/// What a training goes on from.
+pub fn checkpoint(bytes: &[u8]) {
+    CHECKPOINT.with(|checkpoint| {
+        checkpoint.with(bytes, |folder| {
+            let path = folder.join(checkpoint::CHECKPOINT);
+            let _ = Checkpoint::read_notes(&path).map(|notes| notes.number::<u64>("updates").ok());
+            if let Ok(mut whole) = Checkpoint::read(&path) {
+                let _ = whole.floats("loss");
+                let _ = whole.take_bytes("patches");
+                let _ = NETWORK.with(|network| whole.fill_store("network", network));
+            }
+        });
+    });
+}
+
+/// A whole one.
+pub fn checkpoints() -> Vec<Vec<u8>> {
+    CHECKPOINT.with(Folder::seeds)
+}
+
 fn network() -> nn::VarStore {
     let store = nn::VarStore::new(Device::Cpu);
     let _ = nn::linear(store.root() / "layer", 3, 2, nn::LinearConfig::default());
@@ -127,6 +167,27 @@ fn make_scan(folder: &Path) {
     recording.store(&Shot { pose: 1, images, patch, optimum: FocalPower::MIDDLE, truth: None }).unwrap();
 }
 
+/// The pictures of one pose, named as `scan import` wants them.
+fn make_pictures(folder: &Path) {
+    for power in evenly_spread(PICTURES) {
+        save(&picture(power), &folder.join(format!("pose001_f{:.3}.png", power.get())));
+    }
+}
+
+fn make_checkpoint(folder: &Path) {
+    let mut checkpoint = Checkpoint::default();
+    checkpoint.put_bytes("patches", vec![7; 13]);
+    checkpoint.put_floats("loss", [0.5, 0.25]);
+    checkpoint.put_store("network", &network());
+    checkpoint.notes.insert("updates".to_owned(), "3".to_owned());
+    checkpoint.write(&folder.join(checkpoint::CHECKPOINT)).unwrap();
+}
+
+fn save(picture: &GrayImage, path: &Path) {
+    let gray = picture.data.iter().map(|&level| level as u8).collect();
+    image::GrayImage::from_raw(SIDE as u32, SIDE as u32, gray).unwrap().save(path).unwrap();
+}
+
 /// A stack's pictures, and a list that says where each was taken.
 fn make_stack(folder: &Path) {
     let pictures = folder.join("pictures");
@@ -135,9 +196,7 @@ fn make_stack(folder: &Path) {
     let mut list = "file,position\n".to_owned();
     for (number, power) in evenly_spread(PICTURES).into_iter().enumerate() {
         let name = format!("plane{number}.png");
-        let gray = picture(power).data.into_iter().map(|level| level as u8).collect();
-        let gray = image::GrayImage::from_raw(SIDE as u32, SIDE as u32, gray).unwrap();
-        gray.save(pictures.join(&name)).unwrap();
+        save(&picture(power), &pictures.join(&name));
         writeln!(list, "{name},{number}").unwrap();
     }
     fs::write(folder.join(LIST), list).unwrap();

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use parfocal::autofocus::{PolicyName, Registry};
+use parfocal::camera::footage::next_pnm;
 use parfocal::imaging::{
     Calibration, GrayImage, MosaicFrame, PatchArea, Picture, Reconstructor, RgbImage, content_area, decode, decode_raw,
 };
@@ -32,14 +33,16 @@ pub struct Target {
 }
 
 /// All of them.
-pub static TARGETS: [Target; 26] = [
+pub static TARGETS: [Target; 29] = [
     Target { name: "authority", take: folders::authority, more_seeds: folders::authorities },
     Target { name: "backup", take: backup::backup, more_seeds: backup::pieces },
     Target { name: "calibration", take: calibration, more_seeds: Vec::new },
     Target { name: "calibration-table", take: folders::calibration_table, more_seeds: Vec::new },
     Target { name: "certificate", take: folders::certificate, more_seeds: folders::certificates },
+    Target { name: "checkpoint", take: lessons::checkpoint, more_seeds: lessons::checkpoints },
     Target { name: "door", take: server::door, more_seeds: server::knocks },
     Target { name: "export", take: folders::export, more_seeds: folders::export_files },
+    Target { name: "import", take: lessons::import, more_seeds: lessons::import_files },
     Target { name: "json", take: json, more_seeds: Vec::new },
     Target { name: "keys", take: folders::keys, more_seeds: Vec::new },
     Target { name: "lens-dynamics", take: lens_dynamics, more_seeds: Vec::new },
@@ -48,6 +51,7 @@ pub static TARGETS: [Target; 26] = [
     Target { name: "optotune", take: optotune, more_seeds: Vec::new },
     Target { name: "package", take: packages::package, more_seeds: packages::packages },
     Target { name: "picture", take: picture, more_seeds: Vec::new },
+    Target { name: "pipe", take: pipe, more_seeds: piped_pictures },
     Target { name: "protocol", take: protocol, more_seeds: shipped_protocols },
     Target { name: "recipe", take: recipe, more_seeds: shipped_recipes },
     Target { name: "recording", take: folders::recording, more_seeds: folders::recording_files },
@@ -123,6 +127,24 @@ pub fn picture(bytes: &[u8]) {
         assert_eq!(gray.data.len(), gray.width * gray.height);
         let _ = content_area::detect(&gray);
     }
+}
+
+/// What ffmpeg writes to a pipe: pictures one after another, until one is damaged or the stream ends.
+pub fn pipe(bytes: &[u8]) {
+    let mut stream = bytes;
+    while let Ok(Some(picture)) = next_pnm(&mut stream) {
+        assert!(
+            u64::from(picture.width()) * u64::from(picture.height()) <= bytes.len() as u64,
+            "more than was written"
+        );
+    }
+}
+
+/// Pictures in colour and in gray, and text pictures, which ffmpeg does not write but the decoder reads.
+fn piped_pictures() -> Vec<Vec<u8>> {
+    let binary = b"P6\n2 1\n255\n\x01\x02\x03\x04\x05\x06P5 1 2 255 \x07\x08".to_vec();
+    let deep = b"P5\n2 2\n65535\n\x01\x02\x03\x04\x05\x06\x07\x08".to_vec();
+    vec![binary, deep, b"P2\n2 2\n255\n1 2 3 4\n".to_vec(), b"P4\n8 1\n\xaa".to_vec()]
 }
 
 /// A trial protocol from any text is read or refused, and what is read is within the limits that docs/trial.md states.

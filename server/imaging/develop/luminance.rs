@@ -167,9 +167,7 @@ impl Luminance {
         let sums = (coarse.lanes_mut(0), fine.lanes_mut(0));
 
         let first = cell * y;
-        let near = |row: usize| {
-            self.smooth_detail.lanes((first + row).saturating_sub(1).min(self.height - 1))
-        };
+        let near = |row: usize| self.smooth_detail.lanes((first + row).saturating_sub(1).min(self.height - 1));
         let detail = |row: usize| self.detail.lanes(first + row);
         let mean = |row: usize| self.mean.lanes(first + row);
         if cell == 4 {
@@ -335,6 +333,9 @@ fn rounded(value: f32) -> i16 {
     (value + 1.5 * LOW_BITS).to_bits() as i16
 }
 
+/// Rows to be made.
+type Rows<'a, const ROWS: usize> = [&'a mut [Lanes<i16>]; ROWS];
+
 /// Parts the detail of a row of cells, `ROWS` rows of values, into a smooth part, added to the mean, and the rest, and sums
 /// the absolute values of both down the columns. `around` is the detail smoothed across, in those rows and in the one
 /// above and below them: `AROUND` rows.
@@ -343,15 +344,15 @@ fn part_rows<const ROWS: usize, const AROUND: usize>(
     around: [&[Lanes<i16>]; AROUND],
     detail: [&[Lanes<i16>]; ROWS],
     mean: [&[Lanes<u16>]; ROWS],
-    (coarse, fine): ([&mut [Lanes<i16>]; ROWS], [&mut [Lanes<i16>]; ROWS]),
+    (coarse, fine): (Rows<'_, ROWS>, Rows<'_, ROWS>),
     (coarse_sum, fine_sum): (&mut [Lanes<u16>], &mut [Lanes<u16>]),
 ) {
     let count = coarse_sum.len();
     let around = around.map(|values| &values[..count]);
     let detail = detail.map(|values| &values[..count]);
     let mean = mean.map(|values| &values[..count]);
-    let mut coarse = coarse.map(|values| &mut values[..count]);
-    let mut fine = fine.map(|values| &mut values[..count]);
+    let coarse = coarse.map(|values| &mut values[..count]);
+    let fine = fine.map(|values| &mut values[..count]);
     let fine_sum = &mut fine_sum[..count];
 
     for x in 0..count {
@@ -380,7 +381,7 @@ fn part_four(
     around: [&[Lanes<i16>]; 6],
     detail: [&[Lanes<i16>]; 4],
     mean: [&[Lanes<u16>]; 4],
-    parts: ([&mut [Lanes<i16>]; 4], [&mut [Lanes<i16>]; 4]),
+    parts: (Rows<'_, 4>, Rows<'_, 4>),
     sums: (&mut [Lanes<u16>], &mut [Lanes<u16>]),
 ) {
     part_rows(around, detail, mean, parts, sums);
@@ -392,7 +393,7 @@ fn part_two(
     around: [&[Lanes<i16>]; 4],
     detail: [&[Lanes<i16>]; 2],
     mean: [&[Lanes<u16>]; 2],
-    parts: ([&mut [Lanes<i16>]; 2], [&mut [Lanes<i16>]; 2]),
+    parts: (Rows<'_, 2>, Rows<'_, 2>),
     sums: (&mut [Lanes<u16>], &mut [Lanes<u16>]),
 ) {
     part_rows(around, detail, mean, parts, sums);
