@@ -14,6 +14,8 @@ use crate::trial::view::{LogLine, OperatorView, SurgeonView};
 /// what stopped it.
 pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (SurgeonView, OperatorView) {
     let surgeon = surgeon(course, now);
+    let withdrawn = course.state.withdrawn();
+    let readable = course.latest_comments.iter().rev().filter(|_| !withdrawn);
     let operator = OperatorView {
         surgeon: surgeon.clone(),
         study: course.study.clone(),
@@ -21,9 +23,9 @@ pub(super) fn both(course: &Course, because: Option<&str>, now: Moment) -> (Surg
         protocol: course.made.protocol.clone(),
         consent_required: course.protocol.consent.clone(),
         consent: course.consent.clone(),
-        withdrawn: course.state.withdrawn(),
+        withdrawn,
         unrecorded_because: because.filter(|_| course.is_unrecorded()).map(str::to_owned),
-        latest_comments: course.latest_comments.iter().rev().cloned().collect(),
+        latest_comments: readable.cloned().collect(),
         log: log(course),
     };
 

@@ -164,7 +164,7 @@ async fn what_was_said_in_a_withdrawn_session_is_shown_no_more() {
 #[tokio::test]
 async fn a_session_under_way_is_aborted_before_it_is_withdrawn_and_no_surgeon_withdraws() {
     let folder = tempfile::tempdir().unwrap();
-    let trial = with_instruments(folder.path()).await;
+    let mut trial = with_instruments(folder.path()).await;
     let session = begin(&trial).await;
     let refused = trial.conductor.act(Role::Operator, session, withdraw()).await.unwrap_err();
     assert!(matches!(&refused, ConductError::Conflict(text) if text.contains("abort it first")), "{refused}");
@@ -175,8 +175,11 @@ async fn a_session_under_way_is_aborted_before_it_is_withdrawn_and_no_surgeon_wi
     let refused = trial.conductor.act(Role::Operator, session, no_reason).await.unwrap_err();
     assert!(matches!(refused, ConductError::Invalid(_)), "{refused}");
 
+    trial.say("hard to judge").await;
+    assert_eq!(trial.operator_view().latest_comments.len(), 1);
     trial.conductor.act(Role::Operator, session, withdraw()).await.unwrap();
     assert!(trial.operator_view().withdrawn);
+    assert_eq!(trial.operator_view().latest_comments, [], "nor does the operator's page go on showing what was said");
 }
 
 #[tokio::test]

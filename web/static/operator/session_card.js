@@ -211,7 +211,8 @@ function drawFeed(session) {
       : null;
     return make("li", {}, timeOf(comment.at), make("span", {}, where, commentWords(comment)));
   });
-  const none = make("li", { className: "empty" }, "None yet.");
+  const why = session.withdrawn ? "No longer shown: the participant withdrew." : "None yet.";
+  const none = make("li", { className: "empty" }, why);
   redraw(byId("comments"), comments.length > 0 ? comments : [none]);
 
   const events = session.log.map((line) => {
