@@ -90,8 +90,8 @@ fn true_colours(scene: &Scene) -> Vec<[u8; 3]> {
     colours
 }
 
-/// Colour differences: the median to the enlarged cell picture, of the developed picture and of the truth; and of hue and
-/// chroma to the truth, which 1 place in 20 exceeds, of the enlarged cell picture and of the developed one.
+/// Colour differences: the median to the enlarged cell picture, of the developed picture and of the truth; and of hue
+/// and chroma to the truth, which 1 place in 20 exceeds, of the enlarged cell picture and of the developed one.
 fn colour_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 4] {
     let mosaic = scene.mosaic(seed);
     let cells = developed(&mosaic, Size::Cell).0.data;
@@ -168,9 +168,10 @@ fn colours_are_those_of_the_cells_without_fringes_at_edges() {
     ];
     for (name, scene) in scenes {
         let [to_cells, of_truth, before, after] = colour_quality(name, &scene, 7);
-        // The leaves have strong detail nearly everywhere, which the cell picture lacks: there the truth itself is further
-        // away from the cells.
-        assert!(to_cells < of_truth.max(2.0), "{name}: {to_cells} {of_truth}");
+        // The leaves have strong detail nearly everywhere, which the cell picture lacks.
+        let limit = if name.starts_with("brain") { 2.0 } else { 3.0 };
+        assert!(to_cells < limit, "{name}: {to_cells}");
+        assert!(to_cells < of_truth, "{name}: {to_cells}, and the truth itself {of_truth}");
         assert!(after < 0.85 * before, "{name}: {before} {after}");
     }
 }

@@ -129,16 +129,18 @@ impl Colour {
     ) {
         let width = CELL * means.len();
         repeat(means, per_cell, self.of_cell.row_mut(0));
-        for (row, levelled) in self.levelled.chunks_exact_mut(width).enumerate() {
-            // With two by two pixels a cell, two rows of samples share one row of pixels.
-            let of_pixels = luminance.lanes((CELL * y + row) * per_cell / CELL);
-            excess_row(of_pixels, self.of_cell.lanes(0), self.excess.lanes_mut(0));
+        // With two by two pixels a cell, two rows of samples share one row of pixels.
+        let shared = CELL / per_cell;
+        for (row, levelled) in self.levelled.chunks_exact_mut(shared * width).enumerate() {
+            excess_row(luminance.lanes(per_cell * y + row), self.of_cell.lanes(0), self.excess.lanes_mut(0));
 
-            let levels = levels.row(CELL * y + row);
-            if per_cell == CELL {
-                level_singles(levels, self.excess.row(0), levelled);
-            } else {
-                level_pairs(levels, self.excess.row(0), levelled);
+            for (below, levelled) in levelled.chunks_exact_mut(width).enumerate() {
+                let levels = levels.row(CELL * y + shared * row + below);
+                if per_cell == CELL {
+                    level_singles(levels, self.excess.row(0), levelled);
+                } else {
+                    level_pairs(levels, self.excess.row(0), levelled);
+                }
             }
         }
 
@@ -284,7 +286,7 @@ fn nearest(share: f32) -> i16 {
     (share.clamp(-32_767.0, 32_767.0) + 1.5 * LOW_BITS).to_bits() as i16
 }
 
-/// x^(1/2.4) of a level's light above [`FLOOR`], which it must not be below; 1 for white. That `times` as much, and `plus`.
+/// x^(1/2.4) of a level's light above [`FLOOR`], which it must not be below; 1 for white. `times` as much, and `plus`.
 ///
 /// A quotient of two quadratics that is within 1.1 % of it from 1/250 of white on, and 0.06 for no light. What error it
 /// has in common at a cell and at a pixel cancels out. It is divided out, so that the numerator is linear, and written

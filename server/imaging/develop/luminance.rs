@@ -3,8 +3,7 @@
 //! A sample senses one band, so its level must be turned into the mean that all bands would have
 //! there. The samples of the same band around it, and the mean of all bands at those places, tell
 //! how the two go together: where a surface is only lit more or less, they stay in proportion;
-//! where something white is added, they differ by a constant. [`SHARES`] stands between the
-//! two.
+//! where something white is added, they differ by a constant. [`SHARES`] stand between the two.
 //!
 //! That is wrong where bands change quickly beside one another, at the edge between two colours:
 //! the error then differs from sample to sample and shows as a maze. Detail that changes from
@@ -20,11 +19,12 @@ use super::lanes::{LANES, Lanes, between, halfway, mixed, upper_half, weighted};
 use super::levels::{BLACK, HIGHEST, LOW_BITS, SPAN, WHITE};
 use super::ring::{Ring, same_bands};
 
-/// How a band's own mean and that of all bands share in that to which a band's deviation is in proportion. With the first
-/// alone a band deviates in proportion to its level; with the second alone all bands deviate by the same amount.
+/// Shares of a band's own mean and of the mean of all bands in what a band's deviation is in proportion to. With the
+/// first alone a band deviates in proportion to its level; with the second alone all bands deviate by the same amount.
 const SHARES: [i16; 2] = [2, 1];
 
-/// Least by which a deviation is divided: so many [`SHARES`] of a level above black.
+/// Least sum of [`SHARES`] by which a deviation is divided: that of a band 64 levels above black, where the mean of all
+/// bands is black.
 const LEAST: i16 = 128;
 
 /// A sample from here on may be saturated, so that it cannot tell that its place is darker than the
@@ -163,25 +163,29 @@ impl Luminance {
     /// the fine part; needs the detail of the next.
     pub(super) fn part(&mut self, y: usize) {
         let cell = self.cell;
-        let Lines { coarse, fine, cells, .. } = &mut self.lines;
-        let sums = (coarse.lanes_mut(0), fine.lanes_mut(0));
-
-        let first = cell * y;
-        let near = |row: usize| self.smooth_detail.lanes((first + row).saturating_sub(1).min(self.height - 1));
-        let detail = |row: usize| self.detail.lanes(first + row);
-        let mean = |row: usize| self.mean.lanes(first + row);
         if cell == 4 {
-            let parts = (self.coarse.rows_mut(first), self.fine.rows_mut(first));
-            let rows = [0, 1, 2, 3];
-            part_four([0, 1, 2, 3, 4, 5].map(near), rows.map(detail), rows.map(mean), parts, sums);
+            self.part_cells::<4, 6>(y);
         } else {
-            let parts = (self.coarse.rows_mut(first), self.fine.rows_mut(first));
-            part_two([0, 1, 2, 3].map(near), [0, 1].map(detail), [0, 1].map(mean), parts, sums);
+            self.part_cells::<2, 4>(y);
         }
 
+        let Lines { coarse, fine, cells, .. } = &mut self.lines;
         let count = self.width / cell;
         trust_row(cell, self.doubt, coarse.row(0), fine.row(0), &mut cells[1..=count]);
         expand(cells, cell, self.trust.row_mut(y));
+    }
+
+    /// [`part_rows`] of the row of cells `y`, of `ROWS` rows of values.
+    fn part_cells<const ROWS: usize, const AROUND: usize>(&mut self, y: usize) {
+        let first = ROWS * y;
+        let last = self.height - 1;
+        let around = std::array::from_fn(|row| self.smooth_detail.lanes((first + row).saturating_sub(1).min(last)));
+        let detail = std::array::from_fn(|row| self.detail.lanes(first + row));
+        let mean = std::array::from_fn(|row| self.mean.lanes(first + row));
+
+        let parts = (self.coarse.rows_mut(first), self.fine.rows_mut(first));
+        let sums = (self.lines.coarse.lanes_mut(0), self.lines.fine.lanes_mut(0));
+        part_rows::<ROWS, AROUND>(around, detail, mean, parts, sums);
     }
 
     /// Makes the luminance of the row of cells `y`; needs the parts of the next.
@@ -336,10 +340,10 @@ fn rounded(value: f32) -> i16 {
 /// Rows to be made.
 type Rows<'a, const ROWS: usize> = [&'a mut [Lanes<i16>]; ROWS];
 
-/// Parts the detail of a row of cells, `ROWS` rows of values, into a smooth part, added to the mean, and the rest, and sums
-/// the absolute values of both down the columns. `around` is the detail smoothed across, in those rows and in the one
-/// above and below them: `AROUND` rows.
-#[inline(always)]
+/// Parts the detail of a row of cells, `ROWS` rows of values, into a smooth part, added to the mean, and the rest, and
+/// sums the absolute values of both down the columns. `around` is the detail smoothed across, in those rows and in the
+/// one above and below them: `AROUND` rows.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn part_rows<const ROWS: usize, const AROUND: usize>(
     around: [&[Lanes<i16>]; AROUND],
     detail: [&[Lanes<i16>]; ROWS],
@@ -373,30 +377,6 @@ fn part_rows<const ROWS: usize, const AROUND: usize>(
         }
         [coarse_sum[x], fine_sum[x]] = sums;
     }
-}
-
-/// [`part_rows`] of cells of four by four values.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn part_four(
-    around: [&[Lanes<i16>]; 6],
-    detail: [&[Lanes<i16>]; 4],
-    mean: [&[Lanes<u16>]; 4],
-    parts: (Rows<'_, 4>, Rows<'_, 4>),
-    sums: (&mut [Lanes<u16>], &mut [Lanes<u16>]),
-) {
-    part_rows(around, detail, mean, parts, sums);
-}
-
-/// [`part_rows`] of cells of two by two values.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn part_two(
-    around: [&[Lanes<i16>]; 4],
-    detail: [&[Lanes<i16>]; 2],
-    mean: [&[Lanes<u16>]; 2],
-    parts: (Rows<'_, 2>, Rows<'_, 2>),
-    sums: (&mut [Lanes<u16>], &mut [Lanes<u16>]),
-) {
-    part_rows(around, detail, mean, parts, sums);
 }
 
 /// How far fine detail is trusted in each cell, of 32767: the energy of the coarse detail beside

@@ -92,6 +92,7 @@ impl<T: Copy + Default> Ring<T> {
         self.some_mut(y).map(|row| row.as_chunks_mut().0)
     }
 
+    /// The `N` rows from `y` on, with their margins.
     fn some_mut<const N: usize>(&mut self, y: usize) -> [&mut [T]; N] {
         let stride = self.stride();
         let rows = &mut self.values[self.skipped + y % self.rows * stride..][..N * stride];
@@ -111,8 +112,8 @@ impl<T: Copy + Default> Ring<T> {
 
     /// Fills the margins of row `y` with the row's first and last `period` values, over and over.
     ///
-    /// `period` divides [`FILLED`]. With the side of a mosaic cell as its period, a place in the margin gets a value of the band
-    /// that would be there.
+    /// `period` divides [`FILLED`]. With the side of a mosaic cell as its period, a place in the margin gets a value of
+    /// the band that would be there.
     pub(super) fn fill_margins(&mut self, y: usize, period: usize) {
         let end = MARGIN + self.width;
         let row = self.padded_mut(y);
