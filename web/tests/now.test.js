@@ -19,8 +19,22 @@ const PHASES = /** @type {const} */ ([
 /** A minute past two, wherever the test runs. */
 const HEARD_AT = new Date(2026, 0, 5, 14, 1).getTime();
 
-const SURGEON = { known: true, missed: false, heardAt: HEARD_AT, unsent: false, unsaved: false };
-const OPERATOR = { known: true, missed: false, heardAt: HEARD_AT, working: true, wrong: false };
+const SURGEON = {
+  known: true,
+  missed: false,
+  heardAt: HEARD_AT,
+  refused: false,
+  unsent: false,
+  unsaved: false,
+};
+const OPERATOR = {
+  known: true,
+  missed: false,
+  heardAt: HEARD_AT,
+  refused: false,
+  working: true,
+  wrong: false,
+};
 
 /** @param {Partial<Api.OperatorView>} told @returns {Api.OperatorView} */
 function operatorView(told) {
@@ -64,6 +78,28 @@ test("a server that is not heard is told with the time since when", () => {
   assert.equal(surgeonWords({ ...lost, view: null }), "No server since 14:01. This page keeps trying.");
   assert.match(surgeonWords({ ...lost, heardAt: null, view: null }), /^The server cannot be reached\./);
   assert.match(operatorWords({ ...OPERATOR, missed: true, view: null }), /since 14:01/);
+});
+
+test("a certificate that has ended is told as the reason, and only while the server is not heard", () => {
+  const time = new FakeTime();
+  const contact = new Contact(time, null);
+  assert.equal(contact.isCertificateOver, false, "a server without a certificate");
+  contact.certifiedUntil(new Date(time.wall() + 60_000).toISOString());
+  assert.equal(contact.isCertificateOver, false);
+  time.wallMillis += 61_000;
+  assert.equal(contact.isCertificateOver, true);
+
+  const refused = { refused: true, missed: true };
+  assert.match(
+    surgeonWords({ ...SURGEON, ...refused, view: VIEW }),
+    /certificate has ended: tell the operator.*saved here/,
+  );
+  assert.match(operatorWords({ ...OPERATOR, ...refused, view: null }), /since 14:01.*certificate has ended/);
+  assert.doesNotMatch(surgeonWords({ ...SURGEON, refused: true, view: VIEW }), /certificate/);
+
+  // The server has another by now.
+  contact.certifiedUntil(new Date(time.wall() + 60_000).toISOString());
+  assert.equal(contact.isCertificateOver, false);
 });
 
 test("before the server has said what is under way, nothing is asked of anybody", () => {

@@ -123,6 +123,7 @@ declare global {
       camera_simulated: boolean;
       lens_simulated: boolean;
       notice: string | null;
+      certificate_until: string | null;
     }
 
     interface OperatorStatus {
@@ -146,6 +147,7 @@ declare global {
       latency_p50_micros: number | null;
       latency_p99_micros: number | null;
       priority: { standing: string; message: string };
+      certificate_until: string | null;
     }
   }
 }

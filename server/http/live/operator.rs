@@ -6,6 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use jiff::Timestamp;
 use serde::Serialize;
 use tokio::sync::watch;
 
@@ -83,6 +84,8 @@ pub(super) struct OperatorStatus {
     latency_p99_micros: Option<u32>,
     /// How the loop stands to other programs on the machine.
     priority: Priority,
+    /// When the server's certificate ends, after which the page cannot reach it.
+    certificate_until: Option<Timestamp>,
 }
 
 /// A [`Standing`], and what it means and what to do in words.
@@ -93,7 +96,7 @@ struct Priority {
 }
 
 impl OperatorStatus {
-    fn new(status: &ControlStatus, blinded: bool) -> Self {
+    fn new(status: &ControlStatus, blinded: bool, certificate_until: Option<Timestamp>) -> Self {
         let (held, message) = match status.held {
             Some(hold) if blinded => told_in_session(hold, status.held_for, status.message.as_ref()),
             held => (held, status.message.clone()),
@@ -113,6 +116,7 @@ impl OperatorStatus {
             latency_p50_micros: (!blinded).then_some(status.latency_p50_micros),
             latency_p99_micros: (!blinded).then_some(status.latency_p99_micros),
             priority: Priority { standing: status.priority, message: status.priority.words() },
+            certificate_until,
         }
     }
 }
@@ -151,7 +155,7 @@ impl Audience for ForOperator {
     }
 
     fn status(status: &ControlStatus, app: &App) -> OperatorStatus {
-        OperatorStatus::new(status, app.blinded())
+        OperatorStatus::new(status, app.blinded(), app.reach.certificate_until())
     }
 }
 

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use jiff::Timestamp;
 use serde::Serialize;
 use tokio::sync::watch;
 use utoipa::ToSchema;
@@ -75,19 +76,27 @@ pub(super) struct SurgeonStatus {
     lens_simulated: bool,
     /// What is the matter, if anything: the same words whatever runs.
     notice: Option<&'static str>,
+    /// When the server's certificate ends, after which the page cannot reach it.
+    #[schema(value_type = Option<String>)]
+    certificate_until: Option<Timestamp>,
 }
 
 impl SurgeonStatus {
     /// Tells of devices that fail, whatever policy runs. A policy that fails is the operator's business: a notice that
     /// came with one policy alone would tell it from the others.
-    fn new(status: &ControlStatus) -> Self {
+    fn new(status: &ControlStatus, certificate_until: Option<Timestamp>) -> Self {
         let notice = match status.held {
             Some(Hold::CameraFailed) => Some("The camera is not delivering pictures."),
             Some(Hold::LensFailed) => Some("The focus is being held for the moment."),
             _ => None,
         };
 
-        Self { camera_simulated: status.camera.simulated, lens_simulated: status.lens.simulated, notice }
+        Self {
+            camera_simulated: status.camera.simulated,
+            lens_simulated: status.lens.simulated,
+            notice,
+            certificate_until,
+        }
     }
 }
 
@@ -113,8 +122,8 @@ impl Audience for ForSurgeon {
         app.surgeon_view.clone()
     }
 
-    fn status(status: &ControlStatus, _: &App) -> SurgeonStatus {
-        SurgeonStatus::new(status)
+    fn status(status: &ControlStatus, app: &App) -> SurgeonStatus {
+        SurgeonStatus::new(status, app.reach.certificate_until())
     }
 }
 

@@ -14,15 +14,18 @@ import { isOver, lacksConsent } from "./session_words.js";
  * @property {boolean} known whether the server has said what is under way
  * @property {boolean} missed whether the server is not heard
  * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
+ * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
  * @property {boolean} working whether camera and lens work, as far as is known
  * @property {boolean} wrong whether the checks found something to put right before a trial
  */
 
 /** @param {Facts} facts */
-export function nowWords({ view, known, missed, heardAt, working, wrong }) {
+export function nowWords({ view, known, missed, heardAt, refused, working, wrong }) {
   if (missed) {
     const since = heardAt === null ? "" : ` since ${minuteText(heardAt)}`;
-    return `The server cannot be reached${since}. Check that it runs and that this device is on its network.`;
+    return refused
+      ? `The server cannot be reached${since}. Its certificate has ended: renew it, or set this device’s clock.`
+      : `The server cannot be reached${since}. Check that it runs and that this device is on its network.`;
   }
   if (!known) return "Connecting to the server…";
   if (!working) return "See to the camera or the lens first. The warning below says what is wrong.";

@@ -61,6 +61,7 @@ function drawNow() {
     known,
     missed: contact.isMissed,
     heardAt: contact.heardAt,
+    refused: contact.isCertificateOver,
     working: status === null || (status.camera.working && status.lens.working),
     wrong,
   };
@@ -70,6 +71,7 @@ function drawNow() {
 /** @param {Stream.OperatorStatus} next */
 function followStatus(next) {
   status = next;
+  contact.certifiedUntil(status.certificate_until);
   drawLamps(byId("devices"), status);
   drawDeviceWords(byId("device-words"), status);
   drawWarnings(byId("warnings"), status);

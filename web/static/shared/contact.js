@@ -16,6 +16,8 @@ export class Contact {
   #heard;
   /** Whether there is no connection. A page begins without one. */
   #isLost = true;
+  /** When the server's certificate ends, in milliseconds since 1970; null where it has none. @type {number | null} */
+  #certificateEnd = null;
 
   /**
    * @param {Clock} clock
@@ -34,6 +36,15 @@ export class Contact {
     this.#isLost = false;
   }
 
+  /**
+   * The server said until when its certificate is valid.
+   *
+   * @param {string | null} until
+   */
+  certifiedUntil(until) {
+    this.#certificateEnd = until === null ? null : Date.parse(until);
+  }
+
   /** The connection is gone. */
   lost() {
     this.#isLost = true;
@@ -42,6 +53,14 @@ export class Contact {
   /** When the server was last heard, in milliseconds since 1970; null if it never was. */
   get heardAt() {
     return this.#heardAt;
+  }
+
+  /**
+   * Whether the server's certificate, as it was last told, has ended by this device's clock. A browser then refuses
+   * the server as it refuses one that it does not trust.
+   */
+  get isCertificateOver() {
+    return this.#certificateEnd !== null && this.#clock.wall() >= this.#certificateEnd;
   }
 
   /** Whether the server has not been heard for long enough to tell somebody. */

@@ -13,13 +13,14 @@ import { minuteText } from "../shared/text.js";
  * @property {boolean} known whether it is known what is under way
  * @property {boolean} missed whether the server is not heard
  * @property {number | null} heardAt when it was last heard, in milliseconds since 1970
+ * @property {boolean} refused whether the server's certificate has ended, so that the browser refuses it
  * @property {boolean} unsent whether a comment stands in the box
  * @property {boolean} unsaved whether anything said is not saved yet
  */
 
 /** @param {Facts} facts */
-export function nowWords({ view, known, missed, heardAt, unsent, unsaved }) {
-  if (missed) return unreachableWords(view, heardAt);
+export function nowWords({ view, known, missed, heardAt, refused, unsent, unsaved }) {
+  if (missed) return unreachableWords(view, heardAt, refused);
   if (!known) return "Connecting to the server…";
   if (view === null) return "Nothing to do yet: wait for the operator to start a trial.";
   if (view.phase === "completed" || view.phase === "aborted") return endWords(unsent, unsaved);
@@ -55,11 +56,13 @@ function endWords(unsent, unsaved) {
 /**
  * @param {View | null} view
  * @param {number | null} heardAt
+ * @param {boolean} refused
  */
-function unreachableWords(view, heardAt) {
+function unreachableWords(view, heardAt, refused) {
   const since =
     heardAt === null ? "The server cannot be reached." : `No server since ${minuteText(heardAt)}.`;
+  const why = refused ? `${since} Its certificate has ended: tell the operator.` : since;
   return view === null
-    ? `${since} This page keeps trying.`
-    : `${since} You can go on commenting: it is saved here and sent later.`;
+    ? `${why} This page keeps trying.`
+    : `${why} You can go on commenting: it is saved here and sent later.`;
 }

@@ -212,6 +212,7 @@ function drawNow() {
     known,
     missed: contact.isMissed,
     heardAt: contact.heardAt,
+    refused: contact.isCertificateOver,
     unsent: comments.unsent,
     unsaved: outbox.waiting.length + voice.waiting > 0,
   };
@@ -220,6 +221,7 @@ function drawNow() {
 
 /** @param {Stream.SurgeonStatus} status */
 function followStatus(status) {
+  contact.certifiedUntil(status.certificate_until);
   const simulated = simulatedWords(status);
   byId("simulated").hidden = simulated === "";
   setText(byId("simulated"), simulated);
