@@ -30,11 +30,12 @@ const TELLING: [&str; 16] = [
 ];
 
 /// Every key of JSON that a surgeon's browser may receive.
-const KEYS: [&str; 52] = [
+const KEYS: [&str; 53] = [
     "age",
     "answers",
     "area",
     "camera_simulated",
+    "certificate_until",
     "comments",
     "error",
     "estimated",

@@ -230,7 +230,7 @@ async fn surgeons_get_no_field_that_could_tell_a_policy() {
     let status = told.iter().find(|told| told["type"] == "status").expect("a status");
     let mut fields: Vec<_> = status.as_object().unwrap().keys().collect();
     fields.sort_unstable();
-    assert_eq!(fields, ["camera_simulated", "lens_simulated", "notice", "type"]);
+    assert_eq!(fields, ["camera_simulated", "certificate_until", "lens_simulated", "notice", "type"]);
     assert!(told.contains(&json!({"type": "session", "view": null})));
 
     let mut operator = Page::open(&server, "operator").await;

@@ -5,6 +5,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use futures_util::StreamExt;
 use http_body_util::BodyExt;
+use jiff::Timestamp;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
@@ -78,14 +79,22 @@ async fn pictures_and_state_come_over_tls() {
     let key = format!("Bearer {}", server.key("surgeon"));
     upgrade.headers_mut().insert("authorization", key.parse().unwrap());
     let (mut socket, _) = client_async(upgrade, line).await.unwrap();
-    let (mut told, mut pictures) = (0, 0);
-    while told == 0 || pictures == 0 {
+    let (mut status, mut pictures) = (None, 0);
+    while status.is_none() || pictures == 0 {
         match socket.next().await.unwrap().unwrap() {
-            Message::Text(_) => told += 1,
+            Message::Text(text) => {
+                let told: Value = serde_json::from_str(&text).unwrap();
+                status = status.or_else(|| (told["type"] == "status").then_some(told));
+            }
             Message::Binary(_) => pictures += 1,
             _ => {}
         }
     }
+
+    // A page that is still open when the certificate has ended says so: it cannot be told any more then.
+    let until: Timestamp = status.unwrap()["certificate_until"].as_str().unwrap().parse().unwrap();
+    let days = until.duration_since(Timestamp::now()).as_hours() / 24;
+    assert!((88..=90).contains(&days), "the authority's certificates live 90 days; this one has {days} left");
 }
 
 fn contains(bytes: &[u8], part: &[u8]) -> bool {
