@@ -129,6 +129,9 @@ impl Authority {
         if read.public_key().subject_public_key.data != key.public_key_raw() {
             return Err(damaged("its private key belongs to another certificate"));
         }
+        // It signed itself. rcgen repeats its names in what it signs, and panics on some that nobody could have written.
+        read.verify_signature(None).map_err(|_| damaged("its certificate is not what was signed"))?;
+
         let name = read.subject().iter_common_name().next().and_then(|name| name.as_str().ok());
         let name = name.unwrap_or_default().to_owned();
 
@@ -261,4 +264,35 @@ fn later(now: Timestamp, by: Duration) -> Timestamp {
 /// Certificates count in seconds.
 fn date(timestamp: Timestamp) -> OffsetDateTime {
     OffsetDateTime::from_unix_timestamp(timestamp.as_second()).unwrap_or(OffsetDateTime::UNIX_EPOCH)
+}
+
+#[cfg(test)]
+mod tests {
+    use base64::Engine;
+    use base64::prelude::BASE64_STANDARD;
+
+    use super::*;
+
+    #[test]
+    fn a_certificate_whose_signed_part_was_changed_anywhere_is_refused() {
+        let now: Timestamp = "2026-06-01T00:00:00Z".parse().unwrap();
+        let pem = make(&Names::default(), now).unwrap();
+        let path = Path::new("authority.pem");
+        assert!(Authority::parse(&pem, path).is_ok());
+
+        let whole = CertificateDer::from_pem_slice(pem.as_bytes()).unwrap().to_vec();
+        let (_, read) = x509_parser::parse_x509_certificate(&whole).unwrap();
+        let signed = read.tbs_certificate.as_ref();
+        let from = whole.windows(signed.len()).position(|window| window == signed).unwrap();
+        let key = &pem[pem.find("-----BEGIN PRIVATE KEY").unwrap()..];
+
+        for (index, bits) in (from..from + signed.len()).flat_map(|index| [(index, 0x01), (index, 0x80)]) {
+            let mut changed = whole.clone();
+            changed[index] ^= bits;
+            let body = BASE64_STANDARD.encode(changed);
+            let pem = format!("-----BEGIN CERTIFICATE-----\n{body}\n-----END CERTIFICATE-----\n{key}");
+            let refused = Authority::parse(&pem, path).err().map(|error| error.to_string());
+            assert!(refused.as_ref().is_some_and(|words| words.contains("is damaged")), "byte {index}: {refused:?}");
+        }
+    }
 }
