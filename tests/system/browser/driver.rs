@@ -453,7 +453,9 @@ async fn area(element: &Element) -> Area {
 }
 
 /// Whether an element has left the page since it was found. While a page is loaded anew, the driver says so in words
-/// of the browser's own.
+/// of its own or of the browser's.
 fn has_left(error: &CmdError) -> bool {
-    error.is_stale_element_reference() || error.to_string().contains("does not belong to the document")
+    const IN_WORDS: [&str; 2] = ["does not belong to the document", "aborted by navigation"];
+    let words = error.to_string();
+    error.is_stale_element_reference() || IN_WORDS.iter().any(|said| words.contains(said))
 }
