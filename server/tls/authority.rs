@@ -129,7 +129,8 @@ impl Authority {
         if read.public_key().subject_public_key.data != key.public_key_raw() {
             return Err(damaged("its private key belongs to another certificate"));
         }
-        // It signed itself. rcgen repeats its names in what it signs, and panics on some that nobody could have written.
+        // The authority signed its own certificate. A changed one must go no further: rcgen writes the authority's name
+        // into whatever it signs, and panics on a name that nobody could have written.
         read.verify_signature(None).map_err(|_| damaged("its certificate is not what was signed"))?;
 
         let name = read.subject().iter_common_name().next().and_then(|name| name.as_str().ok());

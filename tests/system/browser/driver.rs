@@ -88,8 +88,8 @@ impl Driver {
         self.browser_as(&[], json!({ "webkit.webprefs.default_font_size": 32 })).await
     }
 
-    /// The browser of a tablet that has lost its power and is switched on again: `browser` ends at once, without writing
-    /// anything more, and another begins on what is on its disk.
+    /// The browser of a tablet that has lost its power and is switched on again: `browser` ends at once,
+    /// without writing anything more, and another begins on what is on its disk.
     pub async fn after_power_cut(&self, browser: &Browser, options: &[String]) -> Browser {
         // Chromium's lock on its profile names its process.
         let lock = std::fs::read_link(browser.profile.path().join("SingletonLock")).unwrap();
