@@ -17,7 +17,12 @@ const LEAST_ALIKE: f64 = 0.8;
 /// times as much as is usual.
 const MOVED: (f64, f64) = (15.0, 4.0);
 
-/// Notes for the person who took the stack: jumps, motion, overexposure.
+/// Difference of two pictures' sharpness that the same focus may have, as that of logarithms: noise, light.
+const ALIKE_FOCUS: f64 = 0.05;
+/// How many times as much as on either side focus changes where a picture is in the wrong place or one is missing.
+const BREAK: f64 = 3.0;
+
+/// Notes for the person who took the stack: wrong order, jumps, motion, overexposure.
 ///
 /// # Errors
 /// When the pictures are not a focal stack: no peak, another scene, the wrong order, or overexposed.
@@ -26,9 +31,13 @@ pub fn check(stack: &FocalStack) -> Result<Vec<String>, StackError> {
     overexposure(stack, &mut notes)?;
     let blocks = blocks(stack);
     scenes(stack, &blocks)?;
-    curves(stack, &mut notes)?;
-    let jumped = jumps(stack, &mut notes);
-    motion(stack, &blocks, &jumped, &mut notes);
+    let curves = sharpness(stack);
+    peaks_of_focus(stack, &curves, &mut notes)?;
+    let mut broken = disorder(stack, &curves, &mut notes);
+    for (broken, jumped) in broken.iter_mut().zip(jumps(stack, &mut notes)) {
+        *broken |= jumped;
+    }
+    motion(stack, &blocks, &broken, &mut notes);
     Ok(notes)
 }
 
@@ -97,7 +106,8 @@ fn scenes(stack: &FocalStack, blocks: &[GrayImage]) -> Result<(), StackError> {
     Ok(())
 }
 
-fn motion(stack: &FocalStack, blocks: &[GrayImage], jumped: &[bool], notes: &mut Vec<String>) {
+/// What moves, but for pictures between which everything changes: `broken`, one a pair of neighbours.
+fn motion(stack: &FocalStack, blocks: &[GrayImage], broken: &[bool], notes: &mut Vec<String>) {
     let largest = |pair: &[GrayImage]| {
         let changes = changes(pair);
         let index = (0..changes.len()).max_by(|&a, &b| changes[a].total_cmp(&changes[b])).unwrap_or(0);
@@ -107,8 +117,8 @@ fn motion(stack: &FocalStack, blocks: &[GrayImage], jumped: &[bool], notes: &mut
     let usual = median(&largest.iter().map(|change| change.1).collect::<Vec<_>>());
     let side = block_side(stack);
 
-    for ((&(index, change), planes), jumped) in largest.iter().zip(stack.planes().windows(2)).zip(jumped) {
-        if !jumped && change > MOVED.0 && change > MOVED.1 * usual {
+    for ((&(index, change), planes), broken) in largest.iter().zip(stack.planes().windows(2)).zip(broken) {
+        if !broken && change > MOVED.0 && change > MOVED.1 * usual {
             let x = index % blocks[0].width * side;
             let y = index / blocks[0].width * side;
 
@@ -117,8 +127,7 @@ fn motion(stack: &FocalStack, blocks: &[GrayImage], jumped: &[bool], notes: &mut
     }
 }
 
-fn curves(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), StackError> {
-    let curves = sharpness(stack);
+fn peaks_of_focus(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) -> Result<(), StackError> {
     let ratio = |curve: &&Vec<f64>| least_and_most(curve).1 / least_and_most(curve).0.max(0.1);
     let peaked: Vec<&Vec<f64>> = curves.iter().filter(|curve| ratio(curve) >= LEAST_PEAK).collect();
     if peaked.len() * 10 < curves.len().max(1) {
@@ -152,6 +161,44 @@ fn curves(stack: &FocalStack, notes: &mut Vec<String>) -> Result<(), StackError>
         notes.push(format!("{:.0} % of the places are sharpest in the first or last picture", 100.0 * share));
     }
     Ok(())
+}
+
+/// Between which neighbours the order of focus breaks: a picture is in the wrong place, or some are missing.
+fn disorder(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) -> Vec<bool> {
+    let planes = stack.planes();
+    // Root mean square over the places.
+    let change = |one: usize, other: usize| {
+        let differences: Vec<f64> =
+            curves.iter().map(|curve| (curve[one].max(0.1) / curve[other].max(0.1)).ln()).collect();
+        mean(&differences.iter().map(|difference| difference.powi(2)).collect::<Vec<_>>()).sqrt().max(ALIKE_FOCUS)
+    };
+
+    let mut broken = vec![false; planes.len().saturating_sub(1)];
+    for (index, plane) in planes.iter().enumerate().skip(1).take(planes.len().saturating_sub(2)) {
+        // Without this picture its neighbours would follow one another.
+        let around = change(index - 1, index + 1);
+        if change(index - 1, index).min(change(index, index + 1)) > BREAK * around {
+            broken[index - 1..=index].fill(true);
+            notes.push(format!(
+                "{} is not in order of focus: the pictures before and after it are alike, and it is not like them",
+                plane.name
+            ));
+        }
+    }
+
+    for index in 1..planes.len().saturating_sub(2) {
+        let beside = change(index - 1, index).max(change(index + 1, index + 2));
+        let beside_is_sound = !broken[index - 1] && !broken[index] && !broken[index + 1];
+        if beside_is_sound && change(index, index + 1) > BREAK * beside {
+            broken[index] = true;
+            notes.push(format!(
+                "focus jumps between {} and {}: pictures are missing between them, or they are not in order of focus",
+                planes[index].name,
+                planes[index + 1].name
+            ));
+        }
+    }
+    broken
 }
 
 /// Between which pictures everything jumps.
@@ -349,6 +396,20 @@ mod tests {
             shuffled[index].position = position as f64;
         }
         assert!(refused(&FocalStack::new(shuffled).unwrap()).contains("not in order of focus"));
+    }
+
+    #[test]
+    fn pictures_out_of_order_are_noted() {
+        let mut planes = stack(21, |_, picture| picture).planes().to_vec();
+        planes[12].position = 2.5;
+        let told = check(&FocalStack::new(planes).unwrap()).unwrap();
+        assert!(told.len() == 1 && told[0].starts_with("12.png is not in order of focus"), "{told:?}");
+
+        // Its first five pictures come last.
+        let mut planes = stack(31, |_, picture| picture).planes()[..22].to_vec();
+        planes[..5].iter_mut().for_each(|plane| plane.position += 50.0);
+        let told = check(&FocalStack::new(planes).unwrap()).unwrap();
+        assert!(told.len() == 1 && told[0].starts_with("focus jumps between 21.png and 00.png"), "{told:?}");
     }
 
     #[test]
