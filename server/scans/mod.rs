@@ -6,6 +6,7 @@ pub mod benchmark;
 pub mod clip;
 pub mod detail;
 pub mod footage;
+mod photography;
 pub mod pictures;
 pub mod planes;
 mod reach;

@@ -11,11 +11,11 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::photography::{Manner, Photography};
 use super::pictures::{Split, sharp_phantom_of};
 use super::planes::{PlaneStack, PlanesError};
 use crate::imaging::GrayImage;
 use crate::simulation::blur::gaussian_blur;
-use crate::simulation::normal::{cheap_normal, standard_normal};
 use crate::simulation::spots::{LensSpot, blurred};
 use crate::simulation::texture::{Canvas, texture, vary_contrast};
 
@@ -23,6 +23,8 @@ use crate::simulation::texture::{Canvas, texture, vary_contrast};
 const SIDE: usize = 360;
 /// Standard deviations in pixels at which each layer is blurred; between them pictures are mixed.
 const SIGMAS: [f32; 12] = [0.0, 0.4, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 7.5, 9.5, 12.0];
+/// The last of them.
+const MOST_BLUR: f32 = SIGMAS[SIGMAS.len() - 1];
 /// Most that a place is higher or lower than the middle, in pixels of blur.
 const MOST_RELIEF: f64 = 4.5;
 /// Most softness of the best picture, in pixels of standard deviation.
@@ -45,8 +47,8 @@ pub struct Style {
     steps: f64,
     /// Share of scenes that are photographed at few positions.
     photographed: f64,
-    /// Least noise of the pictures of those, in gray levels.
-    least_noise: f32,
+    /// What those may be like.
+    manner: Manner,
 }
 
 impl Style {
@@ -58,7 +60,7 @@ impl Style {
         slopes: f64::INFINITY,
         steps: 0.6,
         photographed: 0.45,
-        least_noise: 0.0,
+        manner: Manner { least_noise: 0.0, misplaced: 0.6, grainy: 0.4, followed: 0.4 },
     };
 
     /// As hard for the hill-climbers as photographed stacks: relief that takes most of the range.
@@ -70,8 +72,11 @@ impl Style {
         slopes: 1.3,
         steps: 1.0,
         photographed: 0.9,
-        least_noise: 1.0,
+        manner: Manner { least_noise: 1.0, misplaced: 0.0, grainy: 0.0, followed: 0.0 },
     };
+
+    /// The same, photographed less carefully: to train on.
+    const DEEP_TO_TRAIN: Self = Self { manner: Manner { least_noise: 1.0, ..Self::VARIED.manner }, ..Self::DEEP };
 }
 
 /// A focal stack to scan in training, and how steeply it may blur.
@@ -104,7 +109,7 @@ pub enum Distance {
 /// # Errors
 /// None in practice: the scenes are large enough.
 pub fn scenes(split: Split, count: u64) -> Result<Vec<Arc<StackScene>>, PlanesError> {
-    let style = |index: u64| if index.is_multiple_of(2) { Style::VARIED } else { Style::DEEP };
+    let style = |index: u64| if index.is_multiple_of(2) { Style::VARIED } else { Style::DEEP_TO_TRAIN };
     (0..count).into_par_iter().map(|index| scene(split, index, style(index)).map(Arc::new)).collect()
 }
 
@@ -129,7 +134,8 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
     let above = rng.random_bool(0.6).then(|| things_above(seed, relief, softness, &mut rng));
     let spots = spots(&mut rng);
     let finish = Finish::draw(&mut rng);
-    let taking = Taking::draw(style, &mut rng);
+    // Without it the scene is shown at so many positions, and so well, that only the scan's own noise is in the pictures.
+    let photography = rng.random_bool(style.photographed).then(|| Photography::draw(style.manner, MOST_BLUR, &mut rng));
 
     let ground = Layer::new(&ground, spots);
     let above = above.map(|Above { colour, cover, height }| {
@@ -150,74 +156,18 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
         (position, finish.apply(GrayImage { width: SIDE, height: SIDE, data: picture }))
     };
 
-    let mut pictures: Vec<_> = taking.positions().into_iter().map(picture).collect();
-    taking.spoil(&mut pictures, &mut rng);
-
-    let least = softness.max(f64::from(relief) / style.most_share).max(taking.least_slope()).max(SLOPES.0);
-    let slopes = (least, (style.slopes * least).min(SLOPES.1));
-    Ok(StackScene { planes: PlaneStack::new(&pictures)?, slopes, distance: Distance::Kept })
-}
-
-/// How a scene's pictures are taken.
-enum Taking {
-    /// At so many positions, and so well, that only the scan's own noise is in the pictures.
-    Ideally,
-    /// As a stack is photographed: at few positions, each picture with noise, brightness and place
-    /// of its own. Through a lens that moves between them, a mix of two pictures has less noise than
-    /// either.
-    Photographed {
-        /// Pixels of blur from one position to the next.
-        spacing: f32,
-        /// Standard deviation of the noise, in gray levels.
-        noise: f32,
-        /// Standard deviation of a picture's brightness, as a share.
-        flicker: f32,
-    },
-}
-
-/// Least positions in a unit of focal power of a photographed stack.
-const LEAST_PLANES: f64 = 5.0;
-
-impl Taking {
-    fn draw(style: Style, rng: &mut impl Rng) -> Self {
-        if !rng.random_bool(style.photographed) {
-            return Self::Ideally;
-        }
-
-        let noise = rng.random_range(style.least_noise..3.5);
-        let flicker = if rng.random_bool(0.5) { rng.random_range(0.0f32..0.03) } else { 0.0 };
-        Self::Photographed { spacing: rng.random_range(0.3f32..2.0), noise, flicker }
+    let positions = photography.as_ref().map_or_else(close_positions, |taken| taken.positions(MOST_BLUR));
+    let mut pictures: Vec<_> = positions.into_iter().map(picture).collect();
+    let mut slope = softness.max(f64::from(relief) / style.most_share).max(SLOPES.0);
+    let mut distance = Distance::Kept;
+    if let Some(photography) = photography {
+        photography.spoil(&mut pictures, &mut rng);
+        slope = slope.max(photography.least_slope());
+        distance = photography.distance(style.manner, &mut rng);
     }
 
-    /// Positions of the focal plane, rising.
-    fn positions(&self) -> Vec<f32> {
-        match self {
-            Self::Ideally => close_positions(),
-            Self::Photographed { spacing, .. } => {
-                let each_side = (SIGMAS[SIGMAS.len() - 1] / spacing).ceil() as i32;
-                (-each_side..=each_side).map(|plane| plane as f32 * spacing).collect()
-            }
-        }
-    }
-
-    /// Least slope at which the positions are close enough.
-    fn least_slope(&self) -> f64 {
-        match self {
-            Self::Ideally => 0.0,
-            Self::Photographed { spacing, .. } => LEAST_PLANES * f64::from(*spacing),
-        }
-    }
-
-    /// Adds what each picture has of its own.
-    fn spoil(&self, pictures: &mut [(f32, GrayImage)], rng: &mut impl Rng) {
-        let Self::Photographed { noise, flicker, .. } = self else { return };
-        for (_, picture) in pictures {
-            let gain = (flicker * standard_normal(rng) as f32).exp();
-            for value in &mut picture.data {
-                *value = (gain * *value + noise * cheap_normal(rng)).clamp(0.0, 255.0);
-            }
-        }
-    }
+    let slopes = (slope, (style.slopes * slope).min(SLOPES.1));
+    Ok(StackScene { planes: PlaneStack::new(&pictures)?, slopes, distance })
 }
 
 /// Positions of the focal plane that lie close together where blur changes what is seen most.
