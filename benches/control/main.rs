@@ -20,9 +20,7 @@ use parfocal::clock::{Clock, SystemClock};
 use parfocal::control::{
     Command, ControlLoop, ControlledFrame, Drive, Eye, LatencyFigures, Rig, Settings, StepRecord, Stepper,
 };
-use parfocal::imaging::{
-    Calibration, GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, View, WIDER,
-};
+use parfocal::imaging::{GrayImage, JpegEncoder, MosaicFrame, Patch, Reconstructor, RgbImage, View, WIDER};
 use parfocal::lens::{FocalPower, Lens, SimulatedLens};
 
 fn texture(index: usize) -> usize {
@@ -67,7 +65,7 @@ fn steps(criterion: &mut Criterion) {
     let image = FrameImage::Mosaic(Arc::new(MosaicFrame::new(2048, 1088, samples).expect("fits")));
     for name in available() {
         let clock = Arc::new(SystemClock);
-        let eye = Eye::new(Reconstructor::new(&Calibration::default()));
+        let eye = Eye::new(Reconstructor::default());
         let lens = Box::new(SimulatedLens::new(clock.clone()));
         let mut stepper = Stepper::new(lens, eye, Registry::standard(), clock.clone(), Duration::from_millis(20));
         let drive = Drive::Policy { name: name.clone(), start: None };
@@ -99,7 +97,7 @@ fn latency(_: &mut Criterion) {
 /// What the whole loop did in `steps` steps, the MGM hill-climber in charge: telemetry is drained, and a thread makes a
 /// picture of each frame meanwhile, as the live view does.
 fn watch_loop(camera: Box<dyn Camera>, lens: Box<dyn Lens>, fps: f64, steps: usize) -> Vec<StepRecord> {
-    let mut reconstructor = Reconstructor::new(&Calibration::default());
+    let mut reconstructor = Reconstructor::default();
     let clock = Arc::new(SystemClock);
     let rig = Rig { camera, lens, reconstructor: reconstructor.clone(), registry: Registry::standard(), clock };
     let frame_period = Duration::from_secs_f64(1.0 / fps);

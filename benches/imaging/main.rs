@@ -45,7 +45,7 @@ fn imaging(criterion: &mut Criterion) {
     group.bench_function("memcpy of the mosaic", |bench| {
         bench.iter(|| black_box(&mut copy).copy_from_slice(black_box(mosaic.samples())));
     });
-    let mut reconstructor = Reconstructor::new(&Calibration::default());
+    let mut reconstructor = Reconstructor::default();
     group.bench_function("reconstruct", |bench| {
         bench.iter(|| reconstructor.reconstruct(black_box(&mosaic), &mut rgb, &mut gray));
     });

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::clip::{Area, Clip, ClipError};
 use crate::camera::footage::{self, ffmpeg, is_picture};
-use crate::imaging::{Calibration, ContentArea, GrayImage, Reconstructor, content_area, decode, reduced};
+use crate::imaging::{ContentArea, GrayImage, Reconstructor, content_area, decode, reduced};
 use crate::notices::tell;
 
 /// Most lines of a picture: the height the paper's walks are meant for.
@@ -59,7 +59,7 @@ fn unreadable(path: &Path, reason: &str) -> FootageError {
 fn image(path: &Path) -> Result<GrayImage, FootageError> {
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error.to_string()))?;
     let picture = decode(&bytes, false).map_err(|error| unreadable(path, &error.to_string()))?;
-    let gray = picture.into_gray(&mut Reconstructor::new(&Calibration::default()));
+    let gray = picture.into_gray(&mut Reconstructor::default());
 
     if gray.height <= LINES {
         return Ok(gray);

@@ -11,9 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::autofocus::mgm;
 use crate::camera::recorded::{Pose, ScanError, ScanFolder};
-use crate::imaging::{
-    Calibration, GrayImage, MosaicFrame, PATCH_SIDE, Patch, PatchArea, Reconstructor, Square, View, WIDER,
-};
+use crate::imaging::{GrayImage, MosaicFrame, PATCH_SIDE, Patch, PatchArea, Reconstructor, Square, View, WIDER};
 use crate::lens::FocalPower;
 use crate::scans::FocalTimeScan;
 use crate::scans::ScanSet;
@@ -153,7 +151,7 @@ impl RecordedScan {
     #[must_use]
     pub fn phantom(trajectory: &Trajectory, seed: u64, powers: usize, progress: &(dyn Fn() + Sync)) -> Self {
         let powers = evenly_spread(powers);
-        let reconstructor = Reconstructor::new(&Calibration::default());
+        let reconstructor = Reconstructor::default();
 
         let still = |samples: &mut Vec<u16>, pose| {
             let still = trajectory.still(pose)?;

@@ -11,9 +11,7 @@ use std::time::Duration;
 use parfocal::autofocus::mgm;
 use parfocal::camera::{self, Camera, CameraError, CameraSettings, Frame, FrameImage};
 use parfocal::clock::{Clock, Moment};
-use parfocal::imaging::{
-    Calibration, GrayImage, MosaicFrame, PatchArea, Reconstructor, RgbImage, content_area, rgb_patch,
-};
+use parfocal::imaging::{GrayImage, MosaicFrame, PatchArea, Reconstructor, RgbImage, content_area, rgb_patch};
 use parfocal::lens::{FocalPower, Optics};
 use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
 
@@ -102,7 +100,7 @@ fn frames_that_come_too_late_are_lost_and_counted() {
 
 #[test]
 fn the_phantom_knows_where_its_patch_is_sharpest() {
-    let reconstructor = Reconstructor::new(&Calibration::default());
+    let reconstructor = Reconstructor::default();
     for seed in [11, 12, 13] {
         let mut phantom = Phantom::new(seed);
         let mut hand = Hand::new(seed);
@@ -140,7 +138,7 @@ fn the_phantoms_picture_is_exposed_well_and_its_content_area_can_be_found() {
     let mosaic = MosaicFrame::new(SENSOR_WIDTH, SENSOR_HEIGHT, samples).unwrap();
     let mut rgb = RgbImage::default();
     let mut gray = GrayImage::default();
-    Reconstructor::new(&Calibration::default()).reconstruct(&mosaic, &mut rgb, &mut gray);
+    Reconstructor::default().reconstruct(&mosaic, &mut rgb, &mut gray);
     let found = content_area::detect(&gray).unwrap();
     let truth = phantom.content_area();
     assert!((found.x - truth.x).hypot(found.y - truth.y) < 3.0, "{found:?} {truth:?}");

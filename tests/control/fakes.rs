@@ -10,7 +10,7 @@ use parfocal::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
 use parfocal::clock::{Clock, Moment};
 use parfocal::control::{Command, Drive};
 use parfocal::ids::SegmentId;
-use parfocal::imaging::{Calibration, Reconstructor, RgbImage};
+use parfocal::imaging::{Reconstructor, RgbImage};
 use parfocal::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
 use rustix::thread::{Pid, gettid};
 
@@ -256,6 +256,6 @@ impl Camera for FakeCamera {
 
 /// No fake frame is a mosaic, so which calibration it is does not matter; making one takes a while.
 pub fn reconstructor() -> Reconstructor {
-    static SHARED: LazyLock<Reconstructor> = LazyLock::new(|| Reconstructor::new(&Calibration::default()));
+    static SHARED: LazyLock<Reconstructor> = LazyLock::new(|| Reconstructor::default());
     SHARED.clone()
 }

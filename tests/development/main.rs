@@ -75,7 +75,7 @@ fn luminance_quality(name: &str, scene: &Scene, seed: u64) -> [f64; 3] {
 
 /// The colours that the sensor would show if it sensed every band at every place.
 fn true_colours(scene: &Scene) -> Vec<[u8; 3]> {
-    let mut reconstructor = Reconstructor::new(&Calibration::default());
+    let mut reconstructor = Reconstructor::default();
     let mut rgb = RgbImage::default();
     let mut gray = GrayImage::default();
     let mut colours = vec![[0; 3]; SIDE * SIDE];
@@ -323,7 +323,7 @@ fn a_cell_picture_is_the_reconstructors() {
     let seen = Scene::leaves(108).mosaic(3);
     let mut rgb = RgbImage::default();
     let mut gray = GrayImage::default();
-    Reconstructor::new(&Calibration::default()).reconstruct(&seen, &mut rgb, &mut gray);
+    Reconstructor::default().reconstruct(&seen, &mut rgb, &mut gray);
     assert_eq!(developed(&seen, Size::Cell), (rgb, gray));
 }
 

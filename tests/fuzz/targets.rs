@@ -119,7 +119,7 @@ pub fn picture(bytes: &[u8]) {
             Ok(Picture::Mosaic(frame)) => {
                 let mut rgb = RgbImage::default();
                 let mut gray = GrayImage::default();
-                Reconstructor::new(&Calibration::default()).reconstruct(&frame, &mut rgb, &mut gray);
+                Reconstructor::default().reconstruct(&frame, &mut rgb, &mut gray);
                 gray
             }
             Err(_) => continue,

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use parfocal::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
 use parfocal::clock::{Clock, ManualClock, Moment, SystemClock};
 use parfocal::control::Eye;
-use parfocal::imaging::{Calibration, Reconstructor, RgbImage};
+use parfocal::imaging::{Reconstructor, RgbImage};
 use parfocal::lens::emulator::Model;
 use parfocal::lens::{FocalPower, Lens, LensDynamics, Optics, SimulatedLens};
 use parfocal::lens_measurement::{Measurement, MeasurementError, Plan, View, measure};
@@ -61,7 +61,7 @@ fn measured(
     let due = clock.now();
     let period = Duration::from_millis(20);
     let camera = Stripes { clock: clock.clone(), optics, pause: pause.clone(), period, due, number: 0, contrast };
-    let eye = Eye::new(Reconstructor::new(&Calibration::default()));
+    let eye = Eye::new(Reconstructor::default());
     measure(lens, &mut View::new(Box::new(camera), eye, clock), plan, &*pause)
 }
 

@@ -13,7 +13,7 @@ use crate::cli::output::{Failure, print};
 use crate::clock::{Clock, SystemClock};
 use crate::control::Eye;
 use crate::files::replace;
-use crate::imaging::{Calibration, Reconstructor};
+use crate::imaging::Reconstructor;
 use crate::lens::{LensInfo, MeasuredDynamics};
 use crate::lens_measurement::{Fit, Measurement, Plan, View, measure, plot};
 
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let settings =
         CameraSettings { fps: arguments.fps.into(), seed: 0, optics: lens.optics(), clock: Arc::clone(&clock) };
     let camera = camera::open(&arguments.camera, settings)?;
-    let eye = Eye::new(Reconstructor::new(&Calibration::default()));
+    let eye = Eye::new(Reconstructor::default());
     let mut view = View::new(camera, eye, Arc::clone(&clock));
 
     let watch = Duration::from_millis(arguments.watch.into());

@@ -7,7 +7,7 @@ mod mix;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use multiversion::multiversion;
 
@@ -62,6 +62,15 @@ struct Lines {
     balanced: Vec<u16>,
     /// One row of each colour.
     colours: [Vec<f32>; 3],
+}
+
+impl Default for Reconstructor {
+    /// The one of the default calibration, whose colour matrix is fitted once: reading a file's pictures
+    /// asks for it again and again.
+    fn default() -> Self {
+        static FITTED: LazyLock<Reconstructor> = LazyLock::new(|| Reconstructor::new(&Calibration::default()));
+        FITTED.clone()
+    }
 }
 
 impl Reconstructor {

@@ -9,7 +9,7 @@ use crate::camera::footage::picture_reader;
 use crate::camera::recorded::{
     FORMAT, Header, LEAST_SIDE, MOST_POSES, Order, Recording, ScanError, ScanFolder, VERSION,
 };
-use crate::imaging::{Calibration, DecodeError, GrayImage, PatchArea, Reconstructor, content_area, decode};
+use crate::imaging::{DecodeError, GrayImage, PatchArea, Reconstructor, content_area, decode};
 use crate::lens::FocalPower;
 
 /// What a folder holds: for each pose its number there, and a file for each focal power, rising.
@@ -115,7 +115,7 @@ pub fn import(imported: &Imported, camera: &str, out: &Path, progress: &dyn Fn()
         focal_powers: imported.powers(),
     };
 
-    let mut reader = Reader { reconstructor: Reconstructor::new(&Calibration::default()), first: None };
+    let mut reader = Reader { reconstructor: Reconstructor::default(), first: None };
     // Before anything is written.
     imported.poses.values().flatten().try_for_each(|(_, path)| reader.measure(path))?;
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{PoseSource, RecordError, Taken};
 use crate::camera::CameraError;
-use crate::imaging::{Calibration, GrayImage, MosaicFrame, Reconstructor, RgbImage};
+use crate::imaging::{GrayImage, MosaicFrame, Reconstructor, RgbImage};
 use crate::lens::FocalPower;
 use crate::scans::recorded::put_square;
 use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH, Trajectory};
@@ -19,7 +19,7 @@ impl PhantomPoses {
     /// The poses of `trajectory`, one after another.
     #[must_use]
     pub fn new(trajectory: Trajectory) -> Self {
-        Self { trajectory, reconstructor: Reconstructor::new(&Calibration::default()) }
+        Self { trajectory, reconstructor: Reconstructor::default() }
     }
 }
 

@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use crate::camera::footage::{self, pictures_in};
-use crate::imaging::{Calibration, DecodeError, GrayImage, Reconstructor, decode, in_blocks};
+use crate::imaging::{DecodeError, GrayImage, Reconstructor, decode, in_blocks};
 
 /// Least number of pictures in which a peak and an order can be recognised.
 pub const LEAST_PLANES: usize = 5;
@@ -147,7 +147,7 @@ impl FocalStack {
             None => named(files),
         };
 
-        let mut reconstructor = Reconstructor::new(&Calibration::default());
+        let mut reconstructor = Reconstructor::default();
         let read = |(path, position): (PathBuf, f64)| {
             let bytes = std::fs::read(&path).map_err(|source| StackError::File { path: path.clone(), source })?;
             let picture = decode(&bytes, false).map_err(|source| StackError::Picture { path: path.clone(), source })?;

@@ -151,14 +151,14 @@ impl Phantom {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::{Calibration, MosaicFrame, Reconstructor};
+    use crate::imaging::{MosaicFrame, Reconstructor};
     use crate::simulation::phantom::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
     #[test]
     fn a_view_alone_equals_that_of_the_whole_exposure() {
         let trajectory = Trajectory::new(1, 2, Haste::default());
         let still = trajectory.still(1).unwrap();
-        let reconstructor = Reconstructor::new(&Calibration::default());
+        let reconstructor = Reconstructor::default();
 
         let seen = |whole: bool| {
             let mut samples = vec![0; SENSOR_WIDTH * SENSOR_HEIGHT];
