@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Condvar, LazyLock, Mutex};
+use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
 use parfocal::autofocus::{Decision, FieldOfView, Observation, Policy, PolicyName, Registry};
@@ -10,7 +10,7 @@ use parfocal::camera::{Camera, CameraError, CameraHealth, Frame, FrameImage};
 use parfocal::clock::{Clock, Moment};
 use parfocal::control::{Command, Drive};
 use parfocal::ids::SegmentId;
-use parfocal::imaging::{Reconstructor, RgbImage};
+use parfocal::imaging::RgbImage;
 use parfocal::lens::{FocalPower, Lens, LensDynamics, LensError, LensHealth, LensInfo, Optics, Response};
 use rustix::thread::{Pid, gettid};
 
@@ -252,10 +252,4 @@ impl Camera for FakeCamera {
             lost: 0,
         }
     }
-}
-
-/// No fake frame is a mosaic, so which calibration it is does not matter; making one takes a while.
-pub fn reconstructor() -> Reconstructor {
-    static SHARED: LazyLock<Reconstructor> = LazyLock::new(|| Reconstructor::default());
-    SHARED.clone()
 }

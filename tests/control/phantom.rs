@@ -8,11 +8,9 @@ use parfocal::autofocus::{PolicyName, Registry};
 use parfocal::camera::{Frame, FrameImage, Truth};
 use parfocal::clock::{Clock, ManualClock};
 use parfocal::control::{Command, Drive, Eye, Stepper};
-use parfocal::imaging::MosaicFrame;
+use parfocal::imaging::{MosaicFrame, Reconstructor};
 use parfocal::lens::{FocalPower, Lens, SimulatedLens};
 use parfocal::simulation::phantom::{Hand, Phantom, SENSOR_HEIGHT, SENSOR_WIDTH};
-
-use super::fakes::reconstructor;
 
 /// A frame every 40 ms, exposed for 10 ms of them: the lens has come to rest before the next one.
 const EXPOSURE: Duration = Duration::from_millis(10);
@@ -35,7 +33,7 @@ fn run(policy: &str, seed: u64) -> Vec<f64> {
     let mut hand = Hand::new(seed);
     let patience = Duration::from_secs(20);
     let mut stepper =
-        Stepper::new(Box::new(lens), Eye::new(reconstructor()), Registry::standard(), clock.clone(), patience);
+        Stepper::new(Box::new(lens), Eye::new(Reconstructor::default()), Registry::standard(), clock.clone(), patience);
     stepper.obey(Command::ContentArea(Some(phantom.content_area())));
     let drive = Drive::Policy { name: PolicyName::new(policy), start: Some(FocalPower::MIDDLE) };
     stepper.obey(Command::Drive { drive, segment: None });

@@ -8,12 +8,12 @@ use parfocal::autofocus::{Decision, FieldOfView, Observation, Policy, PolicyName
 use parfocal::clock::{Clock, ManualClock};
 use parfocal::control::{Command, Drive, Eye, Hold, StepRecord, Stepper};
 use parfocal::ids::SegmentId;
-use parfocal::imaging::ContentArea;
+use parfocal::imaging::{ContentArea, Reconstructor};
 use parfocal::lens::{LensDynamics, LensError};
 use proptest::prelude::*;
 use uuid::Uuid;
 
-use super::fakes::{Deed, FakeLens, Script, drive, frame, power, reconstructor, sized_frame};
+use super::fakes::{Deed, FakeLens, Script, drive, frame, power, sized_frame};
 
 const FRAME: Duration = Duration::from_millis(20);
 /// Far longer than a sound policy's thread needs to be scheduled on a busy machine.
@@ -38,7 +38,7 @@ impl Fixture {
         let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
         clock.advance(Duration::from_secs(10));
         let script = Script::new(Deed::GoTo(0.6));
-        let eye = Eye::new(reconstructor());
+        let eye = Eye::new(Reconstructor::default());
         let stepper = Stepper::new(Box::new(lens.clone()), eye, script.registry(), clock.clone(), patience);
         Self { clock, lens, script, stepper, number: 0 }
     }
@@ -113,7 +113,7 @@ fn a_policy_is_shown_wider_patches_only_if_it_uses_them() {
 
         let clock = Arc::new(ManualClock::new(Timestamp::UNIX_EPOCH));
         let lens = Box::new(FakeLens::at(power(0.5)));
-        let mut stepper = Stepper::new(lens, Eye::new(reconstructor()), registry, clock.clone(), PATIENT);
+        let mut stepper = Stepper::new(lens, Eye::new(Reconstructor::default()), registry, clock.clone(), PATIENT);
 
         clock.advance(Duration::from_secs(10));
         stepper.obey(drive("spectator", None));

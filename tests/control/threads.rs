@@ -9,10 +9,11 @@ use parfocal::clock::{Clock, SystemClock};
 use parfocal::control::{
     Command, ControlHandle, ControlLoop, ControlStatus, ControlledFrame, Drive, Hold, Rig, Settings, StepRecord,
 };
+use parfocal::imaging::Reconstructor;
 use rustix::thread::Pid;
 use tokio::sync::mpsc;
 
-use super::fakes::{Deed, FakeCamera, FakeLens, Script, Shot, drive, power, reconstructor};
+use super::fakes::{Deed, FakeCamera, FakeLens, Script, Shot, drive, power};
 
 const LIMIT: Duration = Duration::from_secs(20);
 const SIDE: usize = 32;
@@ -35,7 +36,7 @@ impl Stage {
         let rig = Rig {
             camera: Box::new(fake_camera),
             lens: Box::new(lens.clone()),
-            reconstructor: reconstructor(),
+            reconstructor: Reconstructor::default(),
             registry: script.registry(),
             clock,
         };
