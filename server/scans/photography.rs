@@ -8,7 +8,6 @@
 
 use rand::{Rng, RngExt};
 
-use super::relief::Distance;
 use crate::imaging::GrayImage;
 use crate::simulation::blur::gaussian_blur;
 use crate::simulation::normal::{cheap_normal, standard_normal};
@@ -85,10 +84,9 @@ impl Photography {
         }
     }
 
-    /// How scans go over the stack.
-    pub fn distance(&self, manner: Manner, rng: &mut impl Rng) -> Distance {
-        let followed = happens(manner.followed, rng);
-        if followed { Distance::Following { spacing: f64::from(self.spacing) } } else { Distance::Kept }
+    /// Where scans follow what is in view, the way from one picture to the next in pixels of blur.
+    pub fn followed(&self, manner: Manner, rng: &mut impl Rng) -> Option<f64> {
+        happens(manner.followed, rng).then(|| f64::from(self.spacing))
     }
 }
 

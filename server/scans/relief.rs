@@ -163,7 +163,9 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
     if let Some(photography) = photography {
         photography.spoil(&mut pictures, &mut rng);
         slope = slope.max(photography.least_slope());
-        distance = photography.distance(style.manner, &mut rng);
+        if let Some(spacing) = photography.followed(style.manner, &mut rng) {
+            distance = Distance::Following { spacing };
+        }
     }
 
     let slopes = (slope, (style.slopes * slope).min(SLOPES.1));
