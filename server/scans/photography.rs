@@ -1,10 +1,10 @@
-//! How a simulated scene becomes a focal stack as people photograph them: few pictures, each with noise and brightness of
-//! its own, and often not aligned.
+//! How a simulated scene becomes a focal stack as people photograph them: few pictures, each with noise and
+//! brightness of its own, and often not aligned.
 //!
-//! Of the four real stacks that we looked at, two have pictures that lie 3 to 13 pixels from their neighbours, since
-//! magnification follows focus, and one has noise that is coarser than a pixel (`docs/notebook.md`). Between two such
-//! pictures a mix shows everything twice and is less sharp than either, so that sharpness falls on the way to a sharper
-//! picture. A policy that has never met that takes it for a peak that it has passed.
+//! Of the four real stacks that we looked at, one has pictures that lie 3 to 10 pixels from their neighbours, since
+//! magnification follows focus, and one has noise that is coarser than a pixel (`docs/notebook.md`). A mix of two
+//! pictures that are not aligned shows everything twice and is less sharp than either, so that sharpness falls on the
+//! way to a sharper picture. A policy that has never met that takes it for a peak that it has passed.
 
 use rand::{Rng, RngExt};
 
@@ -28,7 +28,8 @@ pub struct Manner {
     pub followed: f64,
 }
 
-/// How one stack is photographed. Through a lens that moves between its pictures, a mix of two has less noise than either.
+/// How one stack is photographed. Through a lens that moves between its pictures, a mix of two has less noise than
+/// either.
 #[derive(Debug)]
 pub struct Photography {
     /// Pixels of blur from one picture to the next.
@@ -56,8 +57,8 @@ impl Photography {
         Self { spacing, noise, flicker, places, grain }
     }
 
-    /// Positions of the focal plane, rising, from `most_blur` pixels of blur on one side of the middle to as many on the
-    /// other.
+    /// Positions of the focal plane, rising, from `most_blur` pixels of blur on one side of the middle to as many on
+    /// the other.
     pub fn positions(&self, most_blur: f32) -> Vec<f32> {
         let each_side = (most_blur / self.spacing).ceil() as i32;
         (-each_side..=each_side).map(|plane| plane as f32 * self.spacing).collect()
@@ -90,8 +91,8 @@ impl Photography {
     }
 }
 
-/// Whether what has this share happens. Nothing is drawn for what never does, so that the scenes of the reference benchmark
-/// stay what they are.
+/// Whether what has this share happens. Nothing is drawn for what never does, so that the scenes of the reference
+/// benchmark stay what they are.
 fn happens(share: f64, rng: &mut impl Rng) -> bool {
     share > 0.0 && rng.random_bool(share)
 }

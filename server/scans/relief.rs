@@ -134,7 +134,8 @@ fn scene(split: Split, index: u64, style: Style) -> Result<StackScene, PlanesErr
     let above = rng.random_bool(0.6).then(|| things_above(seed, relief, softness, &mut rng));
     let spots = spots(&mut rng);
     let finish = Finish::draw(&mut rng);
-    // Without it the scene is shown at so many positions, and so well, that only the scan's own noise is in the pictures.
+    // Without it the scene is shown at so many positions, and so well, that only the scan's own noise is in the
+    // pictures.
     let photography = rng.random_bool(style.photographed).then(|| Photography::draw(style.manner, MOST_BLUR, &mut rng));
 
     let ground = Layer::new(&ground, spots);

@@ -176,8 +176,8 @@ fn disorder(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) ->
     // Without a picture that is in the wrong place its neighbours would follow one another.
     let mut broken = vec![false; planes.len().saturating_sub(1)];
     for index in 1..planes.len().saturating_sub(1) {
-        if root_mean_square(curves.iter().map(|curve| stands_out(curve, index))) > BREAK * change(index - 1, index + 1)
-        {
+        let aside = root_mean_square(curves.iter().map(|curve| stands_out(curve, index)));
+        if aside > BREAK * change(index - 1, index + 1) {
             broken[index - 1..=index].fill(true);
             notes.push(format!(
                 "{} is not in order of focus: the pictures before and after it are alike, and it is not like them",
@@ -186,6 +186,7 @@ fn disorder(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) ->
         }
     }
 
+    // Where pictures are missing, focus changes more than before and after.
     for index in 1..planes.len().saturating_sub(2) {
         let beside = change(index - 1, index).max(change(index + 1, index + 2));
         let is_sound = !broken[index - 1..=index + 1].contains(&true);
@@ -201,7 +202,8 @@ fn disorder(stack: &FocalStack, curves: &[Vec<f64>], notes: &mut Vec<String>) ->
     broken
 }
 
-/// By how much a picture lies above or below both of its neighbours in a focus curve; 0 where the curve peaks, as it may.
+/// By how much a picture lies above or below both of its neighbours in a focus curve; 0 where the curve peaks, as it
+/// may.
 fn stands_out(curve: &[f64], index: usize) -> f64 {
     if best(curve) == index {
         return 0.0;
@@ -373,12 +375,17 @@ mod tests {
 
     /// `count` pictures of a texture, sharpest in the middle, each changed by `change`.
     fn stack(count: usize, change: impl Fn(usize, GrayImage) -> GrayImage) -> FocalStack {
-        let plane = |index: usize| {
-            let sigma = 1.2 * (index as f64 - (count / 2) as f64).abs();
+        let sigma = |index: usize| 1.2 * (index as f64 - (count / 2) as f64).abs();
+        blurred_by((0..count).map(sigma), change)
+    }
+
+    /// Pictures of a texture, each blurred by one of `sigmas` and changed by `change`.
+    fn blurred_by(sigmas: impl Iterator<Item = f64>, change: impl Fn(usize, GrayImage) -> GrayImage) -> FocalStack {
+        let plane = |(index, sigma): (usize, f64)| {
             let picture = gaussian_blur(&texture(8, SIDE), sigma);
             Plane { name: format!("{index:02}.png"), position: index as f64, picture: change(index, picture) }
         };
-        FocalStack::new((0..count).map(plane).collect()).unwrap()
+        FocalStack::new(sigmas.enumerate().map(plane).collect()).unwrap()
     }
 
     fn refused(stack: &FocalStack) -> String {
@@ -420,12 +427,7 @@ mod tests {
 
         // Blur from 3.8 to 1.8 pixels was not photographed.
         let sigmas = [4.4, 4.2, 4.0].into_iter().chain((0..17_i32).map(|step| 0.2 * f64::from((8 - step).abs())));
-        let plane = |(index, sigma): (usize, f64)| Plane {
-            name: format!("{index:02}.png"),
-            position: index as f64,
-            picture: gaussian_blur(&texture(8, SIDE), sigma),
-        };
-        let told = check(&FocalStack::new(sigmas.enumerate().map(plane).collect()).unwrap()).unwrap();
+        let told = check(&blurred_by(sigmas, |_, picture| picture)).unwrap();
         assert!(told.len() == 1 && told[0].starts_with("focus jumps between 02.png and 03.png"), "{told:?}");
     }
 
