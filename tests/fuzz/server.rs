@@ -1,12 +1,14 @@
 //! A whole server, as bytes from the network reach it: requests, messages of the live view, pieces of voice, and what
-//! comes to the port of an encrypted server. Each thread has its own, on a folder of its own, in a session that asks for
-//! voice. It is made anew now and then, so that what earlier inputs changed does not add up.
+//! comes to the port of an encrypted server, before TLS and inside it. Each thread has its own, on a folder of its own,
+//! in a session that asks for voice. It is made anew now and then, so that what earlier inputs changed does not add up.
 
 use std::cell::{Cell, RefCell};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::Path;
 use std::sync::{Arc, Once};
 use std::time::Duration;
 
+use jiff::Timestamp;
 use parfocal::clock::Clock;
 use parfocal::health::HealthWatch;
 use parfocal::http::keys::Keys;
@@ -22,11 +24,18 @@ use parfocal::trial::account::AccountRole;
 use parfocal::trial::action::Action;
 use parfocal::trial::remark::Said;
 use tempfile::TempDir;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 use tokio::time::timeout;
+use tokio_rustls::TlsConnector;
+use tokio_rustls::client::TlsStream;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName, UnixTime};
+use tokio_rustls::rustls::time_provider::TimeProvider;
+use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
 use super::fixture::Trial;
 
@@ -60,6 +69,8 @@ struct Server {
     open: SocketAddr,
     /// Encrypted; in the clear, what leads there.
     encrypted: SocketAddr,
+    /// A client that trusts it, and speaks HTTP/2.
+    client: TlsConnector,
     /// Inputs that it has taken.
     taken: u32,
     trial: Trial,
@@ -85,7 +96,7 @@ struct Names {
 
 /// Bytes to the port of an encrypted server: a handshake, or a request in the clear.
 pub fn door(bytes: &[u8]) {
-    ask(|server| server.encrypted, bytes);
+    ask(at_the_door, bytes);
 }
 
 /// Requests that are led to the encrypted pages or refused. A handshake of TLS is in the folder of seeds.
@@ -103,9 +114,35 @@ pub fn knocks() -> Vec<Vec<u8>> {
     requests.map(|request| request.as_bytes().to_vec()).to_vec()
 }
 
+/// Frames of HTTP/2 inside TLS.
+pub fn http2(bytes: &[u8]) {
+    let statuses = http2_statuses(&ask(inside_tls, bytes));
+    assert!(!statuses.contains(&Some(HTTP2_500)), "the server failed");
+}
+
+/// Requests in HTTP/2, with a body and without, and what else a client says there.
+pub fn http2_requests() -> Vec<Vec<u8>> {
+    let connection = [b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", http2_frame(SETTINGS, 0, 0, &[]).as_slice()].concat();
+    let page = http2_frame(HEADERS, END_HEADERS | END_STREAM, 1, &http2_fields("GET", "/surgeon", SURGEON));
+    let focus = http2_fields("POST", "/api/operator/focus", OPERATOR);
+    let focus =
+        [http2_frame(HEADERS, END_HEADERS, 3, &focus), http2_frame(DATA, END_STREAM, 3, br#"{"focal_power":0.5}"#)];
+    let asides = [
+        http2_frame(SETTINGS, 0, 0, &[0, 4, 0, 0, 255, 255]),
+        http2_frame(WINDOW_UPDATE, 0, 0, &[0, 0, 255, 255]),
+        http2_frame(PING, 0, 0, b"8 bytes."),
+        http2_frame(RESET, 0, 1, &[0, 0, 0, 8]),
+        http2_frame(FAREWELL, 0, 0, &[0; 8]),
+    ];
+    [vec![page], focus.to_vec(), asides.to_vec()]
+        .iter()
+        .map(|frames| [&connection[..], &frames.concat()].concat())
+        .collect()
+}
+
 /// Bytes to a server's port in the clear: requests to every page, by everyone.
 pub fn request(bytes: &[u8]) {
-    ask(|server| server.open, bytes);
+    ask(in_the_clear, bytes);
 }
 
 /// Requests as pages and programs make them.
@@ -171,7 +208,7 @@ pub fn requests() -> Vec<Vec<u8>> {
 
 /// A piece of a recording: the end of its address, its type, and then the sound, on a line each.
 pub fn voice(bytes: &[u8]) {
-    ask(|server| server.open, &piece(bytes));
+    ask(in_the_clear, &piece(bytes));
 }
 
 /// Pieces of a recording, first and last.
@@ -202,7 +239,7 @@ pub fn live(bytes: &[u8]) {
         sent.extend(frame(opcode, message));
     }
     sent.extend(frame(0x88, &1000_u16.to_be_bytes()));
-    ask(|server| server.open, &sent);
+    ask(in_the_clear, &sent);
 }
 
 /// What pages say.
@@ -245,6 +282,56 @@ fn frame(opcode: u8, message: &[u8]) -> Vec<u8> {
     frame
 }
 
+// Kinds of frames of HTTP/2 and their flags (RFC 9113, 6).
+const DATA: u8 = 0;
+const HEADERS: u8 = 1;
+const RESET: u8 = 3;
+const SETTINGS: u8 = 4;
+const PING: u8 = 6;
+const FAREWELL: u8 = 7;
+const WINDOW_UPDATE: u8 = 8;
+const END_STREAM: u8 = 1;
+const END_HEADERS: u8 = 4;
+
+/// A frame of HTTP/2 (RFC 9113, 4.1).
+fn http2_frame(kind: u8, flags: u8, stream: u32, payload: &[u8]) -> Vec<u8> {
+    let length = &(payload.len() as u32).to_be_bytes()[1..];
+    [length, &[kind, flags], &stream.to_be_bytes(), payload].concat()
+}
+
+/// A status of 200 and one of 500, as an index of the table that every client knows (RFC 7541, appendix A).
+const HTTP2_200: u8 = 0x88;
+const HTTP2_500: u8 = 0x8E;
+
+/// The first byte of each answer's head in `frames`: a status that is common, as a server names it.
+fn http2_statuses(mut frames: &[u8]) -> Vec<Option<u8>> {
+    let mut statuses = Vec::new();
+    while let Some((&[high, middle, low, kind, _, _, _, _, _], rest)) = frames.split_first_chunk() {
+        let length = u32::from_be_bytes([0, high, middle, low]) as usize;
+        let Some((payload, rest)) = rest.split_at_checked(length) else { break };
+        if kind == HEADERS {
+            statuses.push(payload.first().copied());
+        }
+        frames = rest;
+    }
+    statuses
+}
+
+/// The fields of a request's head, each as a literal that is not remembered (RFC 7541, 6.2.2).
+fn http2_fields(method: &str, path: &str, key: &str) -> Vec<u8> {
+    let key = format!("Bearer {key}");
+    let fields = [
+        (":method", method),
+        (":scheme", "https"),
+        (":authority", "localhost"),
+        (":path", path),
+        ("authorization", &key),
+        ("content-type", "application/json"),
+    ];
+    let text = |text: &str| [&[text.len() as u8], text.as_bytes()].concat();
+    fields.iter().flat_map(|(name, value)| [vec![0], text(name), text(value)].concat()).collect()
+}
+
 fn act(session: &str, action: &str) -> String {
     format!(r#"{{"session":"{session}","action":{action}}}"#)
 }
@@ -273,14 +360,16 @@ fn names() -> Names {
     runtime().block_on(async { begin(&folder).await.1 })
 }
 
-/// What the server of this thread answers to `bytes`. Panics where that made anything in the server panic, or the
-/// server says that it failed.
-fn ask(address: impl FnOnce(&Server) -> SocketAddr, bytes: &[u8]) -> Vec<u8> {
+/// What the server of this thread answers to `bytes`, once `connect` has reached it. Panics where that made anything in
+/// the server panic, or the server says that it failed.
+fn ask<S>(connect: impl AsyncFnOnce(&Server) -> S, bytes: &[u8]) -> Vec<u8>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
     let mut kept = SERVER.take().filter(|server| server.taken < LIFE).unwrap_or_else(start);
     kept.taken += 1;
     let before = PANICS.get();
-    let address = address(&kept);
-    let answer = kept.runtime.block_on(exchange(address, bytes));
+    let answer = kept.runtime.block_on(async { exchange(connect(&kept).await, bytes).await });
 
     let panics = PANICS.get() - before;
     // Dropped where the input did harm: the next one meets a new server.
@@ -291,14 +380,36 @@ fn ask(address: impl FnOnce(&Server) -> SocketAddr, bytes: &[u8]) -> Vec<u8> {
     answer
 }
 
-/// Sends `bytes` on a connection of their own, and reads what comes back until its end.
-async fn exchange(address: SocketAddr, bytes: &[u8]) -> Vec<u8> {
-    let mut stream = TcpStream::connect(address).await.unwrap();
+/// Connects to what `server` serves unencrypted.
+async fn in_the_clear(server: &Server) -> TcpStream {
+    connection(server.open).await
+}
+
+/// Connects to the port of encrypted pages, and leaves the handshake to the input.
+async fn at_the_door(server: &Server) -> TcpStream {
+    connection(server.encrypted).await
+}
+
+/// Shakes hands, as a client that will speak HTTP/2.
+async fn inside_tls(server: &Server) -> TlsStream<TcpStream> {
+    let name = ServerName::IpAddress(server.encrypted.ip().into());
+    let stream = server.client.connect(name, connection(server.encrypted).await).await.unwrap();
+    assert_eq!(stream.get_ref().1.alpn_protocol(), Some(&b"h2"[..]));
+    stream
+}
+
+async fn connection(address: SocketAddr) -> TcpStream {
+    let stream = TcpStream::connect(address).await.unwrap();
     // A million connections would otherwise use up the ports of this machine, which stay taken for a while.
     stream.set_zero_linger().unwrap();
+    stream
+}
 
+/// Sends `bytes` on a connection of their own, and reads what comes back until its end.
+async fn exchange(mut stream: impl AsyncRead + AsyncWrite + Unpin, bytes: &[u8]) -> Vec<u8> {
     // A server may end the connection before it has read everything.
     let _ = stream.write_all(bytes).await;
+    let _ = stream.flush().await;
     let mut answer = Vec::new();
     if timeout(PATIENCE, stream.read_to_end(&mut answer)).await.is_err() {
         let _ = stream.shutdown().await;
@@ -340,7 +451,32 @@ fn start() -> Server {
         let addresses = serve(&trial, &folder, &shutdown).await;
         (trial, addresses)
     });
-    Server { runtime, open, encrypted, taken: 0, trial, _end: end, _folder: folder }
+    let client = client(folder.path(), trial.clock.wall());
+    Server { runtime, open, encrypted, client, taken: 0, trial, _end: end, _folder: folder }
+}
+
+/// A client that trusts the local authority of the data folder `data`, speaks HTTP/2, and takes it to be `now`.
+fn client(data: &Path, now: Timestamp) -> TlsConnector {
+    let mut roots = RootCertStore::empty();
+    roots.add(CertificateDer::from_pem_file(data.join("tls/authority.crt")).unwrap()).unwrap();
+    let clock = Arc::new(TrialTime(Duration::from_secs(now.as_second() as u64)));
+    let mut config = ClientConfig::builder_with_details(Arc::new(ring::default_provider()), clock)
+        .with_safe_default_protocol_versions()
+        .unwrap()
+        .with_root_certificates(roots)
+        .with_no_client_auth();
+    config.alpn_protocols = vec![b"h2".to_vec()];
+    TlsConnector::from(Arc::new(config))
+}
+
+/// The time of the simulated trial, since 1970: certificates are signed by its clock.
+#[derive(Debug)]
+struct TrialTime(Duration);
+
+impl TimeProvider for TrialTime {
+    fn current_time(&self) -> Option<UnixTime> {
+        Some(UnixTime::since_unix_epoch(self.0))
+    }
 }
 
 /// Serves `trial` in the clear and encrypted: where.
@@ -433,11 +569,20 @@ fn a_panic_that_the_server_survives_is_seen() {
 fn seeds_are_let_in_and_understood() {
     let refused = ["400", "401", "403", "413", "415", "422", "500"];
     for seed in requests() {
-        let answer = ask(|server| server.open, &seed);
+        let answer = ask(in_the_clear, &seed);
         // A page that takes long is not waited for.
         let status = answer.get(9..12).map(String::from_utf8_lossy).unwrap_or_default();
         // Only who is signed in plans a study.
         let is_plan = seed.starts_with(b"POST /api/researcher/studies");
         assert!(is_plan || !refused.contains(&&*status), "{status} to {}", String::from_utf8_lossy(&seed));
     }
+}
+
+#[test]
+fn requests_in_http2_are_let_in_and_understood() {
+    let answered = |seed: &Vec<u8>| http2_statuses(&ask(inside_tls, seed)).first().copied().flatten();
+    let statuses: Vec<_> = http2_requests().iter().map(answered).collect();
+    // A page, a wish that a session under way does not allow, and no request.
+    assert_eq!(statuses[0], Some(HTTP2_200));
+    assert!(statuses[1].is_some() && statuses[2].is_none(), "{statuses:?}");
 }
