@@ -17,6 +17,8 @@ mod backup;
 mod fixture;
 #[path = "../../tests/fuzz/folders.rs"]
 mod folders;
+#[path = "../../tests/fuzz/http2.rs"]
+mod http2;
 #[path = "../../tests/fuzz/lessons.rs"]
 mod lessons;
 #[path = "../../tests/fuzz/packages.rs"]
@@ -25,6 +27,8 @@ mod packages;
 mod server;
 #[path = "../../tests/fuzz/targets.rs"]
 mod targets;
+#[path = "../../tests/system/tls/trust.rs"]
+mod trust;
 
 /// The project's folder.
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");

@@ -10,11 +10,14 @@ mod backup;
 #[allow(dead_code, reason = "the trial's tests use more of it")]
 mod fixture;
 mod folders;
+mod http2;
 mod lessons;
 mod mutation;
 mod packages;
 mod server;
 mod targets;
+#[path = "../system/tls/trust.rs"]
+mod trust;
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};

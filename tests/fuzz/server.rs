@@ -4,12 +4,10 @@
 
 use std::cell::{Cell, RefCell};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::path::Path;
 use std::sync::{Arc, Once};
 use std::time::Duration;
 
-use jiff::Timestamp;
-use parfocal::clock::Clock;
+use parfocal::clock::{Clock, SystemClock};
 use parfocal::health::HealthWatch;
 use parfocal::http::keys::Keys;
 use parfocal::http::{self, App, Equipment, Metrics, OpenTablets, Reach};
@@ -29,15 +27,11 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 use tokio::time::timeout;
-use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
-use tokio_rustls::rustls::crypto::ring;
-use tokio_rustls::rustls::pki_types::pem::PemObject;
-use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName, UnixTime};
-use tokio_rustls::rustls::time_provider::TimeProvider;
-use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
 use super::fixture::Trial;
+use super::http2;
+use super::trust::Trust;
 
 /// Inputs that one server takes.
 const LIFE: u32 = 2000;
@@ -69,8 +63,8 @@ struct Server {
     open: SocketAddr,
     /// Encrypted; in the clear, what leads there.
     encrypted: SocketAddr,
-    /// A client that trusts it, and speaks HTTP/2.
-    client: TlsConnector,
+    /// What a client of the encrypted pages trusts; it speaks HTTP/2.
+    trust: Trust,
     /// Inputs that it has taken.
     taken: u32,
     trial: Trial,
@@ -114,30 +108,17 @@ pub fn knocks() -> Vec<Vec<u8>> {
     requests.map(|request| request.as_bytes().to_vec()).to_vec()
 }
 
-/// Frames of HTTP/2 inside TLS.
-pub fn http2(bytes: &[u8]) {
-    let statuses = http2_statuses(&ask(inside_tls, bytes));
-    assert!(!statuses.contains(&Some(HTTP2_500)), "the server failed");
+/// What a client says in HTTP/2, inside TLS.
+pub fn in_http2(bytes: &[u8]) {
+    let statuses = http2::statuses(&ask(inside_tls, bytes));
+    assert!(!statuses.contains(&Some(http2::STATUS_500)), "the server failed");
 }
 
 /// Requests in HTTP/2, with a body and without, and what else a client says there.
 pub fn http2_requests() -> Vec<Vec<u8>> {
-    let connection = [b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", http2_frame(SETTINGS, 0, 0, &[]).as_slice()].concat();
-    let page = http2_frame(HEADERS, END_HEADERS | END_STREAM, 1, &http2_fields("GET", "/surgeon", SURGEON));
-    let focus = http2_fields("POST", "/api/operator/focus", OPERATOR);
-    let focus =
-        [http2_frame(HEADERS, END_HEADERS, 3, &focus), http2_frame(DATA, END_STREAM, 3, br#"{"focal_power":0.5}"#)];
-    let asides = [
-        http2_frame(SETTINGS, 0, 0, &[0, 4, 0, 0, 255, 255]),
-        http2_frame(WINDOW_UPDATE, 0, 0, &[0, 0, 255, 255]),
-        http2_frame(PING, 0, 0, b"8 bytes."),
-        http2_frame(RESET, 0, 1, &[0, 0, 0, 8]),
-        http2_frame(FAREWELL, 0, 0, &[0; 8]),
-    ];
-    [vec![page], focus.to_vec(), asides.to_vec()]
-        .iter()
-        .map(|frames| [&connection[..], &frames.concat()].concat())
-        .collect()
+    let page = http2::request(1, "GET", "/surgeon", SURGEON, b"");
+    let focus = http2::request(3, "POST", "/api/operator/focus", OPERATOR, br#"{"focal_power":0.5}"#);
+    [page, focus, http2::asides()].map(|frames| [http2::opening(), frames].concat()).to_vec()
 }
 
 /// Bytes to a server's port in the clear: requests to every page, by everyone.
@@ -193,7 +174,8 @@ pub fn requests() -> Vec<Vec<u8>> {
             OPERATOR,
             "operator/consents",
             format!(
-                r#"{{"session":"{session}","text_version":"3","given_on":"2026-03-01","obtained_by":"AB","medium":"paper"}}"#
+                r#"{{"session":"{session}","text_version":"3","given_on":"2026-03-01",
+                "obtained_by":"AB","medium":"paper"}}"#
             ),
         ),
         (RESEARCHER, "researcher/studies", r#"{"definition":"name = \"a\"","reason":"planned"}"#.to_owned()),
@@ -282,56 +264,6 @@ fn frame(opcode: u8, message: &[u8]) -> Vec<u8> {
     frame
 }
 
-// Kinds of frames of HTTP/2 and their flags (RFC 9113, 6).
-const DATA: u8 = 0;
-const HEADERS: u8 = 1;
-const RESET: u8 = 3;
-const SETTINGS: u8 = 4;
-const PING: u8 = 6;
-const FAREWELL: u8 = 7;
-const WINDOW_UPDATE: u8 = 8;
-const END_STREAM: u8 = 1;
-const END_HEADERS: u8 = 4;
-
-/// A frame of HTTP/2 (RFC 9113, 4.1).
-fn http2_frame(kind: u8, flags: u8, stream: u32, payload: &[u8]) -> Vec<u8> {
-    let length = &(payload.len() as u32).to_be_bytes()[1..];
-    [length, &[kind, flags], &stream.to_be_bytes(), payload].concat()
-}
-
-/// A status of 200 and one of 500, as an index of the table that every client knows (RFC 7541, appendix A).
-const HTTP2_200: u8 = 0x88;
-const HTTP2_500: u8 = 0x8E;
-
-/// The first byte of each answer's head in `frames`: a status that is common, as a server names it.
-fn http2_statuses(mut frames: &[u8]) -> Vec<Option<u8>> {
-    let mut statuses = Vec::new();
-    while let Some((&[high, middle, low, kind, _, _, _, _, _], rest)) = frames.split_first_chunk() {
-        let length = u32::from_be_bytes([0, high, middle, low]) as usize;
-        let Some((payload, rest)) = rest.split_at_checked(length) else { break };
-        if kind == HEADERS {
-            statuses.push(payload.first().copied());
-        }
-        frames = rest;
-    }
-    statuses
-}
-
-/// The fields of a request's head, each as a literal that is not remembered (RFC 7541, 6.2.2).
-fn http2_fields(method: &str, path: &str, key: &str) -> Vec<u8> {
-    let key = format!("Bearer {key}");
-    let fields = [
-        (":method", method),
-        (":scheme", "https"),
-        (":authority", "localhost"),
-        (":path", path),
-        ("authorization", &key),
-        ("content-type", "application/json"),
-    ];
-    let text = |text: &str| [&[text.len() as u8], text.as_bytes()].concat();
-    fields.iter().flat_map(|(name, value)| [vec![0], text(name), text(value)].concat()).collect()
-}
-
 fn act(session: &str, action: &str) -> String {
     format!(r#"{{"session":"{session}","action":{action}}}"#)
 }
@@ -392,23 +324,28 @@ async fn at_the_door(server: &Server) -> TcpStream {
 
 /// Shakes hands, as a client that will speak HTTP/2.
 async fn inside_tls(server: &Server) -> TlsStream<TcpStream> {
-    let name = ServerName::IpAddress(server.encrypted.ip().into());
-    let stream = server.client.connect(name, connection(server.encrypted).await).await.unwrap();
+    let stream = server.trust.connect(server.encrypted, "127.0.0.1").await.unwrap();
+    free_port_at_once(stream.get_ref().0);
     assert_eq!(stream.get_ref().1.alpn_protocol(), Some(&b"h2"[..]));
     stream
 }
 
 async fn connection(address: SocketAddr) -> TcpStream {
     let stream = TcpStream::connect(address).await.unwrap();
-    // A million connections would otherwise use up the ports of this machine, which stay taken for a while.
-    stream.set_zero_linger().unwrap();
+    free_port_at_once(&stream);
     stream
+}
+
+/// A million connections would otherwise use up the ports of this machine, which stay taken for a while.
+fn free_port_at_once(stream: &TcpStream) {
+    stream.set_zero_linger().unwrap();
 }
 
 /// Sends `bytes` on a connection of their own, and reads what comes back until its end.
 async fn exchange(mut stream: impl AsyncRead + AsyncWrite + Unpin, bytes: &[u8]) -> Vec<u8> {
     // A server may end the connection before it has read everything.
     let _ = stream.write_all(bytes).await;
+    // TLS may keep the last of it back until then.
     let _ = stream.flush().await;
     let mut answer = Vec::new();
     if timeout(PATIENCE, stream.read_to_end(&mut answer)).await.is_err() {
@@ -451,37 +388,14 @@ fn start() -> Server {
         let addresses = serve(&trial, &folder, &shutdown).await;
         (trial, addresses)
     });
-    let client = client(folder.path(), trial.clock.wall());
-    Server { runtime, open, encrypted, client, taken: 0, trial, _end: end, _folder: folder }
-}
-
-/// A client that trusts the local authority of the data folder `data`, speaks HTTP/2, and takes it to be `now`.
-fn client(data: &Path, now: Timestamp) -> TlsConnector {
-    let mut roots = RootCertStore::empty();
-    roots.add(CertificateDer::from_pem_file(data.join("tls/authority.crt")).unwrap()).unwrap();
-    let clock = Arc::new(TrialTime(Duration::from_secs(now.as_second() as u64)));
-    let mut config = ClientConfig::builder_with_details(Arc::new(ring::default_provider()), clock)
-        .with_safe_default_protocol_versions()
-        .unwrap()
-        .with_root_certificates(roots)
-        .with_no_client_auth();
-    config.alpn_protocols = vec![b"h2".to_vec()];
-    TlsConnector::from(Arc::new(config))
-}
-
-/// The time of the simulated trial, since 1970: certificates are signed by its clock.
-#[derive(Debug)]
-struct TrialTime(Duration);
-
-impl TimeProvider for TrialTime {
-    fn current_time(&self) -> Option<UnixTime> {
-        Some(UnixTime::since_unix_epoch(self.0))
-    }
+    let trust = Trust::in_authority(&folder.path().join("tls/authority.crt"), &["h2"]);
+    Server { runtime, open, encrypted, trust, taken: 0, trial, _end: end, _folder: folder }
 }
 
 /// Serves `trial` in the clear and encrypted: where.
 async fn serve(trial: &Trial, folder: &TempDir, shutdown: &watch::Receiver<bool>) -> [SocketAddr; 2] {
-    let now = trial.clock.wall();
+    // Clients look at certificates by the real time.
+    let now = SystemClock.wall();
     let local = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let certificates = Arc::new(Certificates::local(folder.path(), local, now).unwrap());
     let settings = certificates.settings().unwrap();
@@ -580,9 +494,9 @@ fn seeds_are_let_in_and_understood() {
 
 #[test]
 fn requests_in_http2_are_let_in_and_understood() {
-    let answered = |seed: &Vec<u8>| http2_statuses(&ask(inside_tls, seed)).first().copied().flatten();
+    let answered = |seed: &Vec<u8>| http2::statuses(&ask(inside_tls, seed)).first().copied().flatten();
     let statuses: Vec<_> = http2_requests().iter().map(answered).collect();
     // A page, a wish that a session under way does not allow, and no request.
-    assert_eq!(statuses[0], Some(HTTP2_200));
+    assert_eq!(statuses[0], Some(http2::STATUS_200));
     assert!(statuses[1].is_some() && statuses[2].is_none(), "{statuses:?}");
 }

@@ -42,7 +42,7 @@ pub static TARGETS: [Target; 30] = [
     Target { name: "checkpoint", take: lessons::checkpoint, more_seeds: lessons::checkpoints },
     Target { name: "door", take: server::door, more_seeds: server::knocks },
     Target { name: "export", take: folders::export, more_seeds: folders::export_files },
-    Target { name: "http2", take: server::http2, more_seeds: server::http2_requests },
+    Target { name: "http2", take: server::in_http2, more_seeds: server::http2_requests },
     Target { name: "import", take: lessons::import, more_seeds: lessons::import_files },
     Target { name: "json", take: json, more_seeds: Vec::new },
     Target { name: "keys", take: folders::keys, more_seeds: Vec::new },

@@ -13,7 +13,8 @@ use rustix::process::Signal;
 use tokio::net::TcpListener;
 use tokio_rustls::TlsAcceptor;
 
-use super::client::{Trust, certificate, plain, text};
+use super::client::{certificate, plain, text};
+use super::trust::Trust;
 use crate::support::{Server, refused};
 
 const LOOPBACK: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);

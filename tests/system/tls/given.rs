@@ -10,7 +10,8 @@ use rcgen::{CertificateParams, KeyPair};
 use serde_json::Value;
 use time::OffsetDateTime;
 
-use super::client::{Trust, get_as, http2_trusting, text};
+use super::client::{get_as, http2_trusting, text};
+use super::trust::Trust;
 use crate::support::{Server, refused};
 
 const DAY: i64 = 24;

@@ -5,4 +5,5 @@ mod client;
 mod given;
 mod pages;
 mod plain;
+mod trust;
 mod trust_page;

@@ -14,7 +14,8 @@ use tokio_tungstenite::client_async;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 
-use super::client::{Trust, get_as, http2, plain, protocol, request, text};
+use super::client::{get_as, http2, plain, protocol, request, text};
+use super::trust::Trust;
 use crate::support::Server;
 
 #[tokio::test]

@@ -5,7 +5,8 @@ use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest, Sha256};
 use x509_parser::parse_x509_certificate;
 
-use super::client::{Trust, certificate};
+use super::client::certificate;
+use super::trust::Trust;
 use crate::browser::driver::{Browser, Driver};
 use crate::browser::screenshots::shoot;
 use crate::support::Server;
