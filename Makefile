@@ -67,10 +67,13 @@ bench:
 
 # A million mutated inputs for each parser of bytes from outside; fewer, or one parser, on request:
 #   make fuzz ONLY=protocol INPUTS=10000
+# A million of the slow ones (package, backup) takes hours; they can be taken in turns, here the second 250,000:
+#   make fuzz ONLY=backup INPUTS=250000 FIRST=250000
 INPUTS ?= 1000000
+FIRST ?= 0
 ONLY ?=
 fuzz:
-	PARFOCAL_FUZZ_INPUTS=$(INPUTS) $(if $(ONLY),PARFOCAL_FUZZ=$(ONLY)) \
+	PARFOCAL_FUZZ_INPUTS=$(INPUTS) PARFOCAL_FUZZ_FIRST=$(FIRST) $(if $(ONLY),PARFOCAL_FUZZ=$(ONLY)) \
 		cargo test --release --locked $(FEATURES) --test fuzz -- --ignored --nocapture
 
 # A long day, and a working week faster than time: docs/operations.md. `make endurance SECONDS=180` is a short day.

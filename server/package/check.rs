@@ -8,7 +8,7 @@ use super::source::{SESSIONS, Source, exports_of, left_out};
 use super::writing::{Sessions, sums, write};
 use crate::store::Head;
 use crate::store::export::verify::{Check, Verdict};
-use crate::store::export::{SUMS, read_cells, read_json};
+use crate::store::export::{ExportFiles, SUMS};
 
 /// Whether `path` is meant to be a package.
 #[must_use]
@@ -44,9 +44,9 @@ pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
 /// site's up to itself.
 fn head(sources: &[Source], expected: &Head) -> Result<Verdict, String> {
     for source in sources {
-        let column = |name| read_cells(&source.folder, "chain.csv", name);
-        let hashes = column("hash")?;
-        let numbers = column("number")?;
+        let export = ExportFiles::of(&source.folder);
+        let hashes = export.cells("chain.csv", "hash")?;
+        let numbers = export.cells("chain.csv", "number")?;
         let row = numbers.iter().position(|number| number.parse() == Ok(expected.number));
         if row.is_some_and(|row| expected.is(expected.number, &hashes[row])) {
             let same = format!("the history of site '{}' up to {expected} is the same", source.site);
@@ -73,7 +73,7 @@ fn checksums(folder: &Path) -> Result<Verdict, String> {
 
 /// Joins the exports again, and compares every file.
 fn tables(folder: &Path, sources: &[Source]) -> Result<Verdict, String> {
-    let package = read_json(folder, "datapackage.json")?;
+    let package = ExportFiles::of(folder).json("datapackage.json")?;
     let told = &package["parfocal"];
     let version = told["version"].as_str().unwrap_or_default();
     if version != env!("CARGO_PKG_VERSION") {

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::PackageError;
-use crate::store::export::verify::{Verdict, is_export, verify};
-use crate::store::export::{FORMAT, read_cells, read_json};
+use crate::store::export::verify::{Verdict, is_export, verify_files};
+use crate::store::export::{ExportFiles, FORMAT};
 
 /// Folder of a package in which the exports lie.
 pub const SESSIONS: &str = "sessions";
@@ -52,14 +52,15 @@ impl Source {
         }
 
         let unreadable = |reason: String| PackageError::Unreadable { path: folder.to_owned(), reason };
-        let package = read_json(folder, "datapackage.json").map_err(unreadable)?;
+        let export = ExportFiles::of(folder);
+        let package = export.json("datapackage.json").map_err(unreadable)?;
         let told = &package["parfocal"];
         let format = told["format"].as_u64().unwrap_or(1);
         if format != FORMAT {
             return Err(PackageError::OtherFormat { folder: folder.to_owned(), found: format, expected: FORMAT });
         }
 
-        for check in verify(folder, None) {
+        for check in verify_files(&export, None) {
             if let Verdict::Failed(problem) = check.verdict {
                 return Err(PackageError::Unverified {
                     folder: folder.to_owned(),
@@ -72,7 +73,7 @@ impl Source {
         let outside = || PackageError::OutsideAnyStudy(folder.to_owned());
         let text = |value: &Value| value.as_str().map(str::to_owned);
         let cell = |file: &str, column: &str| {
-            let cells = read_cells(folder, file, column).map_err(unreadable)?;
+            let cells = export.cells(file, column).map_err(unreadable)?;
             cells.into_iter().next().ok_or_else(outside)
         };
 
@@ -137,7 +138,7 @@ pub fn left_out(path: &Path) -> Result<Vec<LeftOut>, PackageError> {
         return Ok(Vec::new());
     }
     let unreadable = |reason: String| PackageError::Unreadable { path: path.to_owned(), reason };
-    let package = read_json(path, "datapackage.json").map_err(unreadable)?;
+    let package = ExportFiles::of(path).json("datapackage.json").map_err(unreadable)?;
     serde_json::from_value(package["parfocal"]["left_out"].clone()).map_err(|error| unreadable(error.to_string()))
 }
 
@@ -174,10 +175,9 @@ pub fn agree(sources: &[Source]) -> Result<(), PackageError> {
 /// somebody rewrote a record between two exports, or two databases call themselves the same site.
 fn one_chain(sources: &[&Source]) -> Result<(), PackageError> {
     let Some(longest) = sources.iter().max_by_key(|source| source.head.0) else { return Ok(()) };
-    let column = |name| {
-        read_cells(&longest.folder, "chain.csv", name)
-            .map_err(PackageError::unreadable(longest.folder.join("chain.csv")))
-    };
+    let export = ExportFiles::of(&longest.folder);
+    let column =
+        |name| export.cells("chain.csv", name).map_err(PackageError::unreadable(longest.folder.join("chain.csv")));
     let rows: BTreeMap<String, String> = column("number")?.into_iter().zip(column("hash")?).collect();
 
     for source in sources {

@@ -20,6 +20,7 @@ mod targets;
 mod trust;
 
 use std::fs;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -48,15 +49,16 @@ fn seeds(target: &Target) -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Gives `target` the seeds themselves and `count` mutated ones; each input that it panics on, first come first.
-fn run(target: &Target, count: u64) -> Vec<String> {
+/// Gives `target` the seeds themselves and the mutated inputs of these `numbers`, of which the first is a part's first;
+/// each input that it panics on, first come first.
+fn run(target: &Target, numbers: &Range<u64>) -> Vec<String> {
     let seeds = seeds(target);
     let mut failures: Vec<_> = seeds.iter().filter_map(|seed| failure(target, seed)).collect();
 
-    let parts = 0..count.div_ceil(PART);
+    let parts = numbers.start / PART..numbers.end.div_ceil(PART);
     let found = parts.into_par_iter().flat_map_iter(|part| {
         let mut mutator = Mutator::new(part, &seeds);
-        let inputs = PART.min(count - part * PART);
+        let inputs = PART.min(numbers.end - part * PART);
         (0..inputs).filter_map(|_| failure(target, &mutator.next_input())).collect::<Vec<_>>()
     });
     failures.extend(found.collect::<Vec<_>>());
@@ -70,13 +72,13 @@ fn failure(target: &Target, input: &[u8]) -> Option<String> {
     Some(format!("{}: {} on {}", target.name, words.unwrap_or("a panic"), input.escape_ascii()))
 }
 
-fn run_all(count: u64) {
+fn run_all(numbers: &Range<u64>) {
     // One target, or all: the name stands in the variable.
     let only = std::env::var("PARFOCAL_FUZZ").ok();
     let mut failures = Vec::new();
     for target in TARGETS.iter().filter(|target| only.as_deref().is_none_or(|only| only == target.name)) {
-        let found = run(target, count);
-        println!("{:20} {count} inputs, {} panics", target.name, found.len());
+        let found = run(target, numbers);
+        println!("{:20} {} inputs, {} panics", target.name, numbers.end - numbers.start, found.len());
         failures.extend(found.into_iter().take(3));
     }
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
@@ -84,14 +86,21 @@ fn run_all(count: u64) {
 
 #[test]
 fn every_parser_takes_some_mutated_inputs() {
-    run_all(FEW);
+    run_all(&(0..FEW));
 }
 
 #[test]
 #[ignore = "takes minutes to hours: a million inputs each"]
 fn every_parser_takes_a_million_mutated_inputs() {
-    let told = std::env::var("PARFOCAL_FUZZ_INPUTS").ok().map(|count| count.parse().expect("a number of inputs"));
-    run_all(told.unwrap_or(MANY));
+    let first = number("PARFOCAL_FUZZ_FIRST").unwrap_or(0);
+    assert!(first.is_multiple_of(PART), "PARFOCAL_FUZZ_FIRST must be a multiple of {PART}");
+    run_all(&(first..first + number("PARFOCAL_FUZZ_INPUTS").unwrap_or(MANY)));
+}
+
+/// The number in this variable, if it is set.
+fn number(variable: &str) -> Option<u64> {
+    let told = std::env::var(variable).ok()?;
+    Some(told.parse().unwrap_or_else(|_| panic!("{variable} must be a whole number, not '{told}'")))
 }
 
 #[test]
@@ -100,6 +109,6 @@ fn the_harness_sees_a_panic() {
         assert!(!input.contains(&b'!'), "an exclamation mark");
     }
     let target = Target { name: "made up", take, more_seeds: || vec![b"hello".to_vec()] };
-    let found = run(&target, 20_000);
+    let found = run(&target, &(0..20_000));
     assert!(!found.is_empty() && found[0].contains("an exclamation mark"), "{found:?}");
 }

@@ -32,7 +32,7 @@ use self::blinded::Blinded;
 use self::description::RecordingRow;
 pub use self::folder::{SUMS, folder_name};
 use self::unblinded::Unblinded;
-pub use self::verify::{read_cells, read_json};
+pub use self::verify::ExportFiles;
 use super::{Access, Head, Reader, Recorder, StoreError};
 use crate::ids::SessionId;
 

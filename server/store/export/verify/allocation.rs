@@ -1,11 +1,9 @@
 //! Verification of the allocation that an unblinded export tells: against its other files, the commitment and the draw.
 
-use std::path::Path;
-
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use super::files::{cells, json, session_cell, text};
+use super::files::ExportFiles;
 use super::verdict::{Outcome, Verdict};
 use crate::autofocus::PolicyName;
 use crate::ids::SessionId;
@@ -24,27 +22,27 @@ struct Told {
 }
 
 /// The allocation that an export tells, or why it does not.
-fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
-    if !folder.join("allocation.json").exists() {
+fn allocation(export: &ExportFiles) -> Result<Result<Allocation, Verdict>, String> {
+    if !export.has("allocation.json") {
         return Ok(Err(Verdict::NotChecked("the export is blinded".to_owned())));
     }
 
-    let told: Told = serde_json::from_value(json(folder, "allocation.json")?)
-        .map_err(|error| format!("allocation.json: {error}"))?;
+    let told = Told::deserialize(&*export.json("allocation.json")?);
+    let told = told.map_err(|error| format!("allocation.json: {error}"))?;
 
     for column in ["session", "setting", "segment"] {
-        if cells(folder, "allocation.csv", column)? != cells(folder, "segments.csv", column)? {
+        if export.cells("allocation.csv", column)? != export.cells("segments.csv", column)? {
             return Err(format!("allocation.csv and segments.csv have different {column}s"));
         }
     }
 
-    let listed = cells(folder, "allocation.csv", "policy")?;
+    let listed = export.cells("allocation.csv", "policy")?;
     if !listed.iter().map(String::as_str).eq(told.schedule.iter().map(PolicyName::as_str)) {
         return Err("allocation.csv and allocation.json have different orders".to_owned());
     }
 
     for (column, told) in [("session", told.session.to_string()), ("algorithm", told.algorithm.to_string())] {
-        if session_cell(folder, column)? != told {
+        if export.session_cell(column)? != told {
             return Err(format!("allocation.json and sessions.csv have different {column}s"));
         }
     }
@@ -64,19 +62,19 @@ fn allocation(folder: &Path) -> Result<Result<Allocation, Verdict>, String> {
         algorithm: told.algorithm,
         seed,
         index: told.index,
-        protocol_sha256: Sha256::digest(text(folder, "protocol.toml")?).into(),
+        protocol_sha256: Sha256::digest(export.text("protocol.toml")?).into(),
         schedule: told.schedule,
     }))
 }
 
 /// Whether seed, order and protocol are those committed to.
-pub(super) fn commitment(folder: &Path) -> Outcome {
-    let allocation = match allocation(folder)? {
+pub(super) fn commitment(export: &ExportFiles) -> Outcome {
+    let allocation = match allocation(export)? {
         Ok(allocation) => allocation,
         Err(verdict) => return Ok(verdict),
     };
 
-    if allocation.commitment() == session_cell(folder, "commitment")? {
+    if allocation.commitment() == export.session_cell("commitment")? {
         Ok(Verdict::Passed("seed, order and protocol are those committed to when the session was made".to_owned()))
     } else {
         Err("seed, order or protocol are not those committed to when the session was made".to_owned())
@@ -84,13 +82,13 @@ pub(super) fn commitment(folder: &Path) -> Outcome {
 }
 
 /// Whether the seed leads to the order.
-pub(super) fn schedule(folder: &Path) -> Outcome {
-    let allocation = match allocation(folder)? {
+pub(super) fn schedule(export: &ExportFiles) -> Outcome {
+    let allocation = match allocation(export)? {
         Ok(allocation) => allocation,
         Err(verdict) => return Ok(verdict),
     };
 
-    let protocol = Protocol::parse(&text(folder, "protocol.toml")?, "protocol.toml", &allocation.schedule)
+    let protocol = Protocol::parse(&export.text("protocol.toml")?, "protocol.toml", &allocation.schedule)
         .map_err(|error| error.to_string())?;
 
     // Also keeps a forged export from having all permutations of many policies drawn.

@@ -1,14 +1,13 @@
-//! Verification of the chain that an export tells: every row follows the row before, and the session's rows are
-//! those of
-//! the records in the tables.
+//! Verification of the chain that an export tells: every row follows the row before, and the session's rows are those
+//! of the records in the tables.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::rc::Rc;
 
 use ::csv::StringRecord;
 use serde_json::Value;
 
-use super::files::{cells, csv, json, session_cell};
+use super::files::ExportFiles;
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, Found, FoundRow, Walk};
 use crate::store::chain::{
@@ -20,26 +19,28 @@ use crate::store::export::table::Row;
 /// A row of a table: its cells by column, as they were recorded.
 type Cells = BTreeMap<String, String>;
 
-/// Checks the chain of the export in `folder`, which is of this format; `expected` is a head known from elsewhere.
-pub(super) fn chain(folder: &Path, format: u64, expected: Option<&Head>) -> Outcome {
-    let salts = salts(folder)?;
-    let mut walk = Walk::new(records(folder, format)?, expected.cloned());
-    let steps = Steps::read(folder)?;
+/// Checks the chain of an export of this format; `expected` is a head known from elsewhere.
+pub(super) fn chain(export: &ExportFiles, format: u64, expected: Option<&Head>) -> Outcome {
+    let salts = salts(export)?;
+    let mut walk = Walk::new(records(export, format)?, expected.cloned());
+    let steps = Steps::read(export)?;
     let mut last = None;
 
-    let mut rows = ChainRows::open(folder)?;
-    while let Some(row) = rows.next(&salts)? {
+    let columns = ChainColumns::of(export)?;
+    export.each_row(&ChainRow::TABLE.file(), |row| {
+        let row = columns.read(row, &salts)?;
         if let Some(block) = walk.row(&row)?
             && !steps.check(&block)?
         {
             walk.withhold();
         }
         last = Some(row.entry);
-    }
+        Ok(())
+    })?;
 
-    ends_with_itself(folder, last, walk.last())?;
+    ends_with_itself(export, last, walk.last())?;
     let unchained = steps.beyond(&walk);
-    if unchained > 0 && session_cell(folder, "status")? != "under-way" {
+    if unchained > 0 && export.session_cell("status")? != "under-way" {
         return Err(format!(
             "telemetry: {unchained} steps were inserted at the end: no row of the chain tells of them"
         ));
@@ -48,14 +49,15 @@ pub(super) fn chain(folder: &Path, format: u64, expected: Option<&Head>) -> Outc
 }
 
 /// Checks that the chain ends where the export says, with the record of the export itself.
-fn ends_with_itself(folder: &Path, last: Option<Found>, head: &Head) -> Result<(), String> {
-    let told = &json(folder, "datapackage.json")?["parfocal"]["chain"];
+fn ends_with_itself(export: &ExportFiles, last: Option<Found>, head: &Head) -> Result<(), String> {
+    let package = export.json("datapackage.json")?;
+    let told = &package["parfocal"]["chain"];
     let same = told["number"].as_i64() == Some(head.number) && told["hash"].as_str() == Some(head.hash.as_str());
     if !same {
         return Err(format!("chain: it ends at {head}, which is not the head that datapackage.json tells"));
     }
 
-    let exports = rows(folder, "accesses")?;
+    let exports = rows(export, "accesses")?;
     let has = |row: &Cells, column: &str, value: &str| row.get(column).is_some_and(|cell| cell == value);
     let is_export = |key: &str| exports.iter().any(|row| has(row, "number", key) && has(row, "kind", "exported"));
     match last {
@@ -64,13 +66,9 @@ fn ends_with_itself(folder: &Path, last: Option<Found>, head: &Head) -> Result<(
     }
 }
 
-/// The rows of chain.csv, one by one: each export tells the whole chain, other sessions' rows by their hash alone.
-struct ChainRows {
-    reader: ::csv::Reader<std::fs::File>,
-    row: StringRecord,
-    /// The place of each column of `CHAIN` in the file, if it has it.
-    places: [Option<usize>; CHAIN.len()],
-}
+/// Where the columns of `CHAIN` stand in chain.csv, each if it has it. Each export tells the whole chain, other sessions'
+/// rows by their hash alone.
+struct ChainColumns([Option<usize>; CHAIN.len()]);
 
 /// The columns of chain.csv that are read.
 const CHAIN: [&str; 13] = [
@@ -89,25 +87,19 @@ const CHAIN: [&str; 13] = [
     "sealed_salt",
 ];
 
-impl ChainRows {
-    fn open(folder: &Path) -> Result<Self, String> {
-        let mut reader = csv(folder, "chain.csv")?;
-        let headers = reader.headers().map_err(|error| unreadable(&error))?;
-        let places = CHAIN.map(|column| headers.iter().position(|name| name == column));
-        Ok(Self { reader, row: StringRecord::new(), places })
+impl ChainColumns {
+    fn of(export: &ExportFiles) -> Result<Self, String> {
+        let headers = export.headers(&ChainRow::TABLE.file())?;
+        Ok(Self(CHAIN.map(|column| headers.iter().position(|name| name == column))))
     }
 
-    fn next(&mut self, salts: &BTreeMap<String, String>) -> Result<Option<FoundRow>, String> {
-        if !self.reader.read_record(&mut self.row).map_err(|error| unreadable(&error))? {
-            return Ok(None);
-        }
-
-        let cells = self.places.map(|place| place.and_then(|place| self.row.get(place)).unwrap_or_default());
+    fn read(&self, row: &StringRecord, salts: &BTreeMap<String, String>) -> Result<FoundRow, String> {
+        let cells = self.0.map(|place| place.and_then(|place| row.get(place)).unwrap_or_default());
         let [number, hash, hashed, wall, kind, key, session, place, adopted, salt, sealed, content, sealed_salt] =
             cells;
         if kind.is_empty() {
             let entry = Found::Hash(hashed.to_owned());
-            return Ok(Some(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() }));
+            return Ok(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() });
         }
 
         let entry = Entry {
@@ -131,7 +123,7 @@ impl ChainRows {
         let told = Some(sealed_salt).filter(|salt| !salt.is_empty()).map(str::to_owned);
         let sealed_salt = told.or_else(|| salts.get(number).cloned());
         let entry = Found::Whole(entry, sealed_salt);
-        Ok(Some(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() }))
+        Ok(FoundRow { number: number.to_owned(), previous: None, entry, hash: hash.to_owned() })
     }
 }
 
@@ -141,46 +133,44 @@ fn as_recorded(column: &str, cell: &str) -> String {
     column.map_or(cell, |column| column.read(cell)).to_owned()
 }
 
-fn unreadable(error: &::csv::Error) -> String {
-    format!("chain.csv: {error}")
-}
-
 /// The salts that an unblinded export adds.
-fn salts(folder: &Path) -> Result<BTreeMap<String, String>, String> {
-    if !folder.join("chain_salts.csv").exists() {
+fn salts(export: &ExportFiles) -> Result<BTreeMap<String, String>, String> {
+    if !export.has("chain_salts.csv") {
         return Ok(BTreeMap::new());
     }
     let pair = |mut row: Cells| (row.remove("number").unwrap_or_default(), row.remove("salt").unwrap_or_default());
-    Ok(rows(folder, "chain_salts")?.into_iter().map(pair).collect())
+    Ok(rows(export, "chain_salts")?.into_iter().map(pair).collect())
 }
 
 /// The rows of table `name`.
-fn rows(folder: &Path, name: &str) -> Result<Vec<Cells>, String> {
+fn rows(export: &ExportFiles, name: &str) -> Result<Vec<Cells>, String> {
     let file = format!("{name}.csv");
     let table = ALL.iter().find(|table| table.name == name);
-    let mut reader = csv(folder, &file)?;
-    let headers: Vec<String> =
-        reader.headers().map_err(|error| format!("{file}: {error}"))?.iter().map(str::to_owned).collect();
-
-    let read = |(name, cell): (&String, &str)| {
+    let headers = export.headers(&file)?;
+    let read = |(name, cell): (&str, &str)| {
         let column = table.and_then(|table| table.columns.iter().find(|column| column.name == name));
-        (name.clone(), column.map_or(cell, |column| column.read(cell)).to_owned())
+        (name.to_owned(), column.map_or(cell, |column| column.read(cell)).to_owned())
     };
-    let cells = |row: StringRecord| headers.iter().zip(&row).map(read).collect();
-    reader.records().map(|row| row.map(cells).map_err(|error| format!("{file}: {error}"))).collect()
+
+    let mut rows = Vec::new();
+    export.each_row(&file, |row| {
+        rows.push(headers.iter().zip(row).map(read).collect());
+        Ok(())
+    })?;
+    Ok(rows)
 }
 
 /// The records of the tables that exports of this format have, by kind and key.
-fn records(folder: &Path, format: u64) -> Result<BTreeMap<(&'static str, String), Record>, String> {
-    let unblinded = folder.join("allocation.json").exists();
-    let allocation = if unblinded { json(folder, "allocation.json")? } else { Value::Null };
+fn records(export: &ExportFiles, format: u64) -> Result<BTreeMap<(&'static str, String), Record>, String> {
+    let unblinded = export.has("allocation.json");
+    let allocation = if unblinded { export.json("allocation.json")? } else { Rc::new(Value::Null) };
     let unblinding = allocation.get("unblinding_reason").and_then(Value::as_str);
 
     let mut found = BTreeMap::new();
     // An export tells of no participant but by the session's code.
     let told = |kind: &&Kind| ALL.iter().any(|table| table.name == kind.table && table.since() <= format);
     for kind in KINDS.iter().filter(told) {
-        for mut row in rows(folder, kind.table)? {
+        for mut row in rows(export, kind.table)? {
             let cell = |row: &Cells, column: &str| row.get(column).cloned().unwrap_or_default();
             let key = match kind.name {
                 "run" => cell(&row, "run"),
@@ -195,7 +185,7 @@ fn records(folder: &Path, format: u64) -> Result<BTreeMap<(&'static str, String)
             };
 
             if kind.name == "session" {
-                row.insert("segments".to_owned(), cells(folder, "segments.csv", "segment")?.join(","));
+                row.insert("segments".to_owned(), export.cells("segments.csv", "segment")?.join(","));
             }
             let mut withheld = kind.name == "run";
             if kind.name == "event" && cell(&row, "kind") == UNBLINDED {
@@ -257,14 +247,14 @@ impl Netstrings {
 }
 
 impl Steps {
-    fn read(folder: &Path) -> Result<Self, String> {
-        let settings = cells(folder, "segments.csv", "setting")?;
-        let segments = cells(folder, "segments.csv", "segment")?;
+    fn read(export: &ExportFiles) -> Result<Self, String> {
+        let settings = export.cells("segments.csv", "setting")?;
+        let segments = export.cells("segments.csv", "segment")?;
         let segments: BTreeMap<String, String> = settings.into_iter().zip(segments).collect();
-        let blinded = !folder.join("policy_steps.csv").exists();
+        let blinded = !export.has("policy_steps.csv");
         Ok(Self {
-            open: by_segment(folder, "telemetry.csv", &OPEN, &segments)?,
-            sealed: if blinded { None } else { Some(by_segment(folder, "policy_steps.csv", &SEALED, &segments)?) },
+            open: by_segment(export, "telemetry.csv", &OPEN, &segments)?,
+            sealed: if blinded { None } else { Some(by_segment(export, "policy_steps.csv", &SEALED, &segments)?) },
         })
     }
 
@@ -299,22 +289,16 @@ fn hashed(steps: &BTreeMap<String, Netstrings>, block: &BlockToCheck, mut list: 
 }
 
 fn by_segment(
-    folder: &Path,
+    export: &ExportFiles,
     file: &str,
     columns: &[&str],
     segments: &BTreeMap<String, String>,
 ) -> Result<BTreeMap<String, Netstrings>, String> {
-    let mut reader = csv(folder, file)?;
-    let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?.clone();
-    let place = |column: &str| {
-        headers.iter().position(|name| name == column).ok_or_else(|| format!("{file} has no column {column}"))
-    };
-    let setting = place("setting")?;
-    let places: Vec<usize> = columns.iter().map(|column| place(column)).collect::<Result<_, _>>()?;
+    let setting = export.place(file, "setting")?;
+    let places: Vec<usize> = columns.iter().map(|column| export.place(file, column)).collect::<Result<_, _>>()?;
 
     let mut found: BTreeMap<String, Netstrings> = BTreeMap::new();
-    let mut row = StringRecord::new();
-    while reader.read_record(&mut row).map_err(|error| format!("{file}: {error}"))? {
+    export.each_row(file, |row| {
         let cell = |place: usize| row.get(place).unwrap_or_default();
         let segment = segments.get(cell(setting)).map(String::as_str).unwrap_or_default();
         // An export has a handful of segments: their names are copied once each.
@@ -324,6 +308,7 @@ fn by_segment(
         if let Some(steps) = found.get_mut(segment) {
             steps.step(places.iter().map(|&place| cell(place)));
         }
-    }
+        Ok(())
+    })?;
     Ok(found)
 }

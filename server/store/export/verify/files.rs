@@ -1,70 +1,161 @@
-//! Reading the files of an export that is being verified. Errors name the file.
+//! The files of an export as they are read again. Errors name the file.
 
-use std::path::Path;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
-use ::csv::StringRecord;
+use ::csv::{Reader, StringRecord};
 use serde_json::Value;
 
-use crate::store::export::table::FORMAT;
+use crate::store::export::description::{ChainRow, PolicyStepRow, TelemetryRow};
+use crate::store::export::table::{FORMAT, Row};
 
-pub fn text(folder: &Path, file: &str) -> Result<String, String> {
-    std::fs::read_to_string(folder.join(file)).map_err(|error| format!("{file}: {error}"))
+/// The tables with a row for each step of a policy or each record of the whole chain: gigabytes of a long day, which are
+/// read row by row each time and never kept.
+const LONG: [&str; 3] = [ChainRow::TABLE.name, TelemetryRow::TABLE.name, PolicyStepRow::TABLE.name];
+
+/// What reading a file gave, kept for all who ask for it.
+type Kept<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
+
+/// The files of an export. Its JSON files and its short tables are read once each, when they are first asked for: a dozen
+/// checks look at the same ones.
+pub struct ExportFiles {
+    folder: PathBuf,
+    documents: Kept<Value>,
+    tables: Kept<Rows>,
 }
 
-/// A JSON file of an export.
-///
-/// # Errors
-/// A sentence that names the file, when it cannot be read.
-pub fn json(folder: &Path, file: &str) -> Result<Value, String> {
-    serde_json::from_str(&text(folder, file)?).map_err(|error| format!("{file}: {error}"))
+/// A table that is kept.
+struct Rows {
+    headers: StringRecord,
+    rows: Vec<StringRecord>,
 }
 
-/// A reader of a CSV file of the export.
-pub fn csv(folder: &Path, file: &str) -> Result<csv::Reader<std::fs::File>, String> {
-    csv::Reader::from_path(folder.join(file)).map_err(|error| format!("{file}: {error}"))
-}
+impl ExportFiles {
+    /// Those of the export in `folder`. Nothing is read yet.
+    #[must_use]
+    pub fn of(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), documents: Kept::default(), tables: Kept::default() }
+    }
 
-/// The cells of a column of a CSV file of an export.
-///
-/// # Errors
-/// A sentence that names the file, when it cannot be read or has no such column.
-pub fn cells(folder: &Path, file: &str, column: &str) -> Result<Vec<String>, String> {
-    let mut cells = Vec::new();
-    each_cell(folder, file, column, |cell| {
-        cells.push(cell.to_owned());
+    /// Where they lie.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Whether the export has `file`.
+    pub(super) fn has(&self, file: &str) -> bool {
+        self.folder.join(file).exists()
+    }
+
+    /// What stands in `file`.
+    pub(super) fn text(&self, file: &str) -> Result<String, String> {
+        std::fs::read_to_string(self.folder.join(file)).map_err(|error| format!("{file}: {error}"))
+    }
+
+    /// A JSON file.
+    ///
+    /// # Errors
+    /// A sentence that names the file, when it cannot be read.
+    pub fn json(&self, file: &str) -> Result<Rc<Value>, String> {
+        once(&self.documents, file, || {
+            serde_json::from_str(&self.text(file)?).map_err(|error| format!("{file}: {error}"))
+        })
+    }
+
+    /// The format of the export, which says what columns it has.
+    pub(super) fn format(&self) -> Result<u64, String> {
+        let format = self.json("datapackage.json")?["parfocal"]["format"].as_u64().unwrap_or(1);
+        if format > FORMAT {
+            return Err(format!("a newer version of parfocal wrote it (format {format}); verify it with that version"));
+        }
+        Ok(format)
+    }
+
+    /// The names of the columns of CSV file `file`.
+    pub(super) fn headers(&self, file: &str) -> Result<StringRecord, String> {
+        if is_long(file) {
+            self.csv(file)?.headers().map_err(unreadable(file)).cloned()
+        } else {
+            Ok(self.table(file)?.headers.clone())
+        }
+    }
+
+    /// Hands each row of CSV file `file` to `take`, in order, until that has something against one.
+    pub(super) fn each_row(
+        &self,
+        file: &str,
+        mut take: impl FnMut(&StringRecord) -> Result<(), String>,
+    ) -> Result<(), String> {
+        if !is_long(file) {
+            return self.table(file)?.rows.iter().try_for_each(take);
+        }
+
+        let mut reader = self.csv(file)?;
+        let mut row = StringRecord::new();
+        while reader.read_record(&mut row).map_err(unreadable(file))? {
+            take(&row)?;
+        }
         Ok(())
-    })?;
-    Ok(cells)
-}
-
-/// Hands each cell of a column to `take`, without gathering them: a table may have a row for each frame.
-pub fn each_cell(
-    folder: &Path,
-    file: &str,
-    column: &str,
-    mut take: impl FnMut(&str) -> Result<(), String>,
-) -> Result<(), String> {
-    let mut reader = csv(folder, file)?;
-    let headers = reader.headers().map_err(|error| format!("{file}: {error}"))?;
-    let place =
-        headers.iter().position(|name| name == column).ok_or_else(|| format!("{file} has no column {column}"))?;
-
-    let mut row = StringRecord::new();
-    while reader.read_record(&mut row).map_err(|error| format!("{file}: {error}"))? {
-        take(row.get(place).unwrap_or_default())?;
     }
-    Ok(())
-}
 
-pub fn session_cell(folder: &Path, column: &str) -> Result<String, String> {
-    cells(folder, "sessions.csv", column)?.into_iter().next().ok_or_else(|| "sessions.csv has no session".to_owned())
-}
-
-/// The format of the export, which says what columns it has.
-pub fn format(folder: &Path) -> Result<u64, String> {
-    let format = json(folder, "datapackage.json")?["parfocal"]["format"].as_u64().unwrap_or(1);
-    if format > FORMAT {
-        return Err(format!("a newer version of parfocal wrote it (format {format}); verify it with that version"));
+    /// The place of `column` among the columns of CSV file `file`.
+    pub(super) fn place(&self, file: &str, column: &str) -> Result<usize, String> {
+        let place = self.headers(file)?.iter().position(|name| name == column);
+        place.ok_or_else(|| format!("{file} has no column {column}"))
     }
-    Ok(format)
+
+    /// The cells of a column of a CSV file.
+    ///
+    /// # Errors
+    /// A sentence that names the file, when it cannot be read or has no such column.
+    pub fn cells(&self, file: &str, column: &str) -> Result<Vec<String>, String> {
+        let place = self.place(file, column)?;
+        let mut cells = Vec::new();
+        self.each_row(file, |row| {
+            cells.push(row.get(place).unwrap_or_default().to_owned());
+            Ok(())
+        })?;
+        Ok(cells)
+    }
+
+    /// What the export tells of its session in `column`.
+    pub(super) fn session_cell(&self, column: &str) -> Result<String, String> {
+        let cells = self.cells("sessions.csv", column)?;
+        cells.into_iter().next().ok_or_else(|| "sessions.csv has no session".to_owned())
+    }
+
+    fn table(&self, file: &str) -> Result<Rc<Rows>, String> {
+        once(&self.tables, file, || {
+            let mut reader = self.csv(file)?;
+            let headers = reader.headers().map_err(unreadable(file))?.clone();
+            let rows = reader.records().collect::<Result<_, _>>().map_err(unreadable(file))?;
+            Ok(Rows { headers, rows })
+        })
+    }
+
+    fn csv(&self, file: &str) -> Result<Reader<File>, String> {
+        Reader::from_path(self.folder.join(file)).map_err(unreadable(file))
+    }
+}
+
+/// What `kept` has of `file`, which `read` reads where it has nothing yet.
+fn once<T>(kept: &Kept<T>, file: &str, read: impl FnOnce() -> Result<T, String>) -> Result<Rc<T>, String> {
+    if let Some(known) = kept.borrow().get(file) {
+        return known.clone();
+    }
+    let found = read().map(Rc::new);
+    kept.borrow_mut().insert(file.to_owned(), found.clone());
+    found
+}
+
+fn is_long(file: &str) -> bool {
+    file.strip_suffix(".csv").is_some_and(|name| LONG.contains(&name))
+}
+
+fn unreadable(file: &str) -> impl Fn(::csv::Error) -> String {
+    move |error| format!("{file}: {error}")
 }

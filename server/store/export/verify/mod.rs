@@ -16,7 +16,7 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-pub use files::{cells as read_cells, json as read_json};
+pub use files::ExportFiles;
 pub use verdict::Verdict;
 
 use crate::store::Head;
@@ -30,7 +30,6 @@ use crate::store::export::table::{Row, Table};
 use crate::store::export::voice::FOLDER as RECORDINGS;
 use allocation::{commitment, schedule};
 use chain::chain;
-use files::{cells, csv, each_cell, format, json, session_cell, text};
 use study::study;
 use verdict::Outcome;
 use voice::voice;
@@ -51,63 +50,67 @@ pub fn is_export(path: &Path) -> bool {
     [SUMS, "datapackage.json", "sessions.csv"].iter().any(|file| path.join(file).exists())
 }
 
-/// Checks the export in `folder`: every check, in order. With `expected`, a head known from elsewhere, also
-/// whether the chain
-/// is the one that had it.
+/// Checks the export in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether the
+/// chain is the one that had it.
 #[must_use]
 pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
+    verify_files(&ExportFiles::of(folder), expected)
+}
+
+/// Checks as `verify` does the export whose files are `export`.
+pub fn verify_files(export: &ExportFiles, expected: Option<&Head>) -> Vec<Check> {
     let check =
         |name, outcome: Result<Verdict, String>| Check { name, verdict: outcome.unwrap_or_else(Verdict::Failed) };
     vec![
-        check("checksums", checksums(folder)),
-        check("columns", columns(folder)),
-        check("events", events(folder)),
-        check("said", said(folder)),
-        check("voice", recorded(folder)),
-        check("copies", copies(folder)),
-        check("references", references(folder)),
-        check("protocol", protocol(folder)),
-        check("commitment", commitment(folder)),
-        check("schedule", schedule(folder)),
-        check("study", study(folder)),
-        check("chain", chained(folder, expected)),
+        check("checksums", checksums(export)),
+        check("columns", columns(export)),
+        check("events", events(export)),
+        check("said", said(export)),
+        check("voice", recorded(export)),
+        check("copies", copies(export)),
+        check("references", references(export)),
+        check("protocol", protocol(export)),
+        check("commitment", commitment(export)),
+        check("schedule", schedule(export)),
+        check("study", study(export)),
+        check("chain", chained(export, expected)),
     ]
 }
 
 /// Exports have the chain since their fourth format.
-fn chained(folder: &Path, expected: Option<&Head>) -> Outcome {
-    let format = format(folder)?;
+fn chained(export: &ExportFiles, expected: Option<&Head>) -> Outcome {
+    let format = export.format()?;
     match format {
         ..4 => Ok(Verdict::NotChecked("an earlier version wrote the export, without a chain".to_owned())),
-        _ => chain(folder, format, expected),
+        _ => chain(export, format, expected),
     }
 }
 
 /// Exports have recordings since their seventh format.
-fn recorded(folder: &Path) -> Outcome {
-    match format(folder)? {
+fn recorded(export: &ExportFiles) -> Outcome {
+    match export.format()? {
         ..7 => Ok(Verdict::Passed("an earlier version wrote the export, without voice".to_owned())),
-        _ => voice(folder),
+        _ => voice(export),
     }
 }
 
-fn checksums(folder: &Path) -> Outcome {
+fn checksums(export: &ExportFiles) -> Outcome {
     let mut listed = BTreeSet::from([SUMS.to_owned()]);
-    for line in text(folder, SUMS)?.lines() {
+    for line in export.text(SUMS)?.lines() {
         let (sum, file) = line.split_once("  ").ok_or_else(|| format!("{SUMS}: no checksum in '{line}'"))?;
         let within = file.strip_prefix(RECORDINGS).and_then(|rest| rest.strip_prefix('/')).unwrap_or(file);
         if within.contains('/') || within.starts_with("..") {
             return Err(format!("{SUMS}: '{file}' is not a file of the folder"));
         }
 
-        let content = std::fs::read(folder.join(file)).map_err(|error| format!("{file}: {error}"))?;
+        let content = std::fs::read(export.folder().join(file)).map_err(|error| format!("{file}: {error}"))?;
         if hex::encode(Sha256::digest(&content)) != sum {
             return Err(format!("{file} was changed since it was exported"));
         }
         listed.insert(file.to_owned());
     }
 
-    for name in file_names(folder)? {
+    for name in file_names(export.folder())? {
         if !listed.contains(&name) {
             return Err(format!("{name} was added since it was exported"));
         }
@@ -135,63 +138,61 @@ fn file_names(folder: &Path) -> Result<Vec<String>, String> {
     Ok(found)
 }
 
-fn columns(folder: &Path) -> Outcome {
-    let format = format(folder)?;
+fn columns(export: &ExportFiles) -> Outcome {
+    let format = export.format()?;
     let mut rows = 0;
     for table in ALL {
         let file = table.file();
-        let withheld = !folder.join(&file).exists() && UNBLINDED.iter().any(|(name, _)| *name == file);
+        let withheld = !export.has(&file) && UNBLINDED.iter().any(|(name, _)| *name == file);
         if withheld || table.since() > format {
             continue;
         }
 
-        let mut reader = csv(folder, &file)?;
-        let described = table.columns_of(format).map(|column| column.name);
-        if !reader.headers().map_err(|error| format!("{file}: {error}"))?.iter().eq(described) {
+        let columns: Vec<_> = table.columns_of(format).collect();
+        if !export.headers(&file)?.iter().eq(columns.iter().map(|column| column.name)) {
             return Err(format!("{file}: its columns are not those described"));
         }
 
-        let columns: Vec<_> = table.columns_of(format).collect();
-        let mut row = StringRecord::new();
         let mut line = 1;
-        while reader.read_record(&mut row).map_err(|error| format!("{file}: {error}"))? {
+        export.each_row(&file, |row| {
             line += 1;
-            let mut cells = columns.iter().zip(&row);
-            if let Some((column, cell)) = cells.find(|(column, cell)| !column.kind.accepts(cell)) {
-                return Err(format!("{file}, row {line}: '{cell}' is not a valid {}", column.name));
-            }
             rows += 1;
-        }
+            let mut cells = columns.iter().zip(row);
+            match cells.find(|(column, cell)| !column.kind.accepts(cell)) {
+                Some((column, cell)) => Err(format!("{file}, row {line}: '{cell}' is not a valid {}", column.name)),
+                None => Ok(()),
+            }
+        })?;
     }
 
     Ok(Verdict::Passed(format!("{rows} rows are as described")))
 }
 
-fn events(folder: &Path) -> Outcome {
-    let count = numbered(folder, "events.csv")?;
-    let kinds = cells(folder, "events.csv", "kind")?;
+fn events(export: &ExportFiles) -> Outcome {
+    let count = numbered(export, "events.csv")?;
+    let kinds = export.cells("events.csv", "kind")?;
     if kinds.first().map(String::as_str) != Some("created") {
         return Err("events.csv: the first event is not 'created'".to_owned());
     }
     Ok(Verdict::Passed(format!("{count} events without a gap")))
 }
 
-fn said(folder: &Path) -> Outcome {
-    let comments = numbered(folder, "comments.csv")?;
-    let answers = numbered(folder, "answers.csv")?;
-    let told = session_cell(folder, "comments")?;
+fn said(export: &ExportFiles) -> Outcome {
+    let comments = numbered(export, "comments.csv")?;
+    let answers = numbered(export, "answers.csv")?;
+    let told = export.session_cell("comments")?;
     if told != comments.to_string() {
         return Err(format!("comments.csv holds {comments} comments, but sessions.csv counts {told}"));
     }
-    if format(folder)? >= 2 {
-        counting(folder)?;
+    if export.format()? >= 2 {
+        counting(export)?;
     }
     Ok(Verdict::Passed(format!("{comments} comments and {answers} answers without a gap")))
 }
 
 /// Checks that of the answers to a question at most one counts, and none that is late.
-fn counting(folder: &Path) -> Result<(), String> {
-    let column = |name| cells(folder, "answers.csv", name);
+fn counting(export: &ExportFiles) -> Result<(), String> {
+    let column = |name| export.cells("answers.csv", name);
     let segments = column("segment")?;
     let questions = column("question")?;
     let counts = column("counts")?;
@@ -212,8 +213,8 @@ fn counting(folder: &Path) -> Result<(), String> {
 }
 
 /// The number of rows of `file`, whose column `number` must count them from 1.
-fn numbered(folder: &Path, file: &str) -> Result<usize, String> {
-    let numbers = cells(folder, file, "number")?;
+fn numbered(export: &ExportFiles, file: &str) -> Result<usize, String> {
+    let numbers = export.cells(file, "number")?;
     match numbers.iter().zip(1..).find(|(found, expected)| **found != format!("{expected}")) {
         Some((found, expected)) => Err(format!("{file}: number {expected} is missing; '{found}' stands in its place")),
         None => Ok(numbers.len()),
@@ -252,64 +253,64 @@ const COPIED: [Table; 19] = [
     VoicePieceRow::TABLE,
 ];
 
-fn copies(folder: &Path) -> Outcome {
-    let package = json(folder, "datapackage.json")?;
+fn copies(export: &ExportFiles) -> Outcome {
+    let package = export.json("datapackage.json")?;
     let blinded =
         package["parfocal"]["blinded"].as_bool().ok_or("datapackage.json does not say whether it is blinded")?;
-    let format = format(folder)?;
+    let format = export.format()?;
     let mut files = UNBLINDED.into_iter().filter(|(_, since)| *since <= format).map(|(file, _)| file);
-    if let Some(file) = files.find(|file| folder.join(file).exists() == blinded) {
+    if let Some(file) = files.find(|file| export.has(file) == blinded) {
         let (is, has) = if blinded { ("", "there") } else { ("un", "missing") };
         return Err(format!("datapackage.json says that the export is {is}blinded, and {file} is {has}"));
     }
 
-    let session = json(folder, "session.json")?;
+    let session = export.json("session.json")?;
     for table in COPIED.iter().filter(|table| table.since() <= format) {
         let file = table.file();
         let differs = || format!("session.json and {file} disagree");
         let objects = session[table.name].as_array().ok_or_else(differs)?;
-        let mut reader = csv(folder, &file)?;
-        let rows = reader.records().collect::<Result<Vec<_>, _>>().map_err(|error| format!("{file}: {error}"))?;
-
+        let columns: Vec<_> = table.columns_of(format).collect();
         let same = |object: &Value, row: &StringRecord| {
-            let columns: Vec<_> = table.columns_of(format).collect();
             row.len() == columns.len()
                 && columns.iter().zip(row).all(|(column, cell)| column.tells(cell, &object[column.name]))
         };
 
-        if rows.len() != objects.len() || !objects.iter().zip(&rows).all(|(object, row)| same(object, row)) {
+        let mut objects = objects.iter();
+        export.each_row(&file, |row| match objects.next() {
+            Some(object) if same(object, row) => Ok(()),
+            _ => Err(differs()),
+        })?;
+        if objects.next().is_some() {
             return Err(differs());
         }
     }
     Ok(Verdict::Passed("session.json and the tables agree".to_owned()))
 }
 
-fn references(folder: &Path) -> Outcome {
-    let segments: BTreeSet<String> = cells(folder, "segments.csv", "segment")?.into_iter().collect();
-    let settings: BTreeSet<String> = cells(folder, "segments.csv", "setting")?.into_iter().collect();
+fn references(export: &ExportFiles) -> Outcome {
+    let segments: BTreeSet<String> = export.cells("segments.csv", "segment")?.into_iter().collect();
+    let settings: BTreeSet<String> = export.cells("segments.csv", "setting")?.into_iter().collect();
     for file in ["comments.csv", "answers.csv", "events.csv"] {
-        let unknown = cells(folder, file, "segment")?.into_iter().find(|s| !s.is_empty() && !segments.contains(s));
+        let unknown = export.cells(file, "segment")?.into_iter().find(|s| !s.is_empty() && !segments.contains(s));
         if let Some(segment) = unknown {
             return Err(format!("{file}: segment {segment} is not in segments.csv"));
         }
     }
 
-    for file in ["telemetry.csv", "policy_steps.csv"].into_iter().filter(|file| folder.join(file).exists()) {
-        each_cell(folder, file, "setting", |setting| {
-            if settings.contains(setting) {
-                Ok(())
-            } else {
-                Err(format!("{file}: setting {setting} is not in segments.csv"))
-            }
+    for file in ["telemetry.csv", "policy_steps.csv"].into_iter().filter(|file| export.has(file)) {
+        let place = export.place(file, "setting")?;
+        export.each_row(file, |row| match row.get(place).unwrap_or_default() {
+            setting if settings.contains(setting) => Ok(()),
+            setting => Err(format!("{file}: setting {setting} is not in segments.csv")),
         })?;
     }
 
     Ok(Verdict::Passed(format!("everything belongs to one of {} settings", settings.len())))
 }
 
-fn protocol(folder: &Path) -> Outcome {
-    let found = hex::encode(Sha256::digest(text(folder, "protocol.toml")?));
-    let expected = session_cell(folder, "protocol_sha256")?;
+fn protocol(export: &ExportFiles) -> Outcome {
+    let found = hex::encode(Sha256::digest(export.text("protocol.toml")?));
+    let expected = export.session_cell("protocol_sha256")?;
     if found == expected {
         Ok(Verdict::Passed("protocol.toml is the one that the session was made with".to_owned()))
     } else {

@@ -1,12 +1,10 @@
 //! Verification of what an export tells of its session's study: the definition, the protocol and, once the study is
 //! unblinded, the commitment to all orders and this session's place in them.
 
-use std::path::Path;
-
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use super::files::{cells, format, json, text};
+use super::files::ExportFiles;
 use super::verdict::{Outcome, Verdict};
 use crate::store::export::description::StudySessionRow;
 use crate::store::export::table::Row;
@@ -40,27 +38,27 @@ struct Place {
     number: String,
 }
 
-/// Checks the study that the export in `folder` tells of.
-pub(super) fn study(folder: &Path) -> Outcome {
+/// Checks the study that the export tells of.
+pub(super) fn study(export: &ExportFiles) -> Outcome {
     let outside = || Ok(Verdict::Passed("the session is outside any study".to_owned()));
     // Earlier versions knew no studies.
-    if format(folder)? < StudySessionRow::TABLE.since() {
+    if export.format()? < StudySessionRow::TABLE.since() {
         return outside();
     }
-    let Some(study) = cells(folder, "study_sessions.csv", "study")?.into_iter().next() else { return outside() };
+    let Some(study) = export.cells("study_sessions.csv", "study")?.into_iter().next() else { return outside() };
 
     let cell = |column| {
-        let cells = cells(folder, "study_sessions.csv", column)?;
+        let cells = export.cells("study_sessions.csv", column)?;
         cells.into_iter().next().ok_or_else(|| format!("study_sessions.csv has no {column}"))
     };
     let place = Place { site: cell("site")?, protocol: cell("protocol")?, number: cell("place")? };
-    check_definition(folder, &study, &place)?;
+    check_definition(export, &study, &place)?;
 
-    let commitments = cells(folder, "study_events.csv", "commitment")?;
+    let commitments = export.cells("study_events.csv", "commitment")?;
     let committed = commitments.into_iter().find(|commitment| !commitment.is_empty());
     let committed = committed.ok_or("study_events.csv: the study was never opened")?;
 
-    let Some(statement) = statement(folder)? else {
+    let Some(statement) = statement(export)? else {
         let said =
             "definition and protocol are those of the study; its orders are not told before all of it is unblinded";
         return Ok(Verdict::Passed(said.to_owned()));
@@ -68,26 +66,26 @@ pub(super) fn study(folder: &Path) -> Outcome {
     if commitment(&statement) != committed {
         return Err("allocation.json: the orders of the study are not those committed to when it was opened".to_owned());
     }
-    check_order(folder, &statement, &place)?;
+    check_order(export, &statement, &place)?;
     Ok(Verdict::Passed("the session has the order of its place, and all orders are those committed to".to_owned()))
 }
 
-fn check_definition(folder: &Path, study: &str, place: &Place) -> Result<(), String> {
-    let definition = text(folder, "study.toml")?;
-    let planned = cells(folder, "studies.csv", "definition_sha256")?;
+fn check_definition(export: &ExportFiles, study: &str, place: &Place) -> Result<(), String> {
+    let definition = export.text("study.toml")?;
+    let planned = export.cells("studies.csv", "definition_sha256")?;
     if planned != [hex::encode(Sha256::digest(&definition))] {
         return Err("study.toml is not the definition that the study was planned with".to_owned());
     }
 
     let outline: Outline = toml::from_str(&definition).map_err(|error| format!("study.toml: {}", error.message()))?;
-    if outline.name != study || cells(folder, "studies.csv", "study")? != [study] {
+    if outline.name != study || export.cells("studies.csv", "study")? != [study] {
         return Err("study.toml, studies.csv and study_sessions.csv name different studies".to_owned());
     }
     if !outline.sites.iter().any(|site| site.name == place.site) {
         return Err(format!("study.toml has no site '{}'", place.site));
     }
 
-    let found = hex::encode(Sha256::digest(text(folder, "protocol.toml")?));
+    let found = hex::encode(Sha256::digest(export.text("protocol.toml")?));
     let listed = outline.protocols.iter().find(|protocol| protocol.name == place.protocol);
     if !listed.is_some_and(|protocol| protocol.sha256.eq_ignore_ascii_case(&found)) {
         return Err("protocol.toml is not the version that study.toml names".to_owned());
@@ -96,15 +94,15 @@ fn check_definition(folder: &Path, study: &str, place: &Place) -> Result<(), Str
 }
 
 /// The orders of the whole study, where the export tells them.
-fn statement(folder: &Path) -> Result<Option<String>, String> {
-    if !folder.join("allocation.json").exists() {
+fn statement(export: &ExportFiles) -> Result<Option<String>, String> {
+    if !export.has("allocation.json") {
         return Ok(None);
     }
-    Ok(json(folder, "allocation.json")?["study_statement"].as_str().map(str::to_owned))
+    Ok(export.json("allocation.json")?["study_statement"].as_str().map(str::to_owned))
 }
 
 /// Checks that the session has the order of its place, and that the seed leads to the list that it is in.
-fn check_order(folder: &Path, statement: &str, place: &Place) -> Result<(), String> {
+fn check_order(export: &ExportFiles, statement: &str, place: &Place) -> Result<(), String> {
     let seed = statement.lines().find_map(|line| Seed::from_hex(line.strip_prefix("seed ")?));
     let seed = seed.ok_or("allocation.json: the study's orders have no seed")?;
 
@@ -112,13 +110,13 @@ fn check_order(folder: &Path, statement: &str, place: &Place) -> Result<(), Stri
     let list = statement.lines().skip_while(|line| !line.starts_with(&header)).skip(1);
     let listed: Vec<&str> = list.map_while(|line| line.strip_prefix("place ")).collect();
 
-    let schedule = cells(folder, "allocation.csv", "policy")?.join(",");
+    let schedule = export.cells("allocation.csv", "policy")?.join(",");
     let expected = format!("{} {schedule}", place.number);
     if !listed.contains(&expected.as_str()) {
         return Err(format!("the session's order is not that of place {} in the study's list", place.number));
     }
 
-    let protocol = Protocol::parse_kept(&text(folder, "protocol.toml")?, "protocol.toml");
+    let protocol = Protocol::parse_kept(&export.text("protocol.toml")?, "protocol.toml");
     let protocol = protocol.map_err(|error| error.to_string())?;
     let drawn = List::draw(&place.site, &protocol, listed.len(), seed);
     let drawn = drawn.places.iter().zip(1..).map(|(place, number)| format!("{number} {}", in_words(&place.schedule)));

@@ -2,11 +2,10 @@
 //! the chain's.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use super::files::cells;
+use super::files::ExportFiles;
 use super::verdict::{Outcome, Verdict};
 use crate::store::export::voice::{FOLDER, file_name};
 use crate::store::voice::erased_words;
@@ -19,14 +18,14 @@ struct Piece {
     sha256: String,
 }
 
-/// Checks the recordings of the export in `folder`, whose format has them.
-pub(super) fn voice(folder: &Path) -> Outcome {
-    let pieces = pieces(folder)?;
-    let erased = erased(folder)?;
-    let files = cells(folder, "voice.csv", "file")?;
-    let types = cells(folder, "voice.csv", "media_type")?;
-    let comments = cells(folder, "voice.csv", "comment")?;
-    same_comments(folder, &comments, &pieces)?;
+/// Checks the recordings of an export whose format has them.
+pub(super) fn voice(export: &ExportFiles) -> Outcome {
+    let pieces = pieces(export)?;
+    let erased = erased(export)?;
+    let files = export.cells("voice.csv", "file")?;
+    let types = export.cells("voice.csv", "media_type")?;
+    let comments = export.cells("voice.csv", "comment")?;
+    same_comments(export, &comments, &pieces)?;
 
     let mut known = BTreeSet::new();
     let mut checked = 0;
@@ -48,19 +47,19 @@ pub(super) fn voice(folder: &Path) -> Outcome {
         if erased.contains(comment) {
             return Err(format!("{file}: comment {comment} was erased, but has sound"));
         }
-        let sound = std::fs::read(folder.join(file)).map_err(|error| format!("{file}: {error}"))?;
+        let sound = std::fs::read(export.folder().join(file)).map_err(|error| format!("{file}: {error}"))?;
         check_pieces(file, &sound, pieces)?;
         checked += pieces.len();
         known.insert(file.clone());
     }
 
-    no_others(folder, &known)?;
+    no_others(export, &known)?;
     Ok(Verdict::Passed(format!("{checked} pieces of recordings are as they were sent{}", erased_words(gone))))
 }
 
 /// The pieces of each comment by their places.
-fn pieces(folder: &Path) -> Result<BTreeMap<String, Vec<Piece>>, String> {
-    let column = |name| cells(folder, "voice_pieces.csv", name);
+fn pieces(export: &ExportFiles) -> Result<BTreeMap<String, Vec<Piece>>, String> {
+    let column = |name| export.cells("voice_pieces.csv", name);
     let comments = column("comment")?;
     let places = column("piece")?;
     let lengths = column("bytes")?;
@@ -79,17 +78,21 @@ fn pieces(folder: &Path) -> Result<BTreeMap<String, Vec<Piece>>, String> {
 }
 
 /// The comments that were erased.
-fn erased(folder: &Path) -> Result<BTreeSet<String>, String> {
-    let subjects = cells(folder, "erasures.csv", "subject")?;
-    let records = cells(folder, "erasures.csv", "record")?;
+fn erased(export: &ExportFiles) -> Result<BTreeSet<String>, String> {
+    let subjects = export.cells("erasures.csv", "subject")?;
+    let records = export.cells("erasures.csv", "record")?;
     let comments = subjects.into_iter().zip(records).filter(|(subject, _)| subject == "comment");
     Ok(comments.map(|(_, record)| record).collect())
 }
 
 /// Checks that the voice comments, the recordings and the pieces belong together.
-fn same_comments(folder: &Path, recordings: &[String], pieces: &BTreeMap<String, Vec<Piece>>) -> Result<(), String> {
-    let keys = cells(folder, "comments.csv", "key")?;
-    let kinds = cells(folder, "comments.csv", "kind")?;
+fn same_comments(
+    export: &ExportFiles,
+    recordings: &[String],
+    pieces: &BTreeMap<String, Vec<Piece>>,
+) -> Result<(), String> {
+    let keys = export.cells("comments.csv", "key")?;
+    let kinds = export.cells("comments.csv", "kind")?;
     let spoken = keys.into_iter().zip(kinds).filter(|(_, kind)| kind == "voice").map(|(key, _)| key);
     if !spoken.eq(recordings.iter().cloned()) {
         return Err("voice.csv: its rows are not the voice comments of comments.csv".to_owned());
@@ -114,9 +117,9 @@ fn check_pieces(file: &str, sound: &[u8], pieces: &[Piece]) -> Result<(), String
     if rest.is_empty() { Ok(()) } else { Err(format!("{file}: {} bytes were added at its end", rest.len())) }
 }
 
-/// Checks that the folder of recordings has no other files.
-fn no_others(folder: &Path, known: &BTreeSet<String>) -> Result<(), String> {
-    let Ok(entries) = std::fs::read_dir(folder.join(FOLDER)) else { return Ok(()) };
+/// Checks that the export's folder of recordings has no other files.
+fn no_others(export: &ExportFiles, known: &BTreeSet<String>) -> Result<(), String> {
+    let Ok(entries) = std::fs::read_dir(export.folder().join(FOLDER)) else { return Ok(()) };
     for entry in entries {
         let name = entry.map_err(|error| format!("{FOLDER}: {error}"))?.file_name();
         let name = format!("{FOLDER}/{}", name.to_string_lossy());
