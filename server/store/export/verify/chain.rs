@@ -66,8 +66,8 @@ fn ends_with_itself(export: &ExportFiles, last: Option<Found>, head: &Head) -> R
     }
 }
 
-/// Where the columns of `CHAIN` stand in chain.csv, each if it has it. Each export tells the whole chain, other sessions'
-/// rows by their hash alone.
+/// Where the columns of `CHAIN` stand in chain.csv, each if it has it. Each export tells the whole chain, and other
+/// sessions' rows by their hash alone.
 struct ChainColumns([Option<usize>; CHAIN.len()]);
 
 /// The columns of chain.csv that are read.

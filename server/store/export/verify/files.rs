@@ -12,15 +12,15 @@ use serde_json::Value;
 use crate::store::export::description::{ChainRow, PolicyStepRow, TelemetryRow};
 use crate::store::export::table::{FORMAT, Row};
 
-/// The tables with a row for each step of a policy or each record of the whole chain: gigabytes of a long day, which are
-/// read row by row each time and never kept.
+/// The tables with a row for each step of a policy or each record of the whole chain. They can be gigabytes, so they
+/// are read row by row each time and never kept.
 const LONG: [&str; 3] = [ChainRow::TABLE.name, TelemetryRow::TABLE.name, PolicyStepRow::TABLE.name];
 
 /// What reading a file gave, kept for all who ask for it.
 type Kept<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
 
-/// The files of an export. Its JSON files and its short tables are read once each, when they are first asked for: a dozen
-/// checks look at the same ones.
+/// The files of an export. Its JSON files and its short tables are read once each, when they are first asked for,
+/// because a dozen checks look at the same ones.
 pub struct ExportFiles {
     folder: PathBuf,
     documents: Kept<Value>,
