@@ -16,8 +16,8 @@ pub fn is_package(path: &Path) -> bool {
     path.join(SESSIONS).is_dir()
 }
 
-/// Checks the package in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether the
-/// history up to it is still the same at the site where it was noted.
+/// Checks the package in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether
+/// the history up to it is still the same at the site where it was noted.
 #[must_use]
 pub fn check(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     let verdict = |outcome: Result<Verdict, String>| outcome.unwrap_or_else(Verdict::Failed);

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use ::csv::StringRecord;
 use serde_json::Value;
 
-use super::files::ExportFiles;
+use super::files::{ExportFiles, place_among};
 use super::verdict::{Outcome, Verdict};
 use crate::store::chain::check::{BlockToCheck, Found, FoundRow, Walk};
 use crate::store::chain::{
@@ -294,8 +294,10 @@ fn by_segment(
     columns: &[&str],
     segments: &BTreeMap<String, String>,
 ) -> Result<BTreeMap<String, Netstrings>, String> {
-    let setting = export.place(file, "setting")?;
-    let places: Vec<usize> = columns.iter().map(|column| export.place(file, column)).collect::<Result<_, _>>()?;
+    let headers = export.headers(file)?;
+    let place = |column: &str| place_among(&headers, file, column);
+    let setting = place("setting")?;
+    let places: Vec<usize> = columns.iter().map(|column| place(column)).collect::<Result<_, _>>()?;
 
     let mut found: BTreeMap<String, Netstrings> = BTreeMap::new();
     export.each_row(file, |row| {

@@ -104,8 +104,7 @@ impl ExportFiles {
 
     /// The place of `column` among the columns of CSV file `file`.
     pub(super) fn place(&self, file: &str, column: &str) -> Result<usize, String> {
-        let place = self.headers(file)?.iter().position(|name| name == column);
-        place.ok_or_else(|| format!("{file} has no column {column}"))
+        place_among(&self.headers(file)?, file, column)
     }
 
     /// The cells of a column of a CSV file.
@@ -150,6 +149,12 @@ fn once<T>(kept: &Kept<T>, file: &str, read: impl FnOnce() -> Result<T, String>)
     let found = read().map(Rc::new);
     kept.borrow_mut().insert(file.to_owned(), found.clone());
     found
+}
+
+/// The place of `column` among the `headers` of CSV file `file`.
+pub(super) fn place_among(headers: &StringRecord, file: &str, column: &str) -> Result<usize, String> {
+    let place = headers.iter().position(|name| name == column);
+    place.ok_or_else(|| format!("{file} has no column {column}"))
 }
 
 fn is_long(file: &str) -> bool {
