@@ -3,6 +3,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import vm from "node:vm";
 
+import { Contact } from "../static/shared/contact.js";
 import { Awake } from "../static/surgeon/awake.js";
 import { LastView } from "../static/surgeon/last_view.js";
 import { storageAdvice } from "../static/surgeon/storage_words.js";
@@ -21,8 +22,24 @@ test("the last view comes back as it was told, without what time has overtaken",
   assert.deepEqual(kept?.view, { ...VIEW, remaining_seconds: null, prompt: null });
   assert.equal(kept?.heardAt, told);
 
-  new LastView(store, "link", time.wall).touch(told + 5_000);
-  assert.equal(new LastView(store, "link", time.wall).read()?.heardAt, told + 5_000);
+  const heard = { heardAt: told + 5_000, certificateEnd: told + HOUR_MS };
+  new LastView(store, "link", time.wall).touch(heard);
+  const { heardAt, certificateEnd } = new LastView(store, "link", time.wall).read() ?? {};
+  assert.deepEqual({ heardAt, certificateEnd }, heard);
+});
+
+test("a page loaded again without a network knows when the certificate ends", () => {
+  const time = new FakeTime();
+  const store = fakeStore();
+  const lastView = new LastView(store, "link", time.wall);
+  lastView.keep(VIEW);
+  lastView.touch({ heardAt: time.wall(), certificateEnd: time.wall() + HOUR_MS });
+  lastView.keep(VIEW);
+
+  const loadedAgain = () => new Contact(time, new LastView(store, "link", time.wall).read());
+  assert.equal(loadedAgain().isCertificateOver, false);
+  time.wallMillis += HOUR_MS;
+  assert.equal(loadedAgain().isCertificateOver, true);
 });
 
 test("the last view is gone under another link, after the session’s end, and after two hours", () => {

@@ -16,16 +16,18 @@ export class Contact {
   #heard;
   /** Whether there is no connection. A page begins without one. */
   #isLost = true;
-  /** When the server's certificate ends, in milliseconds since 1970; null where it has none. @type {number | null} */
-  #certificateEnd = null;
+  /** @type {number | null} */
+  #certificateEnd;
 
   /**
    * @param {Clock} clock
-   * @param {number | null} heardAt when an earlier load of the page last heard the server, by the wall clock
+   * @param {{ heardAt: number, certificateEnd: number | null } | null} earlier what an earlier load of the page knew,
+   *   in milliseconds since 1970
    */
-  constructor(clock, heardAt) {
+  constructor(clock, earlier) {
     this.#clock = clock;
-    this.#heardAt = heardAt;
+    this.#heardAt = earlier?.heardAt ?? null;
+    this.#certificateEnd = earlier?.certificateEnd ?? null;
     this.#heard = clock.page();
   }
 
@@ -53,6 +55,11 @@ export class Contact {
   /** When the server was last heard, in milliseconds since 1970; null if it never was. */
   get heardAt() {
     return this.#heardAt;
+  }
+
+  /** When the server's certificate ends, in milliseconds since 1970; null where it has none, or has not said. */
+  get certificateEnd() {
+    return this.#certificateEnd;
   }
 
   /**

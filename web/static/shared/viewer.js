@@ -36,6 +36,7 @@ export class Viewer {
   /** @type {Set<string>} */
   #shown = new Set();
   #peaking = new Peaking();
+  #isOverlayClear = true;
   /** @type {{ header: Stream.Header, receivedAt: number } | null} */
   #last = null;
   #connected = false;
@@ -156,9 +157,13 @@ export class Viewer {
   #drawOverlays() {
     const context = this.#overlay;
     const { width, height } = context.canvas;
+    const isShown = this.#last !== null && this.#shown.size > 0;
+    // Cleared again for each picture, an empty canvas as large as the view would be composed anew each time.
+    if (!isShown && this.#isOverlayClear) return;
     context.resetTransform();
     context.clearRect(0, 0, width, height);
-    if (!this.#last || this.#shown.size === 0) return;
+    this.#isOverlayClear = !isShown;
+    if (!this.#last || !isShown) return;
 
     const { header } = this.#last;
     const density = pixelsPerCss(context.canvas);

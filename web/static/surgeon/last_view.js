@@ -10,7 +10,16 @@ const NAME = "parfocal.last-view";
 const KEPT_MS = 2 * 60 * 60 * 1000;
 
 /** @typedef {Api.SurgeonView} View */
-/** @typedef {{ link: string, heardAt: number, view: View }} Kept */
+
+/**
+ * What is known of the server while it is not heard.
+ *
+ * @typedef {object} Heard
+ * @property {number} heardAt when it was last heard, in milliseconds since 1970
+ * @property {number | null} certificateEnd when its certificate ends, likewise; null where it has none, or did not say
+ */
+
+/** @typedef {Heard & { link: string, view: View }} Kept */
 
 export class LastView {
   #store;
@@ -40,13 +49,14 @@ export class LastView {
     }
     // Time goes on while nobody is heard: what is left then is not known, nor whether a prompt is due.
     const lasting = { ...view, remaining_seconds: null, prompt: null };
-    this.#write({ link: this.#link, heardAt: this.#wall(), view: lasting });
+    const certificateEnd = this.#parse()?.certificateEnd ?? null;
+    this.#write({ link: this.#link, heardAt: this.#wall(), certificateEnd, view: lasting });
   }
 
-  /** The server was heard at `heardAt`, and told nothing new. @param {number} heardAt */
-  touch(heardAt) {
+  /** The server told nothing new of the session, and this is what else is known of it. @param {Heard} heard */
+  touch(heard) {
     const kept = this.read();
-    if (kept) this.#write({ ...kept, heardAt });
+    if (kept) this.#write({ ...kept, ...heard });
   }
 
   /**

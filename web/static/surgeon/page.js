@@ -52,7 +52,7 @@ let questionPanel = null;
 let panelDrawn = "";
 
 const outbox = openOutbox();
-const contact = new Contact(clock, lastView.read()?.heardAt ?? null);
+const contact = new Contact(clock, lastView.read());
 const viewer = new Viewer(byId("view"), "surgeon");
 const comments = new Comments(outbox, drafts, here);
 const box = commentBox(comments, outbox);
@@ -368,9 +368,10 @@ function tick() {
 }
 
 document.addEventListener("visibilitychange", () => awake.ask());
-// The next load of the page is to know since when the server was not heard.
+// The next load of the page is to know since when the server was not heard, and whether its certificate has ended.
 addEventListener("pagehide", () => {
-  if (contact.heardAt !== null) lastView.touch(contact.heardAt);
+  const { heardAt, certificateEnd } = contact;
+  if (heardAt !== null) lastView.touch({ heardAt, certificateEnd });
 });
 
 setInterval(tick, TICK_MS);
