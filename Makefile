@@ -5,7 +5,7 @@
 BIND ?= 127.0.0.1:8080
 ARGS ?=
 
-# GigE Vision and USB3 Vision are checked wherever their library is. Every check is built once, with it or without; `make run` needs neither.
+# GigE Vision and USB3 Vision come in wherever their libraries are; nothing needs them.
 FEATURES := $(if $(shell pkg-config --exists aravis-0.8 libusb-1.0 2>/dev/null && echo yes),--features aravis)
 
 # A Debian package of the release build: target/parfocal_VERSION_amd64.deb.
@@ -18,7 +18,7 @@ package:
 
 run:
 	@.ci/setup build
-	@cargo build --release
+	@cargo build --release --locked $(FEATURES)
 	@exec target/release/parfocal serve --bind $(BIND) $(ARGS)
 
 test:
@@ -28,9 +28,12 @@ test:
 # The checks alone, on a machine that is already set up.
 check: lint web unit interface readme packaged
 
+# Tests and program are one build, so all is checked as it is shipped and compiled once. `cargo test` alone makes a
+# development build, which is faster after a change.
 lint:
 	cargo fmt --check
-	cargo clippy --all-targets --locked $(FEATURES) -- --deny warnings
+	cargo clippy --release --all-targets --locked $(FEATURES) -- --deny warnings
+	$(if $(FEATURES),cargo clippy --release --locked -- --deny warnings)
 	cargo deny --locked check licenses bans sources
 
 # The pages' code: format, lint, types, unit tests.
@@ -40,11 +43,11 @@ web:
 
 # After a change of the HTTP interface: the types that the pages are checked against.
 web-types:
-	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --quiet --locked $(FEATURES) --test system the_pages_are_checked
+	PARFOCAL_WRITE_DESCRIPTION=1 cargo test --release --quiet --locked $(FEATURES) --test system the_pages_are_checked
 	npm --prefix web run --silent api
 
 unit:
-	cargo test --locked $(FEATURES)
+	cargo test --release --locked $(FEATURES)
 
 # What HTTP answers, against its own description, as each role.
 interface:
@@ -59,7 +62,7 @@ packaged:
 
 # Pictures of every page and state, in target/screenshots/.
 screenshots:
-	PARFOCAL_SCREENSHOTS=1 cargo test --locked $(FEATURES) --test system -- browser:: tls::trust_page
+	PARFOCAL_SCREENSHOTS=1 cargo test --release --locked $(FEATURES) --test system -- browser:: tls::trust_page
 
 # Speed: each figure that docs/speed.md states comes from here.
 bench:

@@ -341,7 +341,7 @@ fn succeeds(arguments: &[&str], folder: &Path) -> String {
 fn start(data: Arc<TempDir>, address: &str, protocols: &Path, lens: &Emulator, camera: &Camera) -> Server {
     let lens = format!("optotune:{}", lens.path().display());
     let protocols = protocols.to_str().unwrap();
-    let mut arguments = vec!["--bind", address, "--fps", "10", "--protocols", protocols, "--lens", &lens];
+    let mut arguments = vec!["--bind", address, "--fps", "5", "--protocols", protocols, "--lens", &lens];
     arguments.extend(camera.arguments());
     Server::on(data, &arguments)
 }

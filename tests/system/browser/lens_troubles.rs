@@ -14,7 +14,7 @@ use crate::support::Server;
 async fn the_operator_reads_what_is_wrong_with_the_lens() {
     let mut emulator = Emulator::start(Model::default(), Arc::new(SystemClock)).unwrap();
     let lens = format!("optotune:{}", emulator.path().display());
-    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10", "--lens", &lens]);
+    let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "5", "--lens", &lens]);
 
     let driver = Driver::start();
     let operator = operator(&driver, &server).await;

@@ -46,7 +46,7 @@ pub async fn operator(driver: &Driver, server: &Server) -> Browser {
 fn start(data: Arc<TempDir>, address: &str) -> Server {
     let protocols = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/system/browser");
     // Few frames: the camera and two browsers share the machine.
-    Server::on(data, &["--bind", address, "--fps", "10", "--protocols", protocols.to_str().unwrap()])
+    Server::on(data, &["--bind", address, "--fps", "5", "--protocols", protocols.to_str().unwrap()])
 }
 
 /// Ends `server` as a power cut would.

@@ -143,7 +143,7 @@ pub fn command(data: &std::path::Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_parfocal"));
     command.arg("serve").args(arguments).arg("--data-dir").arg(data).stdin(Stdio::null()).env("RUST_LOG", "warn");
     if !arguments.contains(&"--fps") {
-        command.args(["--fps", "10"]);
+        command.args(["--fps", "5"]);
     }
     command
 }
