@@ -157,15 +157,15 @@ export class Viewer {
   #drawOverlays() {
     const context = this.#overlay;
     const { width, height } = context.canvas;
-    const isShown = this.#last !== null && this.#shown.size > 0;
+    const drawn = this.#shown.size > 0 ? this.#last : null;
     // Cleared again for each picture, an empty canvas as large as the view would be composed anew each time.
-    if (!isShown && this.#isOverlayClear) return;
+    if (!drawn && this.#isOverlayClear) return;
     context.resetTransform();
     context.clearRect(0, 0, width, height);
-    this.#isOverlayClear = !isShown;
-    if (!this.#last || !isShown) return;
+    this.#isOverlayClear = !drawn;
+    if (!drawn) return;
 
-    const { header } = this.#last;
+    const { header } = drawn;
     const density = pixelsPerCss(context.canvas);
     const { left, top, scale } = this.#framing.place;
     const pixels = scale * density;
