@@ -101,8 +101,7 @@ pub struct Restored {
 }
 
 /// Copies the database of data folder `folder` to the new file `out`, whether or not a server has it open. The
-/// copy gets its
-/// name once it is verified and on the disk.
+/// copy gets its name once it is verified and on the disk.
 ///
 /// # Errors
 /// When `out` is there or cannot be written, the database cannot be read, or the copy does not verify.
@@ -227,15 +226,13 @@ async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupErr
 
 /// The head of the copy at `path`, if all of it verifies. `what` names it.
 async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
-    let reader = Reader::open_checked(path).await?;
-    let snapshot = reader.snapshot().await?;
+    let snapshot = Reader::open_snapshot(path).await?;
     let problem = checks(&snapshot, None).await.into_iter().find_map(|check| match check {
         Check { verdict: Verdict::Failed(problem), .. } => Some(problem),
         _ => None,
     });
     let head = snapshot.head().await;
     snapshot.close().await;
-    reader.close().await;
 
     match problem {
         Some(problem) => Err(BackupError::Unsound { what: what.to_owned(), problem }),

@@ -226,9 +226,8 @@ async fn connect(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError
     Ok(pool.connect_with(options).await?)
 }
 
-/// Records the start of a run. Before it what an earlier version recorded is chained, and the telemetry that the
-/// run before
-/// did not come to chain.
+/// Records the start of a run. Before it, chains what an earlier version recorded, and the telemetry that the run
+/// before did not chain.
 async fn begin_run(trial: &SqlitePool, run: &Run) -> Result<i64, StoreError> {
     let weights = serde_json::to_string(&run.weights).map_err(|error| StoreError::Damaged(error.to_string()))?;
     let wall = run.wall.to_string();

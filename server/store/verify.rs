@@ -9,23 +9,22 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use super::chain::check::{BlockToCheck, Found, FoundRow, Walk};
 use super::chain::{Entry, Head, all, hashes, unsealed};
 use super::export::verify::{Check, Verdict};
+use super::schema::DATABASE;
 use super::studies::check_studies;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
 use crate::trial::commitment::Allocation;
 
 /// Checks the database of data folder `path`, or the database file `path`: every check, in order. With `expected`,
-/// a head
-/// known from elsewhere, also whether the chain is the one that had it.
+/// a head known from elsewhere, also whether the chain is the one that had it.
 ///
 /// # Errors
 /// When there is no database, or it is of another version.
 pub async fn verify_database(path: &Path, expected: Option<Head>) -> Result<Vec<Check>, StoreError> {
-    let reader = if path.is_dir() { Reader::open(path).await? } else { Reader::open_checked(path).await? };
-    let snapshot = reader.snapshot().await?;
+    let file = if path.is_dir() { path.join(DATABASE) } else { path.to_owned() };
+    let snapshot = Reader::open_snapshot(&file).await?;
     let checks = checks(&snapshot, expected).await;
     snapshot.close().await;
-    reader.close().await;
     Ok(checks)
 }
 
@@ -142,8 +141,7 @@ async fn check_block(connection: &mut SqliteConnection, block: &BlockToCheck) ->
 }
 
 /// How many steps of telemetry have no block yet. Only the latest run may have such: the next start of the server
-/// chains
-/// what a killed one did not come to chain.
+/// chains what a killed one did not come to chain.
 async fn unchained(connection: &mut SqliteConnection, walk: &Walk) -> Result<i64, Wrong> {
     let sessions = sqlx::query_as(
         "SELECT session, session IN (SELECT session FROM events WHERE run = (SELECT max(run) FROM events))
