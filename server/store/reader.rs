@@ -41,23 +41,22 @@ impl Reader {
 
     /// Opens the database `file`.
     pub(super) async fn open_checked(file: &Path) -> Result<Self, StoreError> {
-        check_there(file)?;
+        if !file.is_file() {
+            return Err(StoreError::Missing(file.to_owned()));
+        }
         let reader = Self::open_file(file).await?;
         reader.check_version().await?;
         Ok(reader)
     }
 
     pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
-        let pool = SqlitePoolOptions::new().max_connections(3).connect_with(read_only(file)).await?;
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .read_only(true)
+            .busy_timeout(Duration::from_secs(5))
+            .row_buffer_size(ROWS_AHEAD);
+        let pool = SqlitePoolOptions::new().max_connections(3).connect_with(options).await?;
         Ok(Self { pool, ended: MotionsOfEnded::default() })
-    }
-
-    /// Opens the database `file` as it is now: see [`Self::snapshot`].
-    pub(super) async fn open_snapshot(file: &Path) -> Result<Self, StoreError> {
-        check_there(file)?;
-        let snapshot = Self { pool: snapshot_pool(read_only(file)).await?, ended: MotionsOfEnded::default() };
-        snapshot.check_version().await?;
-        Ok(snapshot)
     }
 
     /// The database as it is now, whatever is written from now on: all that is read from what comes
@@ -67,7 +66,20 @@ impl Reader {
     /// When the database failed.
     pub async fn snapshot(&self) -> Result<Self, StoreError> {
         let options = (*self.pool.connect_options()).clone();
-        Ok(Self { pool: snapshot_pool(options).await?, ended: Arc::clone(&self.ended) })
+        // One connection, within one transaction from its first to its last use. The first reading takes the snapshot.
+        let pool = SqlitePoolOptions::new()
+            .max_connections(1)
+            .idle_timeout(None)
+            .max_lifetime(None)
+            .test_before_acquire(false)
+            .after_connect(|connection, _| {
+                Box::pin(async move {
+                    sqlx::query("BEGIN").execute(&mut *connection).await?;
+                    sqlx::query("SELECT count(*) FROM runs").execute(&mut *connection).await.map(|_| ())
+                })
+            });
+
+        Ok(Self { pool: pool.connect_with(options).await?, ended: Arc::clone(&self.ended) })
     }
 
     async fn check_version(&self) -> Result<(), StoreError> {
@@ -252,34 +264,6 @@ impl Reader {
 
         rows.iter().map(path_point).collect()
     }
-}
-
-fn check_there(file: &Path) -> Result<(), StoreError> {
-    if file.is_file() { Ok(()) } else { Err(StoreError::Missing(file.to_owned())) }
-}
-
-fn read_only(file: &Path) -> SqliteConnectOptions {
-    SqliteConnectOptions::new()
-        .filename(file)
-        .read_only(true)
-        .busy_timeout(Duration::from_secs(5))
-        .row_buffer_size(ROWS_AHEAD)
-}
-
-/// One connection, within one transaction from its first to its last use. The first reading takes the snapshot.
-async fn snapshot_pool(options: SqliteConnectOptions) -> Result<SqlitePool, sqlx::Error> {
-    let pool = SqlitePoolOptions::new()
-        .max_connections(1)
-        .idle_timeout(None)
-        .max_lifetime(None)
-        .test_before_acquire(false)
-        .after_connect(|connection, _| {
-            Box::pin(async move {
-                sqlx::query("BEGIN").execute(&mut *connection).await?;
-                sqlx::query("SELECT count(*) FROM sqlite_schema").execute(&mut *connection).await.map(|_| ())
-            })
-        });
-    pool.connect_with(options).await
 }
 
 fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {
