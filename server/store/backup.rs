@@ -226,15 +226,13 @@ async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupErr
 
 /// The head of the copy at `path`, if all of it verifies. `what` names it.
 async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
-    let reader = Reader::open_checked(path).await?;
-    let snapshot = reader.snapshot().await?;
+    let snapshot = Reader::open_snapshot(path).await?;
     let problem = checks(&snapshot, None).await.into_iter().find_map(|check| match check {
         Check { verdict: Verdict::Failed(problem), .. } => Some(problem),
         _ => None,
     });
     let head = snapshot.head().await;
     snapshot.close().await;
-    reader.close().await;
 
     match problem {
         Some(problem) => Err(BackupError::Unsound { what: what.to_owned(), problem }),

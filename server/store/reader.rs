@@ -41,22 +41,22 @@ impl Reader {
 
     /// Opens the database `file`.
     pub(super) async fn open_checked(file: &Path) -> Result<Self, StoreError> {
-        if !file.is_file() {
-            return Err(StoreError::Missing(file.to_owned()));
-        }
-        let reader = Self::open_file(file).await?;
+        let reader = Self::open_file(there(file)?).await?;
         reader.check_version().await?;
         Ok(reader)
     }
 
     pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
-        let options = SqliteConnectOptions::new()
-            .filename(file)
-            .read_only(true)
-            .busy_timeout(Duration::from_secs(5))
-            .row_buffer_size(ROWS_AHEAD);
-        let pool = SqlitePoolOptions::new().max_connections(3).connect_with(options).await?;
+        let pool = SqlitePoolOptions::new().max_connections(3).connect_with(reading(file)).await?;
         Ok(Self { pool, ended: MotionsOfEnded::default() })
+    }
+
+    /// Opens the database `file` as it is now, whatever is written from now on.
+    pub(super) async fn open_snapshot(file: &Path) -> Result<Self, StoreError> {
+        let pool = snapshot_pool(reading(there(file)?)).await?;
+        let snapshot = Self { pool, ended: MotionsOfEnded::default() };
+        snapshot.check_version().await?;
+        Ok(snapshot)
     }
 
     /// The database as it is now, whatever is written from now on: all that is read from what comes
@@ -65,21 +65,8 @@ impl Reader {
     /// # Errors
     /// When the database failed.
     pub async fn snapshot(&self) -> Result<Self, StoreError> {
-        let options = (*self.pool.connect_options()).clone();
-        // One connection, within one transaction from its first to its last use. The first reading takes the snapshot.
-        let pool = SqlitePoolOptions::new()
-            .max_connections(1)
-            .idle_timeout(None)
-            .max_lifetime(None)
-            .test_before_acquire(false)
-            .after_connect(|connection, _| {
-                Box::pin(async move {
-                    sqlx::query("BEGIN").execute(&mut *connection).await?;
-                    sqlx::query("SELECT count(*) FROM runs").execute(&mut *connection).await.map(|_| ())
-                })
-            });
-
-        Ok(Self { pool: pool.connect_with(options).await?, ended: Arc::clone(&self.ended) })
+        let pool = snapshot_pool((*self.pool.connect_options()).clone()).await?;
+        Ok(Self { pool, ended: Arc::clone(&self.ended) })
     }
 
     async fn check_version(&self) -> Result<(), StoreError> {
@@ -264,6 +251,32 @@ impl Reader {
 
         rows.iter().map(path_point).collect()
     }
+}
+
+/// The database `file`, if there is one.
+fn there(file: &Path) -> Result<&Path, StoreError> {
+    if file.is_file() { Ok(file) } else { Err(StoreError::Missing(file.to_owned())) }
+}
+
+/// How the database `file` is opened for reading.
+fn reading(file: &Path) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(file)
+        .read_only(true)
+        .busy_timeout(Duration::from_secs(5))
+        .row_buffer_size(ROWS_AHEAD)
+}
+
+/// One connection, within one transaction from its first to its last use.
+async fn snapshot_pool(options: SqliteConnectOptions) -> Result<SqlitePool, StoreError> {
+    let one = SqlitePoolOptions::new().max_connections(1).idle_timeout(None).max_lifetime(None);
+    let pool = one.test_before_acquire(false).connect_with(options).await?;
+
+    // The first reading takes the snapshot. Both are asked for here and not in `after_connect`: where that fails, as it
+    // does on a damaged file, the pool tries again for half a minute, and then says that it waited too long.
+    sqlx::query("BEGIN").execute(&pool).await?;
+    sqlx::query("SELECT count(*) FROM sqlite_schema").execute(&pool).await?;
+    Ok(pool)
 }
 
 fn line(row: &SqliteRow) -> Result<SessionLine, StoreError> {

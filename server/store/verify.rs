@@ -9,6 +9,7 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use super::chain::check::{BlockToCheck, Found, FoundRow, Walk};
 use super::chain::{Entry, Head, all, hashes, unsealed};
 use super::export::verify::{Check, Verdict};
+use super::schema::DATABASE;
 use super::studies::check_studies;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
@@ -20,11 +21,12 @@ use crate::trial::commitment::Allocation;
 /// # Errors
 /// When there is no database, or it is of another version.
 pub async fn verify_database(path: &Path, expected: Option<Head>) -> Result<Vec<Check>, StoreError> {
-    let reader = if path.is_dir() { Reader::open(path).await? } else { Reader::open_checked(path).await? };
-    let snapshot = reader.snapshot().await?;
+    let snapshot = match path.is_dir() {
+        true => Reader::open_snapshot(&path.join(DATABASE)).await?,
+        false => Reader::open_snapshot(path).await?,
+    };
     let checks = checks(&snapshot, expected).await;
     snapshot.close().await;
-    reader.close().await;
     Ok(checks)
 }
 

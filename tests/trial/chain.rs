@@ -433,6 +433,27 @@ async fn a_backup_is_made_while_the_server_writes_and_put_back_when_it_is_gone()
 }
 
 #[tokio::test]
+async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
+    const PAGE: usize = 4096;
+
+    let folder = tempfile::tempdir().unwrap();
+    a_database(folder.path()).await;
+    let whole = std::fs::read(folder.path().join("parfocal.db")).unwrap();
+    let copy = folder.path().join("copy.db");
+    assert!(whole.len() > 40 * PAGE);
+
+    for page in 0..whole.len() / PAGE {
+        let mut damaged = whole.clone();
+        damaged[page * PAGE..(page + 1) * PAGE].fill(0xff);
+        std::fs::write(&copy, damaged).unwrap();
+        match verify_database(&copy, None).await {
+            Ok(checks) => assert!(said(&checks, "database").unwrap_err().contains("damaged"), "{page}: {checks:?}"),
+            Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{page}: {error}"),
+        }
+    }
+}
+
+#[tokio::test]
 async fn who_looks_is_recorded_and_stands_in_the_export() {
     let folder = tempfile::tempdir().unwrap();
     let (trial, session) = with_session(folder.path()).await;
