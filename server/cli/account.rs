@@ -9,6 +9,7 @@ use clap::{Args, Subcommand};
 use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
 
 use super::output::{Failure, print};
+use super::wait::wait_for;
 use crate::accounts::{Accounts, Cost, Passphrase};
 use crate::clock::SystemClock;
 use crate::notices::tell;
@@ -102,8 +103,7 @@ fn role(text: &str) -> Result<AccountRole, String> {
 /// # Errors
 /// When there is no database, the passphrase is too short, or the rules refuse.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    runtime.block_on(async {
+    wait_for(async {
         match &arguments.action {
             Action::Add(add) => self::add(add).await,
             Action::List(list) => self::list(list).await,
@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Action::Enable(named) => change(named, &AccountChange::Enable).await,
             Action::SignOut(named) => change(named, &AccountChange::SignOut).await,
         }
-    })
+    })?
 }
 
 async fn add(add: &Add) -> Result<(), Failure> {

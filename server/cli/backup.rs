@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::output::{Failure, print};
+use super::wait::wait_for;
 use crate::clock::SystemClock;
 use crate::store::backup;
 
@@ -28,8 +29,7 @@ pub struct Arguments {
 /// # Errors
 /// When the file exists or cannot be written, there is no database, or the copy does not verify.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let made = runtime.block_on(backup::backup(&arguments.data_dir, &arguments.out, Arc::new(SystemClock)))?;
+    let made = wait_for(backup::backup(&arguments.data_dir, &arguments.out, Arc::new(SystemClock)))??;
     if arguments.json {
         return print(&(serde_json::to_string(&made)? + "\n"));
     }

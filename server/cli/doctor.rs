@@ -7,11 +7,13 @@ use std::sync::Arc;
 use jiff::tz::TimeZone;
 
 use super::output::{Failure, print};
+use super::wait::wait_for;
 use crate::camera::calibration::read;
 use crate::clock::{Clock, SystemClock};
-use crate::doctor::{Finding, Verdict, calibration, lens, machine, unreadable_calibration};
+use crate::doctor::{Finding, Verdict, calibration, database, lens, machine, unreadable_calibration};
 use crate::imaging::SENSOR_SIZE;
 use crate::lens::open;
+use crate::store::database_state;
 
 /// Arguments of `parfocal doctor`.
 #[derive(Debug, clap::Args)]
@@ -35,7 +37,9 @@ pub struct Arguments {
 /// # Errors
 /// When something must be put right before a trial, or standard output cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut findings = machine(&arguments.data_dir, &SystemClock);
+    let data = &arguments.data_dir;
+    let mut findings = machine(data, &SystemClock);
+    findings.extend(database(data, wait_for(database_state(data))?));
     if let Some(spec) = &arguments.lens {
         super::interrupt::let_lenses_go_first()?;
         let asked = open(spec, Arc::new(SystemClock)).and_then(|mut opened| opened.info());

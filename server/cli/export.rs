@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::output::{Failure, Steps, print};
+use super::wait::wait_for;
 use crate::clock::SystemClock;
 use crate::ids::SessionId;
 use crate::package::{self, LeftOut, Sessions, Source, Summary};
@@ -42,7 +43,7 @@ pub struct Arguments {
 /// When there is no such session, it has not been unblinded though the policies are asked for, or the
 /// folder cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(write(arguments))
+    wait_for(write(arguments))?
 }
 
 async fn write(arguments: &Arguments) -> Result<(), Failure> {

@@ -22,6 +22,7 @@ mod study;
 mod study_analysis;
 mod train;
 mod verify;
+mod wait;
 
 use std::process::ExitCode;
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::output::{Failure, print};
+use super::wait::wait_for;
 use crate::clock::SystemClock;
 use crate::store::backup::{self, Relation, Restored};
 
@@ -27,8 +28,7 @@ pub struct Arguments {
 /// # Errors
 /// When a server runs on the folder, or the backup does not verify; then nothing was changed.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let restored = runtime.block_on(backup::restore(&arguments.data_dir, &arguments.file, Arc::new(SystemClock)))?;
+    let restored = wait_for(backup::restore(&arguments.data_dir, &arguments.file, Arc::new(SystemClock)))??;
     if arguments.json {
         return print(&(serde_json::to_string(&restored)? + "\n"));
     }

@@ -14,6 +14,7 @@ use super::export::join;
 use super::library::protocols;
 use super::output::{Failure, print};
 use super::study_analysis;
+use super::wait::wait_for;
 use crate::autofocus::Registry;
 use crate::clock::SystemClock;
 use crate::conductor::{Studies, StudyDetail};
@@ -123,8 +124,7 @@ struct Merge {
 /// # Errors
 /// When there is no database, a server has it open, or the study's rules refuse.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    runtime.block_on(async {
+    wait_for(async {
         match &arguments.action {
             Action::New(new) => plan(new).await,
             Action::Open(open) => change(&open.study, Change::Open, &open.signed).await,
@@ -137,7 +137,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Action::Merge(sites) => merge(sites),
             Action::Analyse(analyse) => study_analysis::run(analyse).await,
         }
-    })
+    })?
 }
 
 async fn plan(new: &New) -> Result<(), Failure> {

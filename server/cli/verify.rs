@@ -1,11 +1,12 @@
 //! `parfocal verify`: whether a trial's export, or a whole database, is complete, unchanged and true to its
 //! commitments.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::output::{Failure, print};
+use super::wait::wait_for;
 use crate::package::{check, is_package};
 use crate::store::export::verify::{Check, Verdict, is_export, verify};
 use crate::store::{Head, verify_database};
@@ -39,7 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else if is_export(path) {
         ("export", verify(path, arguments.head.as_ref()))
     } else {
-        ("database", of_database(path, arguments.head.clone())?)
+        ("database", wait_for(verify_database(path, arguments.head.clone()))??)
     };
 
     print(&if arguments.json { serde_json::to_string(&checks)? + "\n" } else { checks.iter().map(line).collect() })?;
@@ -49,11 +50,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     }
     Err(format!("{failed} of {} checks failed: do not rely on this {what}", checks.len()).into())
-}
-
-fn of_database(path: &Path, head: Option<Head>) -> Result<Vec<Check>, Failure> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    Ok(runtime.block_on(verify_database(path, head))?)
 }
 
 fn line(check: &Check) -> String {

@@ -3,6 +3,7 @@
 
 mod calibration;
 mod certificate;
+mod database;
 mod devices;
 mod finding;
 mod folder;
@@ -15,6 +16,7 @@ use std::path::Path;
 
 pub use calibration::{calibration, unreadable_calibration};
 pub use certificate::certificate;
+pub use database::{DatabaseState, database};
 pub use devices::{camera_in_use, lens_in_use};
 pub use finding::{Finding, Verdict};
 pub use folder::LEAST_ROOM;
@@ -24,7 +26,7 @@ pub use tablet::{Tablet, tablets};
 
 use crate::clock::Clock;
 
-/// Looks at everything but the devices: the folder `data` and its disk, clock, network and rights.
+/// Looks at everything but the database and the devices: the folder `data` and its disk, clock, network and rights.
 #[must_use]
 pub fn machine(data: &Path, clock: &dyn Clock) -> Vec<Finding> {
     let mut findings = vec![folder::disk(data), folder::access(data)];

@@ -17,6 +17,7 @@ use super::error::Error;
 use super::roles::Operator;
 use super::{App, AppState};
 use crate::doctor::{self, Finding};
+use crate::store::database_state;
 
 /// What was found.
 #[derive(Debug, Serialize, ToSchema)]
@@ -30,11 +31,12 @@ struct Checks {
 
 /// Whether everything is ready for a trial.
 ///
-/// Looks at the machine anew. Devices are not asked, because the focus loop holds them: the server tells what it knows.
+/// Looks at the machine and the database anew. Devices are not asked, because the focus loop holds them: the server tells what it knows.
 #[utoipa::path(get, path = "/api/operator/checks", tag = "operator", responses((status = 200, body = Checks)))]
 async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>, Error> {
     let look = Arc::clone(&app.equipment.look).lock_owned().await;
     let folder = app.store.folder().to_owned();
+    let database = doctor::database(&folder, database_state(&folder).await);
     let clock = Arc::clone(&app.clock);
     let machine = spawn_blocking(move || {
         let _look = look;
@@ -42,6 +44,7 @@ async fn checks(_: Operator, State(app): State<AppState>) -> Result<Json<Checks>
     });
 
     let mut findings = machine.await.map_err(|_| Error::Internal)?;
+    findings.extend(database);
     let now = app.clock.wall();
     let local = app.reach.authority().is_some();
     findings.extend(app.reach.certificate_until().map(|until| doctor::certificate(until, local, now)));

@@ -19,7 +19,7 @@ use crate::clock::Moment;
 use crate::files::make_private;
 
 use super::counts::Counts;
-use super::schema::{DATABASE, MIGRATOR};
+use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::scrub::scrub;
 use super::values::{begin, nanoseconds};
 use super::writes::{Turn, Writes, Written};
@@ -101,6 +101,7 @@ impl Store {
 
         // What people say is flushed to the disk at each commit; telemetry may lose its last seconds to a power cut.
         let trial = connect(options.clone().synchronous(SqliteSynchronous::Full)).await?;
+        check_names(&trial).await?;
         MIGRATOR.run(&trial).await?;
 
         let relaxed = options.synchronous(SqliteSynchronous::Normal);

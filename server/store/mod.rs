@@ -34,6 +34,7 @@ pub mod telemetry;
 mod values;
 mod verify;
 mod voice;
+mod whole;
 mod withdrawals;
 mod writes;
 
@@ -57,5 +58,6 @@ pub use sessions::{NewSession, StoredSession};
 pub use studies::{Enrolment, NewStudy, StoredStudy, StudyBook, StudyChange};
 pub use verify::verify_database;
 pub use voice::{KeptVoice, PieceKept, Recorded, StoredPiece, VoicePiece};
+pub use whole::database_state;
 pub use withdrawals::Withdrawal;
 pub use writes::{WriteTimes, Writes};

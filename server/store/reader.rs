@@ -10,7 +10,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions, SqliteRo
 use sqlx::{Connection as _, Row, migrate::Migrate};
 
 use super::motion::MotionsOfEnded;
-use super::schema::{DATABASE, MIGRATOR};
+use super::schema::{DATABASE, MIGRATOR, check_names};
 use super::values::moment;
 use super::values::{parsed, stamp};
 use super::{DeviceEvent, Participant, PathPoint, RunClocks, SessionLine, Stamp, StoreError};
@@ -48,15 +48,21 @@ impl Reader {
 
     pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
         let pool = SqlitePoolOptions::new().max_connections(3).connect_with(reading(file)).await?;
+        check_names(&pool).await?;
         Ok(Self { pool, ended: MotionsOfEnded::default() })
     }
 
     /// Opens the database `file` as it is now, whatever is written from now on.
     pub(super) async fn open_snapshot(file: &Path) -> Result<Self, StoreError> {
-        let pool = snapshot_pool(reading(there(file)?)).await?;
-        let snapshot = Self { pool, ended: MotionsOfEnded::default() };
+        let snapshot = Self::open_snapshot_unchecked(file).await?;
         snapshot.check_version().await?;
         Ok(snapshot)
+    }
+
+    /// The same, of whichever version the database is.
+    pub(super) async fn open_snapshot_unchecked(file: &Path) -> Result<Self, StoreError> {
+        let pool = snapshot_pool(reading(there(file)?)).await?;
+        Ok(Self { pool, ended: MotionsOfEnded::default() })
     }
 
     /// The database as it is now, whatever is written from now on: all that is read from what comes
@@ -69,7 +75,7 @@ impl Reader {
         Ok(Self { pool, ended: Arc::clone(&self.ended) })
     }
 
-    async fn check_version(&self) -> Result<(), StoreError> {
+    pub(super) async fn check_version(&self) -> Result<(), StoreError> {
         let mut connection = self.pool.acquire().await?;
         let applied = connection.list_applied_migrations("_sqlx_migrations").await?;
         if let Some(newer) = applied.iter().find(|migration| !MIGRATOR.version_exists(migration.version)) {
@@ -275,7 +281,7 @@ async fn snapshot_pool(options: SqliteConnectOptions) -> Result<SqlitePool, Stor
     // The first reading takes the snapshot. Both are asked for here and not in `after_connect`: where that fails, as it
     // does on a damaged file, the pool tries again for half a minute, and then says that it waited too long.
     sqlx::query("BEGIN").execute(&pool).await?;
-    sqlx::query("SELECT count(*) FROM sqlite_schema").execute(&pool).await?;
+    check_names(&pool).await?;
     Ok(pool)
 }
 

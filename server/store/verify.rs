@@ -11,6 +11,7 @@ use super::chain::{Entry, Head, all, hashes, unsealed};
 use super::export::verify::{Check, Verdict};
 use super::schema::DATABASE;
 use super::studies::check_studies;
+use super::whole::Thoroughness;
 use super::{Reader, StoreError};
 use crate::ids::SessionId;
 use crate::trial::commitment::Allocation;
@@ -21,10 +22,8 @@ use crate::trial::commitment::Allocation;
 /// # Errors
 /// When there is no database, or it is of another version.
 pub async fn verify_database(path: &Path, expected: Option<Head>) -> Result<Vec<Check>, StoreError> {
-    let snapshot = match path.is_dir() {
-        true => Reader::open_snapshot(&path.join(DATABASE)).await?,
-        false => Reader::open_snapshot(path).await?,
-    };
+    let file = if path.is_dir() { path.join(DATABASE) } else { path.to_owned() };
+    let snapshot = Reader::open_snapshot(&file).await?;
     let checks = checks(&snapshot, expected).await;
     snapshot.close().await;
     Ok(checks)
@@ -71,10 +70,7 @@ impl From<sqlx::Error> for Wrong {
 
 /// Whether the file is whole by the database's own checks.
 async fn whole(snapshot: &Reader) -> Result<String, Wrong> {
-    let said: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check(1)").fetch_all(snapshot.pool()).await?;
-    if said != ["ok"] {
-        return Err(format!("the file is damaged: {}", said.join("; ")).into());
-    }
+    snapshot.check_file(Thoroughness::Full).await?;
     if let Some(row) = sqlx::query("PRAGMA foreign_key_check").fetch_optional(snapshot.pool()).await? {
         let table: String = row.try_get(0)?;
         let of: String = row.try_get(2)?;

@@ -2,17 +2,22 @@
 //! is written over the file's content there: so the file stays a database, and what its rows say is wrong.
 
 use std::fs;
+use std::time::Duration;
 
 use parfocal::store::verify_database;
 use parfocal::trial::action::Action;
 use parfocal::trial::role::Role;
 use tempfile::TempDir;
 use tokio::runtime::{Builder, Runtime};
+use tokio::time::timeout;
 
 use super::fixture::Trial;
 
 /// Bytes of the file that a seed holds.
 const PIECE: usize = 64;
+
+/// A verification that takes longer hangs: most take a few milliseconds.
+const LONGEST: Duration = Duration::from_mins(1);
 
 /// A thread's own copy of the database, and what waits for it.
 struct Database {
@@ -37,7 +42,8 @@ pub fn backup(bytes: &[u8]) {
         }
 
         fs::write(&file, changed).unwrap();
-        if let Ok(checks) = database.runtime.block_on(verify_database(&file, None)) {
+        let verified = database.runtime.block_on(async { timeout(LONGEST, verify_database(&file, None)).await });
+        if let Ok(checks) = verified.expect("verification ends") {
             assert!(!checks.is_empty());
         }
     });

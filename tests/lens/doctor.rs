@@ -52,6 +52,18 @@ fn a_lens_without_its_head_and_a_file_for_a_folder_must_be_put_right() {
 }
 
 #[test]
+fn a_database_that_is_none_must_be_put_right() {
+    let data = tempfile::tempdir().unwrap();
+    std::fs::write(data.path().join("parfocal.db"), "not a database").unwrap();
+    let (content, findings, errors) = doctor(data.path(), &[]);
+
+    assert!(!content && errors.contains("put one thing right"), "{errors}");
+    let database = about(&findings, "database");
+    assert_eq!(database["verdict"], "wrong");
+    assert!(database["advice"].as_str().unwrap().contains("parfocal restore"), "{database}");
+}
+
+#[test]
 fn people_read_a_line_a_finding_and_what_to_do() {
     let output = Command::new(env!("CARGO_BIN_EXE_parfocal"))
         .args(["doctor", "--data-dir", "/nowhere/at/all", "--lens", "optotune:/dev/null"])

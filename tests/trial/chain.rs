@@ -5,17 +5,20 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use parfocal::clock::Clock;
+use parfocal::doctor::DatabaseState;
 use parfocal::ids::SessionId;
 use parfocal::store::backup::{BackupError, Relation, backup, restore};
 use parfocal::store::export::export;
 use parfocal::store::export::verify::{Check, Verdict, verify};
-use parfocal::store::{Access, DeviceEvent, Head, MIGRATOR, StoreError, verify_database};
+use parfocal::store::{
+    Access, DeviceEvent, Head, MIGRATOR, Reader, Store, StoreError, database_state, verify_database,
+};
 use parfocal::trial::role::Role;
 use serde_json::Value;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 
 use crate::exports::{failed, with_session};
-use crate::fixture::Trial;
+use crate::fixture::{Trial, a_clock, a_run};
 
 /// A database with a record of every kind, and no server on it.
 async fn a_database(folder: &Path) -> (SessionId, Head) {
@@ -438,19 +441,71 @@ async fn whichever_page_of_a_database_is_damaged_verification_says_so() {
 
     let folder = tempfile::tempdir().unwrap();
     a_database(folder.path()).await;
-    let whole = std::fs::read(folder.path().join("parfocal.db")).unwrap();
-    let copy = folder.path().join("copy.db");
+    let file = folder.path().join("parfocal.db");
+    // Without pages that hold nothing, whose damage would harm nobody.
+    let pool = crate::storage::raw(folder.path()).await;
+    sqlx::query("VACUUM").execute(&pool).await.unwrap();
+    pool.close().await;
+
+    let whole = std::fs::read(&file).unwrap();
     assert!(whole.len() > 40 * PAGE);
+    assert_eq!(database_state(folder.path()).await, DatabaseState::Whole(whole.len() as u64));
 
     for page in 0..whole.len() / PAGE {
         let mut damaged = whole.clone();
         damaged[page * PAGE..(page + 1) * PAGE].fill(0xff);
-        std::fs::write(&copy, damaged).unwrap();
-        match verify_database(&copy, None).await {
+        std::fs::write(&file, damaged).unwrap();
+        match verify_database(&file, None).await {
             Ok(checks) => assert!(said(&checks, "database").unwrap_err().contains("damaged"), "{page}: {checks:?}"),
             Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{page}: {error}"),
         }
+        let state = database_state(folder.path()).await;
+        assert!(matches!(state, DatabaseState::Damaged(_)), "{page}: {state:?}");
     }
+}
+
+/// Such a name made the database's driver panic, and verification wait for ever.
+#[tokio::test]
+async fn a_column_named_by_what_is_no_text_is_refused_whoever_opens_the_database() {
+    let folder = tempfile::tempdir().unwrap();
+    a_database(folder.path()).await;
+    let file = folder.path().join("parfocal.db");
+    let mut bytes = std::fs::read(&file).unwrap();
+    let table = position(&bytes, b"CREATE TABLE chain ");
+    let column = table + position(&bytes[table..], b"previous");
+    bytes[column] = 0xff;
+    std::fs::write(&file, bytes).unwrap();
+
+    for refused in [
+        verify_database(&file, None).await.map(|_| ()),
+        Reader::open(folder.path()).await.map(|_| ()),
+        Store::open(folder.path(), &a_run(&a_clock())).await.map(|_| ()),
+    ] {
+        assert!(matches!(refused, Err(StoreError::Damaged(_))), "{refused:?}");
+    }
+    assert!(matches!(database_state(folder.path()).await, DatabaseState::Damaged(_)));
+}
+
+fn position(bytes: &[u8], part: &[u8]) -> usize {
+    bytes.windows(part.len()).position(|window| window == part).unwrap()
+}
+
+#[tokio::test]
+async fn a_database_is_looked_at_whatever_its_version() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(database_state(folder.path()).await, DatabaseState::Missing);
+    a_database(folder.path()).await;
+
+    let pool = crate::storage::raw(folder.path()).await;
+    let version = "INSERT INTO _sqlx_migrations SELECT 9000, description, installed_on, success, checksum, \
+                   execution_time FROM _sqlx_migrations LIMIT 1";
+    sqlx::query(version).execute(&pool).await.unwrap();
+    assert_eq!(database_state(folder.path()).await, DatabaseState::Newer);
+
+    sqlx::query("DELETE FROM _sqlx_migrations WHERE version = 9000").execute(&pool).await.unwrap();
+    MIGRATOR.undo(&pool, 6).await.unwrap();
+    pool.close().await;
+    assert!(matches!(database_state(folder.path()).await, DatabaseState::Whole(_)));
 }
 
 #[tokio::test]

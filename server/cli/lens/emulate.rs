@@ -8,6 +8,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 
 use crate::cli::output::{Failure, print};
+use crate::cli::wait::wait_for;
 use crate::clock::{Clock, SystemClock};
 use crate::lens::emulator::{Emulator, Fault, Glitch, LENS_DIOPTRES, Model};
 use crate::lens::{LensDynamics, Optics};
@@ -82,7 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&format!("{}\n", emulator.path().display()))?;
     tell(HELP);
 
-    tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(serve(&mut emulator))
+    wait_for(serve(&mut emulator))?
 }
 
 async fn serve(emulator: &mut Emulator) -> Result<(), Failure> {

@@ -22,11 +22,12 @@ fn about<'a>(findings: &'a [Value], subject: &str) -> &'a Value {
 async fn the_operator_is_told_of_the_machine_its_devices_and_the_tablet() {
     let server = Server::with(&["--bind", "127.0.0.1:0", "--fps", "10"]);
     let found = findings(&server).await;
-    for subject in ["disk", "data folder", "clock", "network", "camera", "lens", "calibration", "tablet"] {
+    for subject in ["disk", "data folder", "database", "clock", "network", "camera", "lens", "calibration", "tablet"] {
         let finding = about(&found, subject);
         assert_eq!(finding["advice"].is_null(), finding["verdict"] == "well", "what is not well has advice: {finding}");
     }
     assert_eq!(about(&found, "data folder")["verdict"], "well");
+    assert_eq!(about(&found, "database")["verdict"], "well");
     assert_eq!(about(&found, "tablet")["found"], "No surgeon's page is open.");
     assert!(about(&found, "lens")["found"].as_str().unwrap().contains("simulated lens"), "{found:?}");
 

@@ -1,0 +1,55 @@
+//! The database: whether its file is whole.
+
+use std::path::Path;
+
+use super::finding::Finding;
+
+const DATABASE: &str = "database";
+
+/// How the database of a data folder was found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum DatabaseState {
+    /// There is none.
+    Missing,
+    /// SQLite finds nothing wrong in these bytes.
+    Whole(u64),
+    /// SQLite finds this wrong in it.
+    Damaged(String),
+    /// A newer version of parfocal made it.
+    Newer,
+    /// It cannot be read, for this reason.
+    Unreadable(String),
+}
+
+/// The database of the data folder `data`; nothing where the folder itself is not there.
+#[must_use]
+pub fn database(data: &Path, state: DatabaseState) -> Option<Finding> {
+    let folder = data.display();
+    Some(match state {
+        DatabaseState::Missing if !data.is_dir() => return None,
+        DatabaseState::Missing => Finding::advice(
+            DATABASE,
+            format!("There is no database in {folder} yet."),
+            "The server makes it at its first start; or name the folder that has it: --data-dir DIR.",
+        ),
+        DatabaseState::Whole(bytes) => {
+            Finding::well(DATABASE, format!("The database of {:.1} MB is whole.", bytes as f64 / 1e6))
+        }
+        DatabaseState::Damaged(detail) => Finding::wrong(
+            DATABASE,
+            format!("The database is damaged ({detail})."),
+            "Begin no session. End the server, keep a copy of the data folder, and put the latest backup in the \
+             database's place: parfocal restore FILE",
+        ),
+        DatabaseState::Newer => Finding::wrong(
+            DATABASE,
+            "The database was made by a newer version of parfocal.",
+            "Install that version, or name another folder: --data-dir DIR.",
+        ),
+        DatabaseState::Unreadable(reason) => Finding::wrong(
+            DATABASE,
+            format!("The database cannot be read: {reason}."),
+            "Run this as the user that runs the server, and check the disk.",
+        ),
+    })
+}
