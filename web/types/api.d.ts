@@ -102,7 +102,7 @@ export interface paths {
         };
         /**
          * Whether everything is ready for a trial.
-         * @description Looks at the machine anew. Devices are not asked, because the focus loop holds them: the server tells what it knows.
+         * @description Looks at the machine and the database anew. Devices are not asked, because the focus loop holds them: the server tells what it knows.
          */
         get: operations["operator_checks"];
         put?: never;
