@@ -1,4 +1,4 @@
-//! Verification of exports: what is whole passes, and what was changed is found, with new checksums too.
+//! Verification of exports: unchanged exports pass, and changes are found, even with new checksums.
 
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,7 @@ async fn an_export_is_verified_and_what_was_changed_in_it_is_found() {
     assert_eq!(failed(&verify(&out, None)), ["checksums"]);
 }
 
-/// Makes new checksums of what lies in `folder`, as anyone can.
+/// Makes new checksums of the files in `folder`, as anyone can.
 fn sum_again(folder: &Path) {
     let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     names.retain(|path| path.file_name().unwrap() != "SHA256SUMS");
@@ -61,7 +61,7 @@ fn sum_again(folder: &Path) {
     std::fs::write(folder.join("SHA256SUMS"), names.iter().map(line).collect::<String>()).unwrap();
 }
 
-/// The first `count` columns of a CSV file in the opposite order of rows.
+/// A CSV file whose first `columns` columns have their rows in reverse order.
 fn reversed(text: &str, columns: usize) -> String {
     let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
     let (head, rows) = rows.split_first().unwrap();
@@ -99,16 +99,16 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     let remove = |file: &str| std::fs::remove_file(out.join(file)).unwrap();
     assert_eq!(found(&|| ()), [""; 0], "the same checksums");
 
-    // Policies given to other segments.
+    // Assigns policies to other segments.
     assert_eq!(found(&|| write("allocation.csv", reversed(&read("allocation.csv"), 3))), ["commitment", "schedule"]);
 
-    // The draw taken away, in part and whole.
+    // Removes the draw, first in part and then completely.
     let withheld = read("allocation.json").replace(json(&out, "allocation.json")["seed"].as_str().unwrap(), "");
     let withheld = withheld.replace("\"seed\": \"\"", "\"seed\": null");
     assert_eq!(found(&|| write("allocation.json", withheld.clone())), ["commitment", "schedule"]);
     assert_eq!(found(&|| remove("allocation.json")), ["copies"]);
 
-    // Another way of drawing.
+    // Claims another algorithm.
     let drawn = |file: &str| write(file, read(file).replace("parfocal-shuffle-1", "parfocal-balanced-1"));
     assert_eq!(found(&|| drawn("allocation.json")), ["commitment", "schedule"]);
     assert_eq!(
@@ -116,7 +116,7 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
         ["commitment", "schedule", "chain"]
     );
 
-    // What was said.
+    // Removes or changes answers and comments.
     let answers: String =
         read("answers.csv").lines().filter(|line| !line.starts_with("3,")).map(|l| l.to_owned() + "\n").collect();
     assert_eq!(found(&|| write("answers.csv", answers.clone())), ["said", "copies", "chain"]);
@@ -129,24 +129,35 @@ async fn what_is_forged_is_found_though_the_checksums_were_made_anew() {
     assert_eq!(found(&|| remove("session.json")), ["copies"]);
     assert_eq!(found(&|| remove("datapackage.json")), ["columns", "said", "voice", "copies", "study", "chain"]);
 
-    // An answer that counts though it came too late.
+    // Marks an answer that counts as late.
     let late = read("answers.csv").replacen(",false,false,\n", ",true,false,\n", 1);
     assert_eq!(found(&|| write("answers.csv", late.clone())), ["said", "copies", "chain"]);
 
-    // An event without a number.
+    // Adds an event without a number.
     let event = read("events.csv").lines().last().unwrap().to_owned();
     let (number, rest) =
         event.split_once(',').map(|(session, rest)| (session, rest.split_once(',').unwrap().1)).unwrap();
     let unnumbered = read("events.csv") + &format!("{number},,{rest}\n");
     assert_eq!(found(&|| write("events.csv", unnumbered.clone())), ["events", "copies", "chain"]);
 
-    // A setting that never was.
+    // Adds a step of a setting that does not exist.
     let steps =
         read("policy_steps.csv") + &read("policy_steps.csv").lines().nth(1).unwrap().replacen('1', "9", 1) + "\n";
     assert_eq!(found(&|| write("policy_steps.csv", steps.clone())), ["references", "chain"]);
+
+    // Adds a record to one of the copies in session.json, or a table that no export has.
+    let copies = json(&out, "session.json");
+    for table in copies.as_object().unwrap().keys().map(String::as_str).chain(["more"]) {
+        let mut forged = copies.clone();
+        match forged[table].as_array_mut() {
+            Some(records) => records.push(serde_json::json!({})),
+            None => forged[table] = serde_json::json!([]),
+        }
+        assert_eq!(found(&|| write("session.json", forged.to_string())), ["copies"], "{table}");
+    }
 }
 
-/// Each was made by the program as it was then. The first is from before exports had a format's number, and a chain.
+/// Each export was made by the program of its time. The first is older than the format's number and the chain.
 #[test]
 fn exports_of_earlier_versions_are_still_verified() {
     for (format, not_checked) in [(1, &["chain"][..]), (5, &[]), (6, &[])] {
@@ -159,7 +170,7 @@ fn exports_of_earlier_versions_are_still_verified() {
     }
 }
 
-/// What was changed in an export of an earlier version is found as in today's.
+/// A change in an export of an earlier version is found, as in today's exports.
 #[test]
 fn a_change_in_an_export_of_an_earlier_version_is_found() {
     for format in [5, 6] {

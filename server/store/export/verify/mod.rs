@@ -1,5 +1,4 @@
-//! Verification of an export: what anyone can check of it with no database and no trust in the
-//! server.
+//! Verification of an export: what anyone can check without a database and without trust in the server.
 
 mod allocation;
 mod chain;
@@ -21,9 +20,9 @@ pub use verdict::Verdict;
 
 use crate::store::Head;
 use crate::store::export::description::{
-    ALL, AccessRow, AnswerRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow, RecordingRow,
-    RunRow, ScoreRow, SegmentRow, SessionRow, StudyEventRow, StudyRow, StudySessionRow, VoicePieceRow, VoiceRow,
-    WithdrawalRow,
+    ALL, AccessRow, ActorRow, AnswerRow, CommentRow, ConsentRow, CorrectionRow, DeviceRow, ErasureRow, EventRow,
+    RecordingRow, RunRow, ScoreRow, SegmentRow, SessionRow, StudyEventRow, StudyRow, StudySessionRow, VoicePieceRow,
+    VoiceRow, WithdrawalRow,
 };
 use crate::store::export::folder::SUMS;
 use crate::store::export::table::{Row, Table};
@@ -34,30 +33,30 @@ use study::study;
 use verdict::Outcome;
 use voice::voice;
 
-/// One thing checked.
+/// A check and its verdict.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Check {
-    /// What.
+    /// Name of the check.
     pub name: &'static str,
-    /// How it came out.
+    /// The verdict.
     #[serde(flatten)]
     pub verdict: Verdict,
 }
 
-/// Whether `path` is meant to be an export.
+/// Whether `path` looks like an export: it has at least one of the files that every export has.
 #[must_use]
 pub fn is_export(path: &Path) -> bool {
     [SUMS, "datapackage.json", "sessions.csv"].iter().any(|file| path.join(file).exists())
 }
 
-/// Checks the export in `folder`: every check, in order. With `expected`, a head known from elsewhere, also whether the
-/// chain is the one that had it.
+/// Runs every check on the export in `folder`, in order. If `expected`, a head known from elsewhere, is given, also
+/// checks that the chain has this head in it.
 #[must_use]
 pub fn verify(folder: &Path, expected: Option<&Head>) -> Vec<Check> {
     verify_files(&ExportFiles::of(folder), expected)
 }
 
-/// Checks as `verify` does the export whose files are `export`.
+/// The same as `verify`, for the export whose files are `export`.
 pub fn verify_files(export: &ExportFiles, expected: Option<&Head>) -> Vec<Check> {
     let check =
         |name, outcome: Result<Verdict, String>| Check { name, verdict: outcome.unwrap_or_else(Verdict::Failed) };
@@ -77,7 +76,7 @@ pub fn verify_files(export: &ExportFiles, expected: Option<&Head>) -> Vec<Check>
     ]
 }
 
-/// Exports have the chain since their fourth format.
+/// Checks the chain, which exports have since format 4.
 fn chained(export: &ExportFiles, expected: Option<&Head>) -> Outcome {
     let format = export.format()?;
     match format {
@@ -86,7 +85,7 @@ fn chained(export: &ExportFiles, expected: Option<&Head>) -> Outcome {
     }
 }
 
-/// Exports have recordings since their seventh format.
+/// Checks the voice recordings, which exports have since format 7.
 fn recorded(export: &ExportFiles) -> Outcome {
     match export.format()? {
         ..7 => Ok(Verdict::Passed("an earlier version wrote the export, without voice".to_owned())),
@@ -119,7 +118,7 @@ fn checksums(export: &ExportFiles) -> Outcome {
     Ok(Verdict::Passed(format!("{} files are as they were exported", listed.len() - 1)))
 }
 
-/// The files of an export, those in its folder of recordings included.
+/// The files of an export, including those in its folder of voice recordings.
 fn file_names(folder: &Path) -> Result<Vec<String>, String> {
     let names = |folder: &Path, before: &str| -> Result<Vec<String>, String> {
         let entries = std::fs::read_dir(folder).map_err(|error| error.to_string())?;
@@ -190,7 +189,7 @@ fn said(export: &ExportFiles) -> Outcome {
     Ok(Verdict::Passed(format!("{comments} comments and {answers} answers without a gap")))
 }
 
-/// Checks that of the answers to a question at most one counts, and none that is late.
+/// Checks that at most one answer to each question counts, and no answer that is late.
 fn counting(export: &ExportFiles) -> Result<(), String> {
     let column = |name| export.cells("answers.csv", name);
     let segments = column("segment")?;
@@ -216,12 +215,12 @@ fn counting(export: &ExportFiles) -> Result<(), String> {
 fn numbered(export: &ExportFiles, file: &str) -> Result<usize, String> {
     let numbers = export.cells(file, "number")?;
     match numbers.iter().zip(1..).find(|(found, expected)| **found != format!("{expected}")) {
-        Some((found, expected)) => Err(format!("{file}: number {expected} is missing; '{found}' stands in its place")),
+        Some((found, expected)) => Err(format!("{file}: number {expected} is missing; '{found}' was found instead")),
         None => Ok(numbers.len()),
     }
 }
 
-/// Files that an unblinded export has, and a blinded one must not have, each since which format.
+/// Files that an unblinded export has and a blinded one must not have, each with the first format that has it.
 const UNBLINDED: [(&str, u64); 5] = [
     ("allocation.csv", 1),
     ("allocation.json", 1),
@@ -231,7 +230,7 @@ const UNBLINDED: [(&str, u64); 5] = [
 ];
 
 /// Tables that session.json repeats.
-const COPIED: [Table; 19] = [
+const COPIED: [Table; 20] = [
     RunRow::TABLE,
     SessionRow::TABLE,
     SegmentRow::TABLE,
@@ -249,6 +248,7 @@ const COPIED: [Table; 19] = [
     StudyRow::TABLE,
     StudySessionRow::TABLE,
     StudyEventRow::TABLE,
+    ActorRow::TABLE,
     VoiceRow::TABLE,
     VoicePieceRow::TABLE,
 ];
@@ -284,6 +284,14 @@ fn copies(export: &ExportFiles) -> Outcome {
             return Err(differs());
         }
     }
+
+    // Nothing else either: what is not compared could say anything.
+    let compared = |name: &str| COPIED.iter().any(|table| table.since() <= format && table.name == name);
+    let tables = session.as_object().ok_or("session.json is not an object")?;
+    if let Some(name) = tables.keys().find(|name| !compared(name)) {
+        return Err(format!("session.json has '{name}', which is not a table of this format"));
+    }
+
     Ok(Verdict::Passed("session.json and the tables agree".to_owned()))
 }
 
