@@ -24,7 +24,7 @@ use crate::trial::role::Role;
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct SignInQuery {
-    /// Path of the page to go on to.
+    /// Path of the page to open after signing in.
     next: Option<String>,
 }
 
@@ -32,9 +32,9 @@ struct SignInQuery {
 #[template(path = "sign_in.html")]
 struct Page {
     nonce: String,
-    /// Where to go on to; empty for the page of the account's role.
+    /// Path of the page to open after signing in; empty for the page of the account's role.
     next: String,
-    /// Who is signed in now.
+    /// The account that is signed in now, if any.
     person: Option<Account>,
 }
 
@@ -51,27 +51,28 @@ async fn page(
     Page { nonce, next, person }.render().map(Html).map_err(|_| Error::Internal)
 }
 
-/// Whether `path` leads to a page of this server: another site's link must not choose where somebody goes on to.
+/// Whether `path` leads to a page of this server: a link must not send somebody to another site after signing in.
 fn is_own_path(path: &str) -> bool {
-    path.starts_with('/') && !path.starts_with("//") && !path.contains(['\\', '\r', '\n'])
+    // Browsers read a backslash as a slash, and drop tabs and line breaks: `/<tab>/host` is another site to them.
+    path.starts_with('/') && !path.starts_with("//") && !path.contains(|c: char| c == '\\' || c.is_control())
 }
 
-/// Who wants to sign in.
+/// A request to sign in.
 #[derive(Deserialize, ToSchema)]
 struct SignIn {
     /// The account's name.
     name: String,
-    /// Its passphrase.
+    /// The account's passphrase.
     passphrase: String,
-    /// The passphrase that replaces it from now on: needed where a lead set the present one.
+    /// A new passphrase that replaces it: needed if a lead set the current one.
     #[serde(default)]
     new_passphrase: Option<String>,
-    /// Whether the answer is to hold the token, for a program, instead of setting a cookie.
+    /// Whether the answer contains the token, for a program, instead of setting a cookie.
     #[serde(default)]
     as_bearer: bool,
 }
 
-/// Who signed in.
+/// The answer after signing in.
 #[derive(Serialize, ToSchema)]
 struct SignedInAs {
     /// The account.
@@ -79,7 +80,7 @@ struct SignedInAs {
     account: Account,
     /// The page of the account's role.
     home: &'static str,
-    /// The token, to be sent as `Authorization: Bearer`, where it was asked for.
+    /// The token, to be sent as `Authorization: Bearer`, if it was asked for.
     token: Option<String>,
 }
 
@@ -99,7 +100,7 @@ async fn sign_in(
 ) -> Result<Response, Error> {
     let chosen = wanted.new_passphrase.as_deref().map(Passphrase::new).transpose().map_err(AccountError::from)?;
     let (account, token) = app.accounts.sign_in(&wanted.name, &wanted.passphrase, chosen, peer).await?;
-    // The log names nobody; the database has who it was.
+    // The log names nobody; the database records who it was.
     tracing::info!(role = page_role(account.role).name(), "somebody signed in");
 
     let home = home(page_role(account.role));
@@ -111,7 +112,7 @@ async fn sign_in(
     Ok((AppendHeaders([(SET_COOKIE, cookie)]), Json(SignedInAs { account, home, token: None })).into_response())
 }
 
-/// Signs out: the token opens nothing any more. Signing out again changes nothing.
+/// Signs out: the token is no longer valid. Signing out again changes nothing.
 #[utoipa::path(post, path = "/api/sign-out", tag = "accounts", responses(
     (status = 204, description = "Signed out"),
     (status = 507, description = "The disk failed", body = ErrorBody)))]
@@ -123,7 +124,7 @@ async fn sign_out(State(app): State<AppState>, SignedIn(person): SignedIn) -> Re
     Ok((StatusCode::NO_CONTENT, AppendHeaders([(SET_COOKIE, cookie)])))
 }
 
-/// The role whose page an account's role begins with.
+/// The role whose page an account opens first, by the account's role.
 pub(super) const fn page_role(role: AccountRole) -> Role {
     match role {
         AccountRole::Operator => Role::Operator,
@@ -143,7 +144,9 @@ mod tests {
     #[test]
     fn only_a_path_of_this_server_is_gone_on_to() {
         assert!(is_own_path("/researcher/studies/scope-2026"));
-        for elsewhere in ["", "researcher", "//evil.example", "https://evil.example", "/\\evil.example"] {
+        for elsewhere in
+            ["", "researcher", "//evil.example", "https://evil.example", "/\\evil.example", "/\t/evil.example"]
+        {
             assert!(!is_own_path(elsewhere), "{elsewhere}");
         }
     }
