@@ -1,4 +1,4 @@
-//! The leads' page on accounts, and the first sign-in of somebody whose account a lead made.
+//! The leads' page on accounts, and the first sign-in to an account that a lead made.
 
 use super::driver::{Browser, Driver};
 use super::screenshots::shoot;
@@ -11,7 +11,7 @@ async fn sign_in(page: &Browser, server: &Server, name: &str, passphrase: &str) 
     page.click("#sign-in-go").await;
 }
 
-/// The lead gives the own passphrase in the dialog, and the change is made.
+/// The lead enters their own passphrase in the dialog, and the change is made.
 async fn confirm(page: &Browser, seen: &str) {
     page.type_into("#change-passphrase", PASSPHRASE).await;
     page.click("#change-go").await;
@@ -59,7 +59,7 @@ async fn a_lead_makes_an_account_and_its_person_chooses_a_passphrase() {
     lead.reload().await;
     lead.sees("#people", "in use").await;
     lead.click("[data-account='a.lovelace'] [data-change=role]").await;
-    lead.sees("#change-heading", "Another role for Dr Ada Lovelace").await;
+    lead.sees("#change-heading", "Change the role of Dr Ada Lovelace").await;
     assert_eq!(lead.value("#change-role").await, "researcher");
     lead.select("#change-role", "monitor").await;
     shoot(&lead, "people-2-role").await;
@@ -68,15 +68,22 @@ async fn a_lead_makes_an_account_and_its_person_chooses_a_passphrase() {
     confirm(&lead, "disabled").await;
     shoot(&lead, "people-3-disabled").await;
 
-    // The last lead stays.
+    // The last lead cannot be disabled.
     lead.click("[data-account=lead] [data-change=disable]").await;
     lead.type_into("#change-passphrase", PASSPHRASE).await;
     lead.click("#change-go").await;
-    lead.sees("#change-trouble", "the last account that leads").await;
+    lead.sees("#change-trouble", "the last lead who can sign in").await;
     lead.click("#change-dialog [data-close]").await;
 
     person.reload().await;
     person.sees("body", "Sign in").await;
+
+    // A device must not be left behind that only seems to be signed out.
+    drop(server);
+    lead.click("#sign-out").await;
+    lead.sees("#sign-out-trouble", "You are still signed in").await;
+    shoot(&lead, "people-4-still-signed-in").await;
+
     for browser in [&lead, &person] {
         assert_eq!(browser.complaints().await.iter().find(|text| text.contains("Uncaught")), None);
     }

@@ -1,5 +1,4 @@
-// The recording: how it stands, how long the disk will last, and the button that starts and stops
-// it.
+// The recording card: what is being recorded, how long the disk will last, and the button that starts and stops it.
 
 import { get, post } from "../shared/api.js";
 import { byId, setText } from "../shared/dom.js";
@@ -26,7 +25,7 @@ function draw(status) {
 }
 
 /**
- * What became of the last recording: a warning only where something went wrong.
+ * Says how the last recording ended. It is a warning only if something went wrong.
  *
  * @param {Api.RecordingStatus} status
  */
@@ -44,7 +43,7 @@ async function refresh() {
     const status = await get(PATH);
     if (!busy) draw(status);
   } catch {
-    // The page says by itself that the server does not answer.
+    // Another part of the page already says that the server does not answer.
   }
 }
 
@@ -57,10 +56,9 @@ async function turn() {
     tell(byId("recording-trouble"), "");
     draw(status);
   } catch (error) {
-    tellTrouble(byId("recording-trouble"), error);
-  } finally {
     busy = false;
     button.disabled = false;
+    tellTrouble(byId("recording-trouble"), error);
   }
 }
 

@@ -1,5 +1,5 @@
-// Focal power, focus metric and belief over the last seconds, on one scale of focal power from 0
-// (bottom) to 1 (top).
+// Draws focal power, focus metric and belief over the last seconds, on one scale of focal power from 0 (bottom) to 1
+// (top).
 
 import { makeCanvas, onResize, pixelsPerCss } from "../shared/canvas.js";
 
@@ -8,10 +8,10 @@ const MEASURED = { colour: "#5cf2ff", label: "measured" };
 const METRIC = { colour: "#ff9ecb", label: "metric" };
 const BELIEF_COLOUR = "rgba(255, 255, 255, .7)";
 
-/** Seconds across. */
+/** Time span across the canvas, in seconds. */
 const SECONDS = 10;
 
-/** Width of the belief's bars at the right end: share of the whole. */
+/** Width of the belief's bars at the right end, as a fraction of the whole width. */
 const BELIEF_SHARE = 0.12;
 
 /**
@@ -22,7 +22,7 @@ const BELIEF_SHARE = 0.12;
  * @property {number | null} metric
  */
 
-/** Drawn by a canvas of its own within `element`, with the legend above. */
+/** The traces, drawn on their own canvas within `element`, with the legend above. */
 export class Traces {
   #element;
   #context = makeCanvas("viewer-traces");
@@ -56,8 +56,8 @@ export class Traces {
   }
 
   /**
-   * Keeps what came with a frame that was exposed at `time` (milliseconds). While a session is
-   * under way nothing does.
+   * Adds the values of a frame that was exposed at `time` (milliseconds). During a session frames carry no values, and
+   * the traces are cleared.
    *
    * @param {Stream.Header} header
    * @param {number} time
@@ -100,7 +100,7 @@ export class Traces {
    * @param {string} colour
    * @param {number} line
    * @param {(point: Point) => number} x
-   * @param {(point: Point) => number | null} y null where there is nothing to draw
+   * @param {(point: Point) => number | null} y null if there is nothing to draw for a point
    */
   #trace(colour, line, x, y) {
     const context = this.#context;
@@ -148,9 +148,11 @@ export class Traces {
     const longest = context.canvas.width - left;
     const greatest = Math.max(...belief, 1e-9);
     context.fillStyle = BELIEF_COLOUR;
-    for (const [slice, probability] of belief.entries()) {
-      const from = y((slice + 1) / belief.length);
-      const to = y(slice / belief.length);
+    // Value k of n is the probability of focal power k / (n - 1). Its bar is centred there; the outer bars are cut in half.
+    const steps = Math.max(belief.length - 1, 1);
+    for (const [bin, probability] of belief.entries()) {
+      const from = y(Math.min((bin + 0.5) / steps, 1));
+      const to = y(Math.max((bin - 0.5) / steps, 0));
       context.fillRect(
         left,
         from,

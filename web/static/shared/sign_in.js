@@ -1,8 +1,9 @@
-// Who is signed in, on every page that can be used under a personal account: signing out, and signing in again over
-// the page when the server asks for it. What stood in the page's forms and dialogs stays there.
+// Signing in and out, on every page that can be used under a personal account. When the server asks for it, a dialog
+// to sign in opens over the page. Whatever was entered in the page's forms and dialogs stays there.
 
 import { inWords, keep, onSignInNeeded, post } from "./api.js";
 import { make, setText } from "./dom.js";
+import { tellTrouble } from "./trouble.js";
 
 /** @type {HTMLDialogElement | null} */
 let dialog = null;
@@ -32,12 +33,12 @@ function makeDialog() {
   const form = make(
     "form",
     {},
-    make("h2", { id: "sign-in-heading" }, "Sign in to go on"),
+    make("h2", { id: "sign-in-heading" }, "Sign in to continue"),
     make(
       "p",
       { className: "muted" },
-      "This belongs to a study, and you are not signed in, or not any more. Nothing on the page is lost: sign in, " +
-        "then do again what you wanted to do.",
+      "This belongs to a study. You are not signed in, or your sign-in has ended. Nothing on the page is lost: " +
+        "sign in, then repeat what you wanted to do.",
     ),
     make("div", {}, make("label", { for: name.id }, "Name of the account"), name),
     make("div", {}, make("label", { for: passphrase.id }, "Passphrase"), passphrase),
@@ -77,8 +78,25 @@ const link = document.getElementById("sign-in");
 if (link instanceof HTMLAnchorElement) link.href = `/sign-in?next=${encodeURIComponent(location.pathname)}`;
 
 async function signOut() {
-  await keep("/api/sign-out", undefined);
-  location.reload();
+  try {
+    await keep("/api/sign-out", undefined);
+    location.reload();
+  } catch (error) {
+    tellSignedIn(error);
+  }
+}
+
+/**
+ * Says that the sign-out failed. Otherwise somebody could leave a device behind on which they are still signed in.
+ *
+ * @param {unknown} error
+ */
+function tellSignedIn(error) {
+  const trouble =
+    document.getElementById("sign-out-trouble") ??
+    make("span", { id: "sign-out-trouble", className: "message", role: "alert" });
+  document.querySelector(".person")?.append(" ", trouble);
+  tellTrouble(trouble, error, "You are still signed in: no connection to the server. Try again in a moment.");
 }
 
 /**

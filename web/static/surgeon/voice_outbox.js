@@ -1,7 +1,7 @@
-// Keeps what was said aloud until the server has it. A recording is a step that begins its comment,
-// and then a piece a second. Each is first kept on this device, and sent while the surgeon still
-// speaks. The comment's key and the piece's number make sending a step twice harmless. What the
-// server refuses stays on this device, and is tried again when the page is next opened.
+// Keeps voice recordings until the server has them. A recording is a sequence of steps: one that begins its comment,
+// and then one piece per second. Each step is first kept on this device, and sent while the surgeon still speaks. The
+// comment's key and the piece's number make sending a step twice harmless. What the server refuses stays on this
+// device, and is tried again when the page is next opened.
 
 import { inWords, Refused } from "../shared/api.js";
 import { counted } from "../shared/text.js";
@@ -15,7 +15,7 @@ const LONGEST_WAIT_MS = 8000;
 /** @typedef {"released" | "limit" | "microphone-lost" | "left"} Ending */
 
 /**
- * What begins a recording: its comment, with the place and the moment of the press.
+ * The first step of a recording: its comment, with the place and the moment of the press.
  *
  * @typedef {object} Begin
  * @property {"begin"} kind
@@ -27,7 +27,7 @@ const LONGEST_WAIT_MS = 8000;
  */
 
 /**
- * A piece of a recording. The last is empty and says why the recording ended.
+ * A piece of a recording. The last piece is empty and says why the recording ended.
  *
  * @typedef {object} Piece
  * @property {"piece"} kind
@@ -51,20 +51,20 @@ const LONGEST_WAIT_MS = 8000;
  * @property {(path: string, audio: ArrayBuffer, type: string) => Promise<void>} sendAudio
  * @property {() => string} newId
  * @property {() => number} wall milliseconds since 1970
- * @property {(run: () => void, ms: number) => () => void} later returns what cancels it
+ * @property {(run: () => void, ms: number) => () => void} later returns a function that cancels the call
  */
 
 export class VoiceOutbox {
-  /** Why the last attempt failed, if it did. @type {string | null} */
+  /** Why the last attempt to send failed; null if it succeeded. @type {string | null} */
   trouble = null;
 
-  /** Settles once what an earlier page left is here. @type {Promise<void>} */
+  /** Resolves once the steps that an earlier load of the page left are loaded. @type {Promise<void>} */
   ready;
 
   #around;
-  /** What is not saved yet, by id. @type {Map<string, Step>} */
+  /** The steps that are not saved yet, by id. @type {Map<string, Step>} */
   #steps = new Map();
-  /** The recordings that the server refused, by comment, and why. @type {Map<string, string>} */
+  /** Why the server refused a recording, by comment. @type {Map<string, string>} */
   #refused = new Map();
   /** The steps that this device does not keep over a reload, by id. @type {Set<string>} */
   #unkept = new Set();
@@ -91,7 +91,7 @@ export class VoiceOutbox {
   }
 
   /**
-   * Calls `listener` whenever something changed. Returns what ends that.
+   * Calls `listener` whenever something has changed. Returns a function that ends the subscription.
    *
    * @param {() => void} listener
    */
@@ -105,7 +105,7 @@ export class VoiceOutbox {
     return this.#unkept.size === 0;
   }
 
-  /** How many recordings are not saved yet, those that the server refused left aside. */
+  /** How many recordings are not saved yet, without those that the server refused. */
   get waiting() {
     const comments = this.#queue().map(({ comment }) => comment);
     return new Set(comments).size;
@@ -117,7 +117,7 @@ export class VoiceOutbox {
   }
 
   /**
-   * How many recordings of a session this device holds: not saved yet, or refused.
+   * How many recordings of a session this device holds because they are not saved yet or were refused.
    *
    * @param {string} session
    */
@@ -138,7 +138,7 @@ export class VoiceOutbox {
   }
 
   /**
-   * Begins a recording; returns its comment's key.
+   * Begins a recording. Returns its comment's key.
    *
    * @param {{ session: string, segment: string | null, frame: number | null, run: number | null }} place
    * @param {Stamp} given when the surgeon began to speak
@@ -151,7 +151,7 @@ export class VoiceOutbox {
   }
 
   /**
-   * Takes a piece of a recording.
+   * Adds a piece of a recording.
    *
    * @param {Omit<Piece, "kind" | "id">} piece
    */
@@ -159,7 +159,7 @@ export class VoiceOutbox {
     this.#add({ ...piece, kind: "piece", id: this.#nextId() });
   }
 
-  /** Tries now rather than at the end of the present wait. */
+  /** Tries to send now, without waiting any longer. */
   nudge() {
     this.#cancel();
     this.#wait = FIRST_WAIT_MS;
@@ -167,15 +167,18 @@ export class VoiceOutbox {
   }
 
   /**
-   * How far what was said aloud has got.
+   * Whether all recordings are saved, with the text to show.
    *
    * @returns {{ kind: "" | "saving" | "unsaved", text: string }}
    */
   get status() {
     const refusal = [...this.#refused.values()].at(-1);
     if (refusal !== undefined) {
-      const many = counted(this.#refused.size, "recording was", "recordings were");
-      const text = `${many} not saved and stays on this device. Tell the operator. ${refusal}`;
+      const many =
+        this.#refused.size === 1
+          ? "1 recording was not saved and stays on this device."
+          : `${this.#refused.size} recordings were not saved and stay on this device.`;
+      const text = `${many} Tell the operator. ${refusal}`;
       return { kind: "unsaved", text };
     }
 
@@ -188,7 +191,7 @@ export class VoiceOutbox {
   }
 
   #nextId() {
-    // A clock that is set back must not put what is said later before what was said.
+    // If the clock is set back, later steps must still sort after earlier ones.
     this.#latest = Math.max(this.#around.wall(), this.#latest + 1);
     return `${String(this.#latest).padStart(15, "0")}-${this.#around.newId()}`;
   }
@@ -205,7 +208,7 @@ export class VoiceOutbox {
   async #keep(step) {
     const kept = await this.#around.store.put(step);
     if (!this.#steps.has(step.id)) {
-      // It was saved meanwhile.
+      // The server has saved the step meanwhile.
       await this.#around.store.remove(step.id);
     } else if (!kept) {
       this.#unkept.add(step.id);
@@ -213,7 +216,7 @@ export class VoiceOutbox {
     }
   }
 
-  /** What is to be sent, in order. */
+  /** The steps that are to be sent, in order. */
   #queue() {
     const open = [...this.#steps.values()].filter(({ comment }) => !this.#refused.has(comment));
     return open.sort((a, b) => (a.id < b.id ? -1 : 1));
@@ -234,7 +237,7 @@ export class VoiceOutbox {
   }
 
   /**
-   * Sends one step. Returns whether the next is worth trying.
+   * Sends one step. Returns whether the next step is worth trying.
    *
    * @param {Step} step
    */
