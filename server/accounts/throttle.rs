@@ -1,4 +1,4 @@
-//! Failed attempts slow down the next: those on one account, and those of one peer.
+//! Slows down attempts to sign in after failed ones, separately for each account and for each peer.
 
 use std::collections::HashMap;
 use std::net::IpAddr;
@@ -8,31 +8,32 @@ use super::AccountError;
 use crate::clock::Moment;
 use crate::trial::account::wait_after;
 
-/// Where an attempt comes from.
+/// The address from which an attempt comes.
 pub type Peer = IpAddr;
 
-/// Failures of a peer count less than those on an account: several people may stand behind one address.
+/// Number of a peer's failures that cost no wait, in addition to those that are free for an account: several people may
+/// share one address.
 const PEERS_ALLOWANCE: u32 = 6;
 
-/// An attempt that would have to wait longer is refused, so that attempts that are made at one time do not pile up.
+/// An attempt that would have to wait longer than this is refused, so that simultaneous attempts do not pile up.
 const LONGEST_WAIT: Duration = Duration::from_secs(9);
 
-/// Failures are forgotten after so long.
+/// Failures are forgotten this long after the latest one.
 const FORGOTTEN_AFTER: Duration = Duration::from_mins(15);
 
-/// Most names and peers that are remembered. Beyond that the oldest are forgotten.
+/// Number of names and peers that are remembered. Above this, each attempt forgets the oldest one.
 const MOST: usize = 4096;
 
-/// Which attempts failed lately.
+/// The recent failed attempts, by account name and by peer.
 #[derive(Default)]
 pub(super) struct Throttle {
     subjects: HashMap<Subject, Failures>,
 }
 
-/// What attempts have in common.
+/// The account name or the peer that attempts have in common.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Subject {
-    /// The name that was given, whether or not there is such an account.
+    /// The given name, whether or not there is such an account.
     Account(String),
     Peer(Peer),
 }
@@ -40,13 +41,13 @@ enum Subject {
 #[derive(Debug, Clone, Copy)]
 struct Failures {
     count: u32,
-    /// The next attempt is not before.
+    /// Earliest time of the next attempt.
     next: Moment,
     latest: Moment,
 }
 
 impl Throttle {
-    /// How long an attempt at `now` has to wait. Its turn is taken with that: the attempt after it waits longer.
+    /// How long an attempt at `now` has to wait. This also reserves its turn, so the next attempt waits longer.
     pub(super) fn reserve(&mut self, name: &str, peer: Peer, now: Moment) -> Result<Duration, AccountError> {
         self.forget(now);
         let both = [Subject::Account(shortened(name)), Subject::Peer(peer)];
@@ -66,7 +67,7 @@ impl Throttle {
         Ok(wait)
     }
 
-    /// An attempt failed at `now`.
+    /// Records that an attempt failed at `now`.
     pub(super) fn failed(&mut self, name: &str, peer: Peer, now: Moment) {
         for subject in [Subject::Account(shortened(name)), Subject::Peer(peer)] {
             let allowance = subject.allowance();
@@ -78,17 +79,17 @@ impl Throttle {
         }
     }
 
-    /// An attempt succeeded: failures on the account are forgotten, those of the peer stay.
+    /// Records that an attempt succeeded: forgets the account's failures, but keeps those of the peer.
     pub(super) fn succeeded(&mut self, name: &str, _peer: Peer) {
         self.subjects.remove(&Subject::Account(shortened(name)));
     }
 
     fn forget(&mut self, now: Moment) {
         self.subjects.retain(|_, failures| now.since(failures.latest) < FORGOTTEN_AFTER);
-        if self.subjects.len() > MOST
-            && let Some(oldest) = self.subjects.iter().min_by_key(|(_, failures)| failures.latest)
-        {
-            let oldest = oldest.0.clone();
+        // A failure may have added two, its account and its peer.
+        while self.subjects.len() > MOST {
+            let oldest = self.subjects.iter().min_by_key(|(_, failures)| failures.latest);
+            let Some(oldest) = oldest.map(|(subject, _)| subject.clone()) else { return };
             self.subjects.remove(&oldest);
         }
     }
@@ -103,7 +104,7 @@ impl Subject {
     }
 }
 
-/// A name as it is remembered: what is longer than any account's is nobody's.
+/// The part of a name that is remembered. It is longer than any account's name, so no two accounts are confused.
 fn shortened(name: &str) -> String {
     name.chars().take(64).collect()
 }

@@ -1,4 +1,5 @@
-//! Backups of a database: made while a server writes, verified before they get their name, and put back.
+//! Makes and restores backups of a database. A backup can be made while a server writes, and is verified before it gets
+//! its name.
 
 use std::fs::{DirBuilder, File};
 use std::os::unix::fs::DirBuilderExt;
@@ -17,26 +18,29 @@ use super::{Access, Head, Reader, Recorder, StoreError};
 use crate::clock::Clock;
 use crate::files::{make_private, sync_folder_of};
 
+/// What SQLite adds to a database's name for the files of its log.
+const LOG_SUFFIXES: [&str; 2] = ["-wal", "-shm"];
+
 /// Why nothing was backed up or restored.
 #[derive(Debug, thiserror::Error)]
 pub enum BackupError {
-    /// The file to write is there.
+    /// The file to write exists already.
     #[error("{} exists; choose a new name", .0.display())]
     Exists(PathBuf),
     /// A file could not be read or written.
     #[error("cannot use {}: {error}", .path.display())]
     File {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The error of the file system.
         error: std::io::Error,
     },
     /// The copy does not verify.
     #[error("{what} does not verify: {problem}; nothing was changed")]
     Unsound {
-        /// Which copy.
+        /// Path of the backup.
         what: String,
-        /// What is wrong with it.
+        /// The first problem found, in words.
         problem: String,
     },
     /// The database failed.
@@ -56,55 +60,55 @@ impl BackupError {
 /// A backup that was made.
 #[derive(Debug, Clone, Serialize)]
 pub struct Backup {
-    /// Its file.
+    /// Path of its file.
     pub file: PathBuf,
-    /// Its size.
+    /// Size in bytes.
     pub bytes: u64,
-    /// The head of its chain.
+    /// Head of its chain, `NUMBER:HASH`.
     pub head: String,
 }
 
-/// How the chain of a backup and that of the database it replaced belong together.
+/// How the chain of a backup relates to the chain of the database that it replaces.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "relation", rename_all = "kebab-case")]
 pub enum Relation {
-    /// There was no database, or none with a chain that can be read.
+    /// There was no database, or its chain cannot be read.
     Nothing,
-    /// They are the same.
+    /// Both chains have the same rows.
     Same,
-    /// The backup goes on where the database ended.
+    /// The backup has all rows of the database, and more.
     Later,
-    /// The database went on after the backup was made.
+    /// The database has all rows of the backup, and more.
     Earlier {
         /// Rows of the database that the backup does not have.
         rows: i64,
     },
-    /// They are of different histories.
+    /// The chains have different histories.
     Apart {
-        /// The first row that differs.
+        /// Number of the first row that differs, from 1.
         row: i64,
     },
 }
 
-/// A restore that was made.
+/// The result of a restore.
 #[derive(Debug, Clone, Serialize)]
 pub struct Restored {
-    /// The head of the backup.
+    /// Head of the backup's chain, `NUMBER:HASH`.
     pub backup: String,
-    /// The head of what was replaced.
+    /// Head of the replaced database's chain; `None` if there was no readable one.
     pub replaced: Option<String>,
-    /// Where that is kept.
+    /// Path where the replaced database is kept; `None` if there was none.
     pub kept: Option<PathBuf>,
-    /// How the two belong together.
+    /// How the two chains relate.
     #[serde(flatten)]
     pub relation: Relation,
 }
 
-/// Copies the database of data folder `folder` to the new file `out`, whether or not a server has it open. The
-/// copy gets its name once it is verified and on the disk.
+/// Copies the database of data folder `folder` to the new file `out`, whether or not a server has it open. The copy
+/// gets its name only when it is verified and on disk.
 ///
 /// # Errors
-/// When `out` is there or cannot be written, the database cannot be read, or the copy does not verify.
+/// If `out` exists or cannot be written, the database cannot be read, or the copy does not verify.
 pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<Backup, BackupError> {
     if out.exists() {
         return Err(BackupError::Exists(out.to_owned()));
@@ -128,10 +132,10 @@ pub async fn backup(folder: &Path, out: &Path, clock: Arc<dyn Clock>) -> Result<
     Ok(Backup { file: out.to_owned(), bytes, head: head.to_string() })
 }
 
-/// Puts the backup `file` in the place of the database of data folder `folder`. What was there is kept beside it.
+/// Replaces the database of data folder `folder` by the backup `file`. The replaced database is kept beside it.
 ///
 /// # Errors
-/// When a server has the folder, the backup does not verify, or a file cannot be written. Then nothing was changed.
+/// If a server uses the folder, the backup does not verify, or a file cannot be written. Then nothing was changed.
 pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Result<Restored, BackupError> {
     DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(BackupError::file(folder))?;
     let _lock = lock(folder)?;
@@ -159,19 +163,24 @@ pub async fn restore(folder: &Path, file: &Path, clock: Arc<dyn Clock>) -> Resul
     synced(copy.path())?;
 
     let kept = if there { Some(set_aside(&database, clock.wall()).await?) } else { None };
-    copy.persist(&database).map_err(|error| BackupError::File { path: database.clone(), error: error.error })?;
+    if let Err(error) = copy.persist(&database) {
+        if let Some(kept) = &kept {
+            put_back(&database, kept);
+        }
+        return Err(BackupError::File { path: database, error: error.error });
+    }
     sync_folder_of(&database);
     let replaced = replaced.map(|head| head.to_string());
     Ok(Restored { backup: head.to_string(), replaced, kept, relation })
 }
 
-/// The database `file` if it can be read by this version.
+/// Opens the database `file`; `None` if this version cannot read it.
 async fn readable(file: &Path) -> Option<Reader> {
     let reader = Reader::open_checked(file).await.ok()?;
     if reader.head().await.is_ok() { Some(reader) } else { None }
 }
 
-/// How the chain in `backup`, with this head, belongs to the one that `present` reads.
+/// How the chain in `backup`, whose head is `head`, relates to the one that `present` reads.
 async fn relation(present: Option<&Reader>, backup: &Path, head: &Head) -> Result<Relation, BackupError> {
     let Some(present) = present else { return Ok(Relation::Nothing) };
     let ours = present.hashes().await?;
@@ -189,14 +198,10 @@ async fn relation(present: Option<&Reader>, backup: &Path, head: &Head) -> Resul
     })
 }
 
-/// Gives the database a dated name beside it. The new one can then take its place in one step.
+/// Gives the database a second, dated name beside it, and returns that. The new database can then replace it in one
+/// step.
 async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupError> {
-    let sibling = |of: &Path, suffix: &str| {
-        let name = of.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        of.with_file_name(name + suffix)
-    };
-
-    // What its log holds goes into the file, so that one file is all of it. A damaged database keeps its log.
+    // Moves the log into the file, so that one file holds everything. A damaged database keeps its log.
     let folded = Reader::fold_log(database).await;
     let log = sibling(database, "-wal");
     if folded.is_ok() && log.metadata().is_ok_and(|log| log.len() > 0) {
@@ -212,9 +217,10 @@ async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupErr
     let kept = (0..100).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0));
 
     std::fs::hard_link(database, &kept).map_err(BackupError::file(&kept))?;
-    for suffix in ["-wal", "-shm"] {
+    for suffix in LOG_SUFFIXES {
         match std::fs::rename(sibling(database, suffix), sibling(&kept, suffix)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                put_back(database, &kept);
                 return Err(BackupError::File { path: kept, error });
             }
             _ => {}
@@ -224,7 +230,23 @@ async fn set_aside(database: &Path, now: Timestamp) -> Result<PathBuf, BackupErr
     Ok(kept)
 }
 
-/// The head of the copy at `path`, if all of it verifies. `what` names it.
+/// Undoes [`set_aside`], as far as the disk lets it. What cannot be moved back stays beside the database as `kept`.
+fn put_back(database: &Path, kept: &Path) {
+    let moved = |suffix| sibling(kept, suffix).exists();
+    let back = |suffix| std::fs::rename(sibling(kept, suffix), sibling(database, suffix));
+    if LOG_SUFFIXES.into_iter().filter(|&suffix| moved(suffix)).all(|suffix| back(suffix).is_ok()) {
+        // The database itself was never gone: `kept` is a second name of it.
+        let _ = std::fs::remove_file(kept);
+    }
+}
+
+/// The path of the file whose name is that of `path` and then `suffix`.
+fn sibling(path: &Path, suffix: &str) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    path.with_file_name(name + suffix)
+}
+
+/// Verifies the copy at `path` and returns its head. Errors call it `what`.
 async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
     let snapshot = Reader::open_snapshot(path).await?;
     let problem = checks(&snapshot, None).await.into_iter().find_map(|check| match check {
@@ -240,7 +262,7 @@ async fn verified(path: &Path, what: &str) -> Result<Head, BackupError> {
     }
 }
 
-/// A file beside `path` that is removed unless it gets its name.
+/// A temporary file beside `path`. It is removed unless it is renamed.
 fn temporary_beside(path: &Path) -> Result<NamedTempFile, BackupError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let builder = tempfile::Builder::new().prefix(".parfocal-backup-").tempfile_in(folder);

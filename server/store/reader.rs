@@ -1,4 +1,4 @@
-//! Reading: lists and timelines for the pages, also from outside the server while it runs.
+//! Reads lists and timelines for the pages. Other programs can use it too while the server runs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,15 +18,15 @@ use crate::ids::{SegmentId, SessionId};
 use crate::lens::FocalPower;
 use crate::trial::phase::SessionStatus;
 
-/// Rows that are read ahead of whoever takes them: with fewer, two threads wait for each other over and over while
-/// telemetry is read.
+/// Rows that are read ahead of the caller that takes them. With fewer, two threads wait for each other over and over
+/// while telemetry is read.
 const ROWS_AHEAD: usize = 1024;
 
 /// A database open for reading. Clone freely.
 #[derive(Clone, Debug)]
 pub struct Reader {
     pool: SqlitePool,
-    /// What telemetry told of sessions that are over, so that it is read once.
+    /// Figures from the telemetry of ended sessions, kept so that it is read only once.
     pub(super) ended: MotionsOfEnded,
 }
 
@@ -34,42 +34,43 @@ impl Reader {
     /// Opens the database of data folder `folder`, whether or not a server has it open.
     ///
     /// # Errors
-    /// When there is none, or it is not of this version.
+    /// If there is no database, or it is of another version.
     pub async fn open(folder: &Path) -> Result<Self, StoreError> {
         Self::open_checked(&folder.join(DATABASE)).await
     }
 
-    /// Opens the database `file`.
+    /// Opens the database `file`, and checks its names and its version.
     pub(super) async fn open_checked(file: &Path) -> Result<Self, StoreError> {
         let reader = Self::open_file(there(file)?).await?;
+        check_names(&reader.pool).await?;
         reader.check_version().await?;
         Ok(reader)
     }
 
+    /// The same without the checks, for a database that the caller has made or checked.
     pub(super) async fn open_file(file: &Path) -> Result<Self, StoreError> {
         let pool = SqlitePoolOptions::new().max_connections(3).connect_with(reading(file)).await?;
-        check_names(&pool).await?;
         Ok(Self { pool, ended: MotionsOfEnded::default() })
     }
 
-    /// Opens the database `file` as it is now, whatever is written from now on.
+    /// Opens a snapshot of the database `file`, which later writes do not change.
     pub(super) async fn open_snapshot(file: &Path) -> Result<Self, StoreError> {
         let snapshot = Self::open_snapshot_unchecked(file).await?;
         snapshot.check_version().await?;
         Ok(snapshot)
     }
 
-    /// The same, of whichever version the database is.
+    /// The same, for a database of any version.
     pub(super) async fn open_snapshot_unchecked(file: &Path) -> Result<Self, StoreError> {
         let pool = snapshot_pool(reading(there(file)?)).await?;
         Ok(Self { pool, ended: MotionsOfEnded::default() })
     }
 
-    /// The database as it is now, whatever is written from now on: all that is read from what comes
-    /// back belongs together.
+    /// A snapshot of the database, which later writes do not change. So everything that is read from it belongs
+    /// together.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn snapshot(&self) -> Result<Self, StoreError> {
         let pool = snapshot_pool((*self.pool.connect_options()).clone()).await?;
         Ok(Self { pool, ended: Arc::clone(&self.ended) })
@@ -90,14 +91,14 @@ impl Reader {
         &self.pool
     }
 
-    /// Copies the database as it is now into `file`, which must be empty or not there.
+    /// Copies the database as it is now into `file`, which must be empty or must not exist.
     pub(super) async fn copy_to(&self, file: &Path) -> Result<(), StoreError> {
         let file = file.to_str().ok_or_else(|| StoreError::Disk("the file's name is not UTF-8".to_owned()))?;
         sqlx::query("VACUUM INTO ?").bind(file).execute(&self.pool).await?;
         Ok(())
     }
 
-    /// Moves all of the log of the database `file` into it, as far as no other program has it open.
+    /// Moves the log of the database `file` into it, as far as other programs that have it open allow.
     pub(super) async fn fold_log(file: &Path) -> Result<(), StoreError> {
         let options = SqliteConnectOptions::new().filename(file).busy_timeout(Duration::from_secs(1));
         let mut connection = sqlx::SqliteConnection::connect_with(&options).await?;
@@ -106,7 +107,7 @@ impl Reader {
         Ok(folded.map(|_| ())?)
     }
 
-    /// Ends its connections.
+    /// Closes its connections.
     pub(super) async fn close(&self) {
         self.pool.close().await;
     }
@@ -114,7 +115,7 @@ impl Reader {
     /// The participants, by code.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn participants(&self) -> Result<Vec<Participant>, StoreError> {
         let rows = sqlx::query(
             "SELECT code, wall, (SELECT count(*) FROM sessions WHERE participant = code AND NOT practice) AS sessions
@@ -132,10 +133,10 @@ impl Reader {
         rows.iter().map(participant).collect()
     }
 
-    /// The sessions, newest first; practice only where `practice` is set.
+    /// The sessions, newest first. Practice sessions are included only if `practice` is true.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn sessions(&self, practice: bool) -> Result<Vec<SessionLine>, StoreError> {
         let rows = sqlx::query(
             "SELECT session, wall, participant, protocol, practice,
@@ -160,12 +161,11 @@ impl Reader {
         rows.iter().map(line).collect()
     }
 
-    /// The clocks at each start of the server. A run whose wall clock was behind when it began
-    /// counts from the last that is known of the run before, so that what happened later is never
-    /// told earlier.
+    /// The clocks at each start of the server. If the wall clock was behind when a run began, that run counts from the
+    /// last known time of the run before. So later events never get earlier times.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn run_clocks(&self) -> Result<RunClocks, StoreError> {
         let rows = sqlx::query(
             "SELECT run, wall, monotonic_ns, coalesce(last_ns, monotonic_ns) AS last_ns FROM runs LEFT JOIN (
@@ -191,12 +191,11 @@ impl Reader {
         Ok(RunClocks(clocks))
     }
 
-    /// What befell camera and lens in `session`, each with its number and the run it was in: from
-    /// the start of every run that served it, so that the state in which it began is told, to its
-    /// end.
+    /// The events of camera and lens in `session`, each with its number and its run. They go from the start of every
+    /// run that served the session to the end of the session, so they include the state in which it began.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn device_events(&self, session: SessionId) -> Result<Vec<(i64, i64, DeviceEvent)>, StoreError> {
         let rows = sqlx::query(
             "SELECT number, run, wall, monotonic_ns, device, working, message FROM device_events AS d
@@ -220,11 +219,12 @@ impl Reader {
         rows.iter().map(event).collect()
     }
 
-    /// The focal power that the lens was last sent to in `segment`, as far as telemetry tells; none where no policy has
-    /// been asked there. While nobody is asked the lens may stand elsewhere: a device that is opened anew does.
+    /// The focal power of the last command to the lens in `segment`, from telemetry; `None` if no policy was asked
+    /// there. Steps without a policy do not count, because the lens may be elsewhere then, as after a device was opened
+    /// again.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn last_commanded(&self, segment: SegmentId) -> Result<Option<FocalPower>, StoreError> {
         let asked: Option<f64> = sqlx::query_scalar(
             "SELECT asked FROM telemetry
@@ -241,7 +241,7 @@ impl Reader {
     /// The focal path of `session`: about `points` steps of each setting, evenly spread over its steps.
     ///
     /// # Errors
-    /// When the database failed.
+    /// If the database fails.
     pub async fn focal_path(&self, session: SessionId, points: u32) -> Result<Vec<PathPoint>, StoreError> {
         let rows = sqlx::query(
             "WITH steps AS (
@@ -259,7 +259,7 @@ impl Reader {
     }
 }
 
-/// The database `file`, if there is one.
+/// `file`, or an error if it does not exist.
 fn there(file: &Path) -> Result<&Path, StoreError> {
     if file.is_file() { Ok(file) } else { Err(StoreError::Missing(file.to_owned())) }
 }
@@ -278,8 +278,8 @@ async fn snapshot_pool(options: SqliteConnectOptions) -> Result<SqlitePool, Stor
     let one = SqlitePoolOptions::new().max_connections(1).idle_timeout(None).max_lifetime(None);
     let pool = one.test_before_acquire(false).connect_with(options).await?;
 
-    // The first reading takes the snapshot. Both are asked for here and not in `after_connect`: where that fails, as it
-    // does on a damaged file, the pool tries again for half a minute, and then says that it waited too long.
+    // The first read takes the snapshot. Both statements are executed here and not in `after_connect`. If that failed,
+    // as it does on a damaged file, the pool would try again for half a minute and then report a timeout.
     sqlx::query("BEGIN").execute(&pool).await?;
     check_names(&pool).await?;
     Ok(pool)

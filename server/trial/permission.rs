@@ -1,4 +1,4 @@
-//! Who may do and see what outside the course of a session. Who may do what within it:
+//! What each role may do and see outside the course of a session. For actions within it, see
 //! [`session::decide`](super::session::decide).
 
 use std::time::Duration;
@@ -7,32 +7,32 @@ use super::phase::Phase;
 use super::refusal::Refusal;
 use super::role::Role;
 
-/// Something that people ask for outside the course of a session.
+/// A request that is not part of the course of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
-    /// To make a session and draw its order.
+    /// Make a session and draw its order.
     MakeSession,
-    /// To take a session off the screens.
+    /// Close a session: remove it from the screens.
     CloseSession,
-    /// To add a participant.
+    /// Add a participant.
     AddParticipant,
-    /// To move the lens, or to put a policy in charge of it.
+    /// Move the lens, or let a policy control it.
     MoveLens,
 }
 
-/// Whether there is a session now, as far as these rules ask.
+/// The state of the current session, in as much detail as these rules need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CurrentSession {
-    /// None, or it was closed.
+    /// There is no session, or it was closed.
     None,
-    /// It was made and has not ended; it may not have started yet.
+    /// A session was made and has not ended. It may not have started yet.
     UnderWay,
-    /// It has ended, and nobody has closed it yet.
+    /// A session has ended, and nobody has closed it yet.
     Ended,
 }
 
 impl CurrentSession {
-    /// For a session in `phase`, if there is one.
+    /// The state for a session in `phase`; `None` means that there is no session.
     #[must_use]
     pub const fn of(phase: Option<Phase>) -> Self {
         match phase {
@@ -43,18 +43,19 @@ impl CurrentSession {
     }
 }
 
-/// Whether `by` may do as `request` says, `current` being the session there is.
+/// Checks whether `by` may make `request` while the session is in the state `current`.
 ///
 /// # Errors
-/// When another role does this, or it does not fit `current`.
+/// If `by` may not make this request, or `current` does not allow it.
 pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), Refusal> {
-    let is_theirs = match request {
-        Request::MakeSession | Request::CloseSession | Request::MoveLens => by == Role::Operator,
-        Request::AddParticipant => matches!(by, Role::Operator | Role::Researcher),
-    };
-
-    if !is_theirs {
-        return Err(Refusal::only("the operator"));
+    match request {
+        Request::MakeSession | Request::CloseSession | Request::MoveLens if by != Role::Operator => {
+            return Err(Refusal::only("the operator"));
+        }
+        Request::AddParticipant if !matches!(by, Role::Operator | Role::Researcher) => {
+            return Err(Refusal::only("the operator or a researcher"));
+        }
+        _ => {}
     }
 
     match (request, current) {
@@ -64,77 +65,76 @@ pub fn check(by: Role, request: Request, current: CurrentSession) -> Result<(), 
         (Request::CloseSession, CurrentSession::UnderWay) => {
             Err(Refusal::conflict("the session is under way; abort it to end it"))
         }
-        // After the end as well: the surgeon still sees the view, and may still be answering.
+        // This also holds after the end: the surgeon still sees the view, and may still be answering questions.
         (Request::MoveLens, CurrentSession::UnderWay | CurrentSession::Ended) => {
-            Err(Refusal::conflict("A session is under way: it decides who focuses until it is closed."))
+            Err(Refusal::conflict("a session is under way and controls the lens until it is closed"))
         }
         _ => Ok(()),
     }
 }
 
-/// Whether `role` may see the focal power on the live view, and everything else there that tells
-/// policies apart: which policy runs, its focus metric, its belief, and how long its steps take.
-/// The surgeon never may. Nobody may until the session is closed, because operator and researcher
-/// can talk to the surgeon.
+/// Whether `role` may see the focal power on the live view, and everything else there that distinguishes policies:
+/// which policy runs, its focus metric, its belief, and how long its steps take. The surgeon never may. The others may
+/// not until the session is closed, because they can talk to the surgeon.
 #[must_use]
 pub fn may_see_focal_power(role: Role, current: CurrentSession) -> bool {
     role != Role::Surgeon && current == CurrentSession::None
 }
 
-/// Whether `role` may see the focus metric of a session's steps afterwards: its scale names the policy.
+/// Whether `role` may see the focus metric of a session's steps afterwards. The metric's scale reveals the policy.
 #[must_use]
 pub fn may_see_metric(role: Role, unblinded: bool) -> bool {
     role == Role::Researcher && unblinded
 }
 
-/// Whether `role` may play a session's recording. The moving picture shows how the policy searched, as the focal path
-/// does; unlike the path, nobody needs it before the policies are told. Practice is no exception, so that one rule
-/// holds for all sessions.
+/// Checks whether `role` may play a session's recording. The moving picture shows how the policy searched, as the focal
+/// path does. Unlike the path, nobody needs it before unblinding. The rule is the same for practice sessions, so that
+/// one rule holds for all.
 ///
 /// # Errors
-/// When `role` is not the researcher, or the session is still blinded.
+/// If `role` is not the researcher, or the session is still blinded.
 pub fn check_playing(role: Role, unblinded: bool) -> Result<(), Refusal> {
     match (role, unblinded) {
         (Role::Researcher, true) => Ok(()),
         (Role::Researcher, false) => Err(Refusal::conflict(
-            "the picture shows how the policy focused, so a recording is played only once its session is unblinded",
+            "the picture shows how the policy focused, so a recording can be played only once its session is unblinded",
         )),
         _ => Err(Refusal::only("the researcher")),
     }
 }
 
-/// Whether what was said, answered and recorded in a session may be read: not once its participant has withdrawn. That
-/// the session took place, and what was done to it, stays readable in its audit trail.
+/// Checks whether a session's comments, answers and recordings may be read. They may not after its participant has
+/// withdrawn. The audit trail stays readable: that the session took place, and what was done to it.
 ///
 /// # Errors
-/// When the participant withdrew.
+/// If the participant withdrew.
 pub fn check_reading(withdrawn: bool) -> Result<(), Refusal> {
     if withdrawn {
         return Err(Refusal::conflict(
-            "the participant withdrew, so what was said, answered and recorded in this session is shown no more; its \
-             audit trail stays",
+            "the participant withdrew, so the comments, answers and recordings of this session are no longer shown; \
+             its audit trail stays",
         ));
     }
     Ok(())
 }
 
-/// A hold that lasts this long is not a slow start, but a fault that the operator must know of.
+/// A hold that lasts this long is not a slow start but a fault. The operator must know about it.
 const LASTING: Duration = Duration::from_secs(3);
 
-/// What of a hold of the lens may be told.
+/// How much about a hold of the lens may be shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HoldTold {
     /// The hold and its reason.
     Fully,
-    /// That there is one, but not why.
+    /// That there is a hold, but not its reason.
     WithoutReason,
     /// Nothing.
     Not,
 }
 
-/// What may be told, while a session is under way, of a hold that has lasted for `held_for`. A hold
-/// by the policy is told only when it lasts, and then without its reason: only learned policies take
-/// time to start and to compute.
+/// How much may be shown, while a session is under way, about a hold that has lasted for `held_for`. A hold that the
+/// policy caused is shown only if it lasts, and then without its reason. Otherwise it could reveal the policy, because
+/// only learned policies take time to start and to compute.
 #[must_use]
 pub fn hold_told(caused_by_policy: bool, held_for: Duration) -> HoldTold {
     if !caused_by_policy {
@@ -179,9 +179,11 @@ mod tests {
     fn only_the_operator_does_these_but_the_researcher_adds_participants_too() {
         for request in REQUESTS {
             for role in ROLES {
-                let may = role == Role::Operator || (role == Role::Researcher && request == Request::AddParticipant);
+                let adds = request == Request::AddParticipant;
+                let may = role == Role::Operator || (role == Role::Researcher && adds);
+                let who = if adds { "the operator or a researcher" } else { "the operator" };
                 let checked = check(role, request, CurrentSession::None);
-                let expected = if may { Ok(()) } else { Err(Refusal::only("the operator")) };
+                let expected = if may { Ok(()) } else { Err(Refusal::only(who)) };
                 assert_eq!(checked, expected, "{role:?} {request:?}");
             }
         }
