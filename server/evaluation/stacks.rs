@@ -5,12 +5,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::report::figure;
+use super::statistics::bootstrap_statistic;
 use super::{EvaluateError, ORACLE, Outcome, Row, evaluate};
 use crate::autofocus::{BlurRate, PolicyName, Registry};
 use crate::files::replace;
@@ -22,7 +21,7 @@ use crate::scans::stack::source::{ScaledStack, StackSource, UnfitStack};
 pub const BASELINE: &str = "mgm-hill-climber";
 /// Seeds of the courses, one scan each.
 pub const SEEDS: usize = 3;
-/// First of the seeds, unless another is asked for.
+/// First of the seeds by default.
 pub const FIRST_SEED: u64 = 31;
 
 /// A stack at one scale, ready to be scanned.
@@ -32,22 +31,22 @@ struct Item {
     scale: &'static str,
     planes: usize,
     scans: StackScans,
-    /// What the policies are told of how fast the optic blurs.
+    /// The optic's blur rate that the policies get, if any.
     blur: Option<BlurRate>,
 }
 
-/// What the policies are told of how fast the optic blurs.
+/// Which blur rate of the optic the policies get.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Told {
-    /// Nothing.
+    /// No rate.
     Nothing,
-    /// This rate, whatever the stack.
+    /// This rate, for every stack.
     Rate(BlurRate),
-    /// The rate that is measured on each stack.
+    /// The rate measured on each stack.
     Measured,
 }
 
-/// Lays three courses over `source` at each scale.
+/// Makes [`SEEDS`] courses over `source` at each scale.
 fn items(source: &StackSource, first_seed: u64, told: Told) -> Result<Vec<Item>, UnfitStack> {
     let item = |scaled: ScaledStack| {
         let course = |seed| StackCourse::new(Arc::clone(&scaled.pictures), scaled.planes, seed).map(Arc::new);
@@ -76,16 +75,16 @@ pub struct StackResult {
     pub stack: String,
     /// `s` or `l`: about 500 or 1000 pixels wide.
     pub scale: &'static str,
-    /// Planes of the range.
+    /// Number of planes in the range.
     pub planes: usize,
-    /// What the policies were told of how fast the optic blurs: pixels a unit of focal power.
+    /// The optic's blur rate that the policies got, if any: pixels per unit of focal power.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blur: Option<f64>,
-    /// One a policy, the oracle first.
+    /// One row for each policy, the oracle first.
     pub rows: Vec<Row>,
 }
 
-/// How a policy does beside the MGM hill-climber, over all stacks and scales.
+/// A policy compared with the MGM hill-climber, over all stacks and scales.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
     /// The policy.
@@ -94,13 +93,13 @@ pub struct Standing {
     pub ratio: f64,
     /// 95 % bootstrap interval of that over stacks.
     pub ratio_interval: (f64, f64),
-    /// On how many stacks and scales its error is greater than the hill-climber's.
+    /// Number of stacks and scales on which its error is greater than the hill-climber's.
     pub worse_on: usize,
     /// Mean share in focus.
     pub in_focus: f64,
     /// Its changes of direction a second divided by the hill-climber's.
     pub turns: f64,
-    /// The stack and scale where it does worst beside the hill-climber.
+    /// The stack and scale where it does worst compared with the hill-climber.
     pub worst: String,
 }
 
@@ -109,17 +108,17 @@ pub struct Standing {
 pub struct StackReport {
     /// First of the seeds.
     pub seed: u64,
-    /// One a stack and scale.
+    /// One result for each stack and scale.
     pub stacks: Vec<StackResult>,
-    /// One a policy.
+    /// One standing for each policy.
     pub standings: Vec<Standing>,
 }
 
-/// Evaluates `policies` on the stacks of `sources`, the oracle and the baseline beside them; `seed` is
-/// the first of the courses' seeds.
+/// Evaluates `policies`, the oracle and the baseline on the stacks of `sources`. `seed` is the first of the courses'
+/// seeds.
 ///
 /// # Errors
-/// When a stack cannot be read or scanned, or a policy cannot run.
+/// If a stack cannot be read or scanned, or a policy cannot run.
 pub fn evaluate_stacks(
     registry: &Registry,
     policies: &[PolicyName],
@@ -163,7 +162,7 @@ pub enum StackReportError {
     Evaluate(#[from] EvaluateError),
 }
 
-/// The standing of `policy`, `None` where a row is missing.
+/// The standing of `policy`; `None` if a row is missing.
 fn standing(policy: &str, stacks: &[StackResult]) -> Option<Standing> {
     let row = |result: &StackResult, name: &str| result.rows.iter().find(|row| row.policy == name).cloned();
     let pairs: Vec<(Row, Row)> =
@@ -188,7 +187,6 @@ fn standing(policy: &str, stacks: &[StackResult]) -> Option<Standing> {
 /// The 95 % percentile-bootstrap interval of the geometric mean, drawing whole stacks: the two scales
 /// of a stack are not independent.
 fn ratio_interval(stacks: &[StackResult], logs: &[f64]) -> (f64, f64) {
-    const RESAMPLES: usize = 2000;
     let mut groups: Vec<(&str, Vec<f64>)> = Vec::new();
     for (result, log) in stacks.iter().zip(logs) {
         match groups.iter_mut().find(|group| group.0 == result.stack) {
@@ -197,20 +195,12 @@ fn ratio_interval(stacks: &[StackResult], logs: &[f64]) -> (f64, f64) {
         }
     }
 
-    if groups.is_empty() {
-        return (0.0, 0.0);
-    }
-
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut resample = |_| {
-        let drawn: Vec<f64> =
-            (0..groups.len()).flat_map(|_| groups[rng.random_range(0..groups.len())].1.clone()).collect();
-        (drawn.iter().sum::<f64>() / drawn.len() as f64).exp()
+    let geometric_mean = |drawn: &[usize]| {
+        let logs: Vec<f64> = drawn.iter().flat_map(|&group| groups[group].1.iter().copied()).collect();
+        Some((logs.iter().sum::<f64>() / logs.len() as f64).exp())
     };
 
-    let mut means: Vec<f64> = (0..RESAMPLES).map(&mut resample).collect();
-    means.sort_by(f64::total_cmp);
-    (means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40])
+    bootstrap_statistic(groups.len(), 1, geometric_mean).unwrap_or((0.0, 0.0))
 }
 
 impl StackReport {
@@ -218,7 +208,7 @@ impl StackReport {
     /// scale into `folder`.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// If a file cannot be written.
     pub fn write(&self, outcomes: &[Vec<Outcome>], folder: &Path) -> std::io::Result<()> {
         std::fs::create_dir_all(folder)?;
         replace(&folder.join("stacks.json"), serde_json::to_string_pretty(self)?.as_bytes())?;
@@ -232,7 +222,7 @@ impl StackReport {
         Ok(())
     }
 
-    /// The figures as Markdown: a row a stack and scale, then each policy beside the MGM hill-climber.
+    /// The figures as Markdown: one row for each stack and scale, then each policy compared with the MGM hill-climber.
     #[must_use]
     pub fn markdown(&self) -> String {
         let Some(first) = self.stacks.first() else { return String::new() };
@@ -247,7 +237,7 @@ impl StackReport {
 
         let _ = write!(
             text,
-            "\n| beside {BASELINE} | MAE, geometric mean | 95 % CI over stacks | worse on | worst | \
+            "\n| compared with {BASELINE} | MAE, geometric mean | 95 % CI over stacks | worse on | worst | \
              in focus, mean | turns |\n\
              |---|---|---|---|---|---|---|\n"
         );

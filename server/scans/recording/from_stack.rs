@@ -1,7 +1,6 @@
 //! Cuts a recorded scan out of a focal stack: windows drift over the stack, and in each of them the
 //! optimum walks as in the paper's simulation. Every picture shown was really taken.
 
-use std::f64::consts::FRAC_1_SQRT_2;
 use std::path::Path;
 
 use rand::SeedableRng;
@@ -13,24 +12,16 @@ use crate::camera::recorded::{FORMAT, Header, LEAST_SIDE, Order, Recording, Scan
 use crate::imaging::{GrayImage, PATCH_SIDE, PatchArea};
 use crate::scans::recorded::{as_patch, evenly_spread, levels_at};
 use crate::scans::stack::FocalStack;
+use crate::scans::stack::drift::{DRIFT, FOCUS, FOCUS_RANGE, SMOOTHING};
 use crate::simulation::gaussian::smoothed;
-use crate::simulation::walk::{Motion, Walk};
-
-/// How the window drifts along each axis, in pixels a frame.
-const DRIFT: Motion = Motion { speed: 5.0 * FRAC_1_SQRT_2, memory: 30.0 };
-/// How the optimum walks, in focal power a frame, and within what.
-const FOCUS: Motion = Motion { speed: 0.012, memory: 60.0 };
-const WITHIN: (f64, f64) = (0.03, 0.97);
-/// Standard deviation, in frames, by which the sharpest plane is smoothed before the window of
-/// planes follows it.
-const SMOOTH: f64 = 12.0;
+use crate::simulation::walk::Walk;
 
 /// How a scan is cut out of a stack.
 #[derive(Debug, Clone)]
 pub struct Cut {
     /// Name of the stack, for people.
     pub name: String,
-    /// Planes that a pose sees: its focal powers.
+    /// Number of planes that a pose sees: one for each focal power.
     pub planes: usize,
     /// Width and height of the window, pixels.
     pub size: usize,
@@ -43,11 +34,11 @@ pub struct Cut {
 /// Why no scan can be cut.
 #[derive(Debug, thiserror::Error)]
 pub enum CutError {
-    /// More planes are asked for than there are.
+    /// A pose would see all planes of the stack, or more.
     #[error("a pose cannot see {planes} planes of a stack of {of}: the window must have room to move; \
              give --planes at most {}", of - 1)]
     Planes {
-        /// Planes asked for.
+        /// Planes requested for a pose.
         planes: usize,
         /// Planes of the stack.
         of: usize,
@@ -84,7 +75,7 @@ pub struct Window {
 /// The windows of `cut` on `stack`, whose planes are evenly spaced.
 ///
 /// # Errors
-/// When stack or pictures are too small.
+/// If stack or pictures are too small.
 pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     let Cut { planes, size, poses, .. } = *cut;
     let (width, height) = stack.size();
@@ -98,7 +89,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
 
     let mut rng = ChaCha8Rng::seed_from_u64(cut.seed);
     let [mut x, mut y] = [width, height].map(|side| Walk::new((0.0, (side - size) as f64), DRIFT, &mut rng));
-    let mut focus = Walk::starting(0.5, WITHIN, FOCUS, &mut rng);
+    let mut focus = Walk::starting(0.5, FOCUS_RANGE, FOCUS, &mut rng);
     let mut corners = Vec::with_capacity(poses);
     let mut optima = Vec::with_capacity(poses);
 
@@ -111,7 +102,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
     }
 
     let sharpest: Vec<f64> = corners.iter().map(|&corner| sharpest(stack, corner, size) as f64).collect();
-    let followed = smoothed(&sharpest, SMOOTH);
+    let followed = smoothed(&sharpest, SMOOTHING);
 
     let window = |((&(left, top), optimum), at): ((&(usize, usize), &f64), &f64)| {
         let first = (at - optimum * (planes - 1) as f64).round().clamp(0.0, (of - planes) as f64);
@@ -125,7 +116,7 @@ pub fn windows(stack: &FocalStack, cut: &Cut) -> Result<Vec<Window>, CutError> {
 /// each pose.
 ///
 /// # Errors
-/// When the stack is too small, or `out` holds another scan or cannot be written.
+/// If the stack is too small, or `out` holds another scan or cannot be written.
 pub fn from_stack(stack: &FocalStack, cut: &Cut, out: &Path, progress: &dyn Fn()) -> Result<(), CutError> {
     let windows = windows(stack, cut)?;
     let powers = evenly_spread(cut.planes);
@@ -209,7 +200,7 @@ mod tests {
         let windows = windows(&stack, &cut(9, 96)).unwrap();
         assert!(windows.iter().all(|w| w.left <= 64 && w.top <= 64 && w.plane <= 12));
 
-        // Sharpest in plane 10: the optimum within the window is wherever the walk put it.
+        // Plane 10 is the sharpest. The walk decides where it lies within the window.
         let optima: Vec<usize> = windows.iter().map(|w| 10usize.saturating_sub(w.plane)).collect();
         let (least, most) = (optima.iter().min().unwrap(), optima.iter().max().unwrap());
         assert!(optima.iter().all(|&o| o <= 8) && most - least >= 2, "{least} to {most}");
@@ -228,9 +219,9 @@ mod tests {
 
     #[test]
     fn smoothing_keeps_what_is_even_and_mirrors_at_the_ends() {
-        assert!(smoothed(&[3.0; 5], SMOOTH).iter().all(|value| (value - 3.0).abs() < 1e-12));
+        assert!(smoothed(&[3.0; 5], SMOOTHING).iter().all(|value| (value - 3.0).abs() < 1e-12));
         let step: Vec<f64> = (0..200).map(|index| f64::from(u8::from(index >= 100))).collect();
-        let found = smoothed(&step, SMOOTH);
+        let found = smoothed(&step, SMOOTHING);
         assert!((found[99] + found[100] - 1.0).abs() < 1e-9 && found[0] < 1e-9 && found[199] > 1.0 - 1e-9);
     }
 }

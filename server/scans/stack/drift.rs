@@ -1,10 +1,10 @@
-//! Focal-time scans over photographed focal stacks: a window drifts over a still scene while the
-//! sharpest plane walks through the range, so that every picture a policy sees was really taken.
+//! Focal-time scans over photographed focal stacks: a window drifts over a still scene while the sharpest plane walks
+//! through the range, so that a policy sees real pictures, or mixes of two neighbouring ones.
 //!
-//! The optimum's focal power and the window walk as in simulated scans. At each frame, `planes`
-//! neighbouring pictures of the stack become the range 0..=1, laid so that the plane in which the
-//! middle patch is sharpest, smoothed over the way, stands at the walking focal power as nearly as
-//! the stack allows. The true optimum is where the patch's mean gradient magnitude peaks.
+//! The optimum's focal power and the window walk as in simulated scans. At each frame, `planes` neighbouring pictures
+//! of the stack become the range 0..=1. They are chosen so that the plane in which the middle patch is sharpest
+//! (smoothed over frames) lies at the walking focal power, as nearly as the stack allows. The true optimum is where the
+//! patch's mean gradient magnitude peaks.
 
 use std::sync::Arc;
 
@@ -24,15 +24,14 @@ use crate::simulation::walk::{Motion, Walk};
 pub const FRAMES: usize = 500;
 /// Side of the window that drifts over the stack, in pixels; the patch is its middle.
 const WINDOW: usize = 128;
-/// How the window drifts along each axis: 5 pixels a frame in all.
-const DRIFT: Motion = Motion { speed: 3.535_533_905_932_737_7, memory: 30.0 };
+/// How a window drifts along each axis: 5 pixels a frame in all.
+pub(in crate::scans) const DRIFT: Motion = Motion { speed: 3.535_533_905_932_737_7, memory: 30.0 };
 /// How the optimum's focal power walks.
-const FOCUS: Motion = Motion { speed: 0.012, memory: 60.0 };
-/// Where it may walk.
-const FOCUS_RANGE: (f64, f64) = (0.03, 0.97);
-/// Frames (standard deviation) over which the sharpest plane along the way is smoothed before the
-/// range is laid around it.
-const SMOOTHING: f64 = 12.0;
+pub(in crate::scans) const FOCUS: Motion = Motion { speed: 0.012, memory: 60.0 };
+/// Range of that walk.
+pub(in crate::scans) const FOCUS_RANGE: (f64, f64) = (0.03, 0.97);
+/// Standard deviation, in frames, with which the sharpest plane is smoothed before the range is placed around it.
+pub(in crate::scans) const SMOOTHING: f64 = 12.0;
 
 /// One scan over a focal stack, prepared: where the patch lies and which planes make the range, frame by frame.
 #[derive(Debug)]
@@ -51,8 +50,8 @@ struct Moment {
 }
 
 impl StackCourse {
-    /// A course over `stack`, whose positions count its planes from 0, drawn from `seed`; `planes` of
-    /// them are the range. `None` where the stack has fewer planes, or is smaller than the window of
+    /// A course over `stack`, drawn from `seed`. The stack's positions count its planes from 0, and `planes` of them
+    /// are the range. `None` if `planes` is below 3, the stack has fewer planes, or it is smaller than the window of
     /// 128 pixels.
     #[must_use]
     pub fn new(stack: Arc<PlaneStack>, planes: usize, seed: u64) -> Option<Self> {
@@ -102,7 +101,7 @@ impl StackCourse {
     }
 }
 
-/// A [`StackCourse`] being replayed; at its last frame it stays.
+/// A replay of a [`StackCourse`]. It stays at the last frame.
 struct Playing {
     course: Arc<StackCourse>,
     frame: usize,

@@ -1,5 +1,4 @@
-//! A batch of windows of consecutive frames, and the targets that the values of its states are
-//! fitted to.
+//! A batch of windows of consecutive frames, and the targets to which the values of its states are fitted.
 
 use tch::{Device, Tensor};
 
@@ -9,22 +8,23 @@ use crate::autofocus::networks::{ACTIONS, HISTORY};
 use crate::autofocus::{IN_FOCUS, STEP};
 use crate::lens::FocalPower;
 
-/// Windows as tensors, and the states in them that have a next frame.
+/// Windows of frames as tensors, and the S states in them.
 pub(super) struct Batch {
     /// All windows' frames.
     pub frames: Frames,
-    /// `[8 S]`: each state's latest eight frames, oldest first; before eight were seen, the first
-    /// stands for those missing.
+    /// `[8 S]`: indices of each state's latest eight frames, oldest first. Before the scan has eight, its first frame
+    /// fills the places of those missing.
     pub history: Tensor,
-    /// `[S, 8]`: the scaled focal powers at these.
+    /// `[S, 8]`: the scaled focal powers at these frames.
     pub focal_powers: Tensor,
+    /// One for each frame.
     pub transitions: Vec<Transition>,
-    /// Frames that are states: their history lies in their window.
+    /// Indices of the frames that are states: those whose whole history lies in their window.
     pub states: Vec<usize>,
 }
 
 impl Batch {
-    /// A batch of `frames`, `window` of them in each window, for a network on `device`.
+    /// A batch of `frames` in windows of `window` frames each, for a network on `device`.
     pub fn new(frames: Frames, transitions: Vec<Transition>, window: usize, device: Device) -> Self {
         let states: Vec<usize> = (0..transitions.len()).filter(|&at| at % window >= reach(&transitions[at])).collect();
 
@@ -45,22 +45,20 @@ impl Batch {
     }
 }
 
-/// Frames of its own scan that a transition's state reaches back.
+/// How many frames back the history of a transition's state reaches: at most 7, and not beyond its scan's start.
 fn reach(transition: &Transition) -> usize {
     usize::from(transition.age).min(HISTORY - 1)
 }
 
-/// What moving earns by itself, in steps: fields of
-/// [`crate::training::recipe::dqn::Target::Lookahead`].
+/// Rewards for moving at all: the fields of [`crate::training::recipe::dqn::Target::Lookahead`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bonus {
     pub restless: f64,
     pub turning: f64,
 }
 
-/// What each action would gain over standing still at the frame after the last of `transitions`, in
-/// steps. Well out of focus, moving earns something by itself: only a policy that moves learns where
-/// to go.
+/// What each action would gain over standing still at the frame after the last of `transitions`, in steps. Well out of
+/// focus, moving earns `bonus` besides: only a policy that moves finds out where to go.
 pub(super) fn gains(transitions: &[Transition], bonus: Bonus) -> [f32; ACTIONS] {
     let Some(transition) = transitions.last() else { return [0.0; ACTIONS] };
     let stands = FocalPower::nearest(f64::from(transition.focal_power));
@@ -86,15 +84,15 @@ pub(super) fn gains(transitions: &[Transition], bonus: Bonus) -> [f32; ACTIONS] 
     })
 }
 
-/// The latest change of focal power that the state of the last of `transitions` shows; 0 for none.
+/// The latest change of focal power within the history of the last of `transitions`; 0 if there was none.
 fn heading(transitions: &[Transition]) -> f64 {
     let changes = transitions.windows(2).rev().take(HISTORY - 1).take_while(|pair| pair[1].age > pair[0].age);
     let mut changes = changes.map(|pair| f64::from(pair[1].focal_power - pair[0].focal_power));
     changes.find(|change| change.abs() > 1e-6).unwrap_or(0.0)
 }
 
-/// How Bellman's equation is applied: those fields of
-/// [`crate::training::recipe::dqn::Target::Bellman`] that rewards depend on.
+/// How Bellman's equation is applied: the fields of [`crate::training::recipe::dqn::Target::Bellman`] that define the
+/// rewards.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Returns {
     pub discount: f64,
@@ -103,7 +101,7 @@ pub(super) struct Returns {
 }
 
 impl Returns {
-    /// The return of the frames from `at` on, up to the state `steps` later, whose value is `next_value`.
+    /// The discounted return of the frames from `at` to the state `steps` later, whose value is `next_value`.
     fn of(&self, transitions: &[Transition], at: usize, next_value: f64) -> f64 {
         let end = at + self.steps;
 
@@ -119,12 +117,12 @@ impl Returns {
         }
 
         let shaped = sum + later * self.oracle(&transitions[end]) - self.oracle(&transitions[at]);
-        // Mean regret a frame, roughly, whatever the horizon.
+        // Roughly the mean regret per frame, independent of the horizon.
         later.mul_add(next_value, shaped * (1.0 - self.discount) / STEP)
     }
 
-    /// What an oracle that steps towards the optimum would still get from where `transition` stands
-    /// if the optimum stayed.
+    /// The discounted reward of an oracle that steps from the focal power of `transition` straight to the optimum, if
+    /// the optimum stayed where it is.
     fn oracle(&self, transition: &Transition) -> f64 {
         let mut error = f64::from((transition.next_optimum - transition.focal_power).abs());
         let mut sum = 0.0;
@@ -140,16 +138,16 @@ impl Returns {
     }
 }
 
-/// The values to fit, by state and action; `None` where an action's is unknown.
+/// The values to fit, by state and action; `None` for an action whose value is unknown.
 pub(super) type Targets = Vec<[Option<f32>; ACTIONS]>;
 
-/// The lookahead's targets for each state: all actions' [`gains`].
+/// The lookahead's targets: for each state the [`gains`] of all actions.
 pub(super) fn lookahead(batch: &Batch, bonus: Bonus) -> Targets {
     batch.states.iter().map(|&at| gains(&batch.transitions[..=at], bonus).map(Some)).collect()
 }
 
-/// Bellman's targets: the value of the action taken in each state whose successor some steps on is
-/// in the batch. `next_values` are the states' own, by row.
+/// Bellman's targets: the value of the action taken, for each state whose successor `returns.steps` later is in the
+/// same scan and window. `next_values` holds the value of each state, by row.
 pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Returns, window: usize) -> Targets {
     let mut row_of = vec![None; batch.transitions.len()];
     for (row, &at) in batch.states.iter().enumerate() {
@@ -173,8 +171,8 @@ pub(super) fn bellman(batch: &Batch, next_values: &[f32], returns: Returns, wind
     batch.states.iter().map(targets).collect()
 }
 
-/// The mean smooth L1 loss (Huber 1964, quadratic within 1) of `values` (`[S, 3]`, row by row) where
-/// they have targets, and its gradient with respect to them.
+/// The mean smooth L1 loss (Huber 1964, quadratic within 1) of those `values` (`[S, 3]`, row by row) that have targets,
+/// and its gradient with respect to `values`.
 pub(super) fn smooth_l1(values: &[f32], targets: &Targets) -> (f64, Vec<f32>) {
     let targets = targets.as_flattened();
     let count = targets.iter().flatten().count().max(1) as f64;
@@ -201,7 +199,7 @@ mod tests {
         focal_powers.iter().enumerate().map(transition).collect()
     }
 
-    /// In thousandths of a step.
+    /// [`gains`] in thousandths of a step.
     fn gained(focal_powers: &[f32], next_optimum: f32, restless: f64, turning: f64) -> [i32; ACTIONS] {
         gains(&transitions(focal_powers, next_optimum), Bonus { restless, turning })
             .map(|gain| (1000.0 * gain).round() as i32)
@@ -227,7 +225,7 @@ mod tests {
         assert_eq!(far(&[0.0])[0], 0, "the lens cannot go there");
     }
 
-    /// In ten thousandths.
+    /// `value` in ten thousandths.
     fn rounded(value: f64) -> i32 {
         (1e4 * value).round() as i32
     }
@@ -238,17 +236,18 @@ mod tests {
         transitions[0].next_optimum = 0.62;
         transitions[1].next_optimum = 0.5;
         let plain = Returns { discount: 0.5, steps: 2, regret: false };
-        // -(0.62 - 0.55) - 0.5 * (0.6 - 0.5), and a quarter of what the last state is worth.
+        // -(0.62 - 0.55) - 0.5 * (0.6 - 0.5), plus a quarter of the last state's value.
         assert_eq!(rounded(plain.of(&transitions, 0, 4.0)), 8800);
 
-        // An oracle at 0.5 is 0.07, then 0.02 away from 0.62; at the end, 0. In steps, over the horizon of two frames.
+        // An oracle that begins at 0.5 is 0.07, then 0.02 away from 0.62, and at the end 0. The result is in steps,
+        // over the horizon of two frames.
         let regret = Returns { regret: true, ..plain };
         assert_eq!(rounded(regret.of(&transitions, 0, 4.0)), 6000);
     }
 
     #[test]
     fn returns_stay_within_a_window_and_a_scan() {
-        // Two windows of four frames, a scan's end in the middle of the first.
+        // Two windows of four frames; a scan ends in the middle of the first.
         let ages = [0, 1, 0, 1, 0, 1, 2, 3];
         let transition = |(at, age): (usize, u16)| Transition {
             focal_power: 0.5,

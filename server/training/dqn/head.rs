@@ -1,4 +1,4 @@
-//! The value head's gradient by hand: a third of the operations that libtorch records and replays.
+//! The value head's gradient, written by hand. It takes a third of the operations that libtorch records and replays.
 //! Tests compare it with libtorch's.
 
 use rayon::prelude::*;
@@ -7,8 +7,8 @@ use tch::{Device, Tensor};
 
 use crate::autofocus::networks::{ValueHead, compute_on_this_thread};
 
-/// Most states that a core works on at once. What is summed over states is summed over these parts
-/// first, in a fixed order: how many cores share them changes no digit.
+/// Most states that a core works on at once. Sums over states are made per part first, and the parts are added in a
+/// fixed order. So the number of cores does not change a digit.
 const STATES_AT_ONCE: i64 = 256;
 
 /// A head's forward pass over states, with all that its gradient needs.
@@ -24,13 +24,13 @@ pub(super) struct Pass {
 struct Part {
     /// The head's layers.
     layers: [Linear; 3],
-    /// What each layer took: `[S, input]`, then twice `[S, 256]`.
+    /// The input of each layer: `[S, input]`, then twice `[S, 256]`.
     inputs: [Tensor; 3],
     values: Tensor,
 }
 
 impl Pass {
-    /// Action values of states `[S, input]` by `head`. Nothing is recorded for libtorch's own gradients.
+    /// Runs `head` on `states` (`[S, input]`). Nothing is recorded for libtorch's own gradients.
     pub fn through(head: &ValueHead, states: &Tensor) -> Self {
         let parts = split(states).into_iter().map(|states| (head.layers.each_ref().map(shared), states));
         let parts = on_all_cores(parts.collect(), |(layers, states)| Part::through(layers, states));
@@ -38,9 +38,10 @@ impl Pass {
         Self { values: Tensor::cat(&values, 0), parts }
     }
 
-    /// Writes to `gradient`, which has the shapes of the head's variables in the order of their names,
-    /// the gradient of a loss whose gradient by the values is `grad_output` (`[S, 3]`). Returns its
-    /// gradient by the states, `[S, input]`.
+    /// Propagates `grad_output` (`[S, 3]`), a loss's gradient with respect to the values, back through the head.
+    ///
+    /// Writes the loss's gradient with respect to the head's variables to `gradient`, which has their shapes, in the
+    /// order of their names. Returns the gradient with respect to the states, `[S, input]`.
     pub fn back(self, grad_output: &Tensor, gradient: &[Tensor]) -> Tensor {
         let parts = self.parts.into_iter().zip(split(grad_output)).enumerate().map(|(index, (part, grad_output))| {
             let first = index == 0;
@@ -79,7 +80,7 @@ impl Part {
                 grad_output = grad_output.mm(&layer.ws);
 
                 if index > 0 {
-                    // What a ReLU let through is above zero.
+                    // The gradient passes a ReLU only where its output is above zero.
                     grad_output = input.threshold_backward(&grad_output, 0);
                 }
             }
@@ -88,14 +89,14 @@ impl Part {
     }
 }
 
-/// Rows for one core each, as even as can be; all together on a GPU.
+/// Splits `rows` as evenly as possible into parts for one core each; on a GPU they stay together.
 fn split(rows: &Tensor) -> Vec<Tensor> {
     let count = rows.size()[0];
     let parts = if rows.device() == Device::Cpu { (count - 1) / STATES_AT_ONCE + 1 } else { 1 };
     rows.chunk(parts.max(1), 0)
 }
 
-/// A layer with the same weights: a tensor's handle may go to another thread, but not be shared with one.
+/// A layer with the same weights. A tensor's handle may be moved to another thread, but not shared between threads.
 fn shared(layer: &Linear) -> Linear {
     Linear { ws: layer.ws.shallow_clone(), bs: layer.bs.as_ref().map(Tensor::shallow_clone) }
 }
@@ -119,34 +120,20 @@ mod tests {
     use tch::{Kind, nn};
 
     use super::*;
-    use crate::simulation::normal::standard_normal;
+    use crate::training::dqn::drawn::{draw_variables, drawn};
 
     #[test]
     fn values_and_gradients_are_libtorchs() {
         compute_on_this_thread();
-        // For one core alone, and for several, unevenly.
+        // One part only, and several parts of different size.
         [34, 700].into_iter().for_each(compare);
-    }
-
-    /// Normal values. Not from libtorch's generator, which all tests of a process draw from: now and then a unit would
-    /// be so near zero that rounding decides whether it has a gradient.
-    fn drawn(rng: &mut ChaCha8Rng, shape: &[i64]) -> Tensor {
-        let count = shape.iter().product();
-        let values: Vec<f32> = (0..count).map(|_: i64| standard_normal(rng) as f32).collect();
-        Tensor::from_slice(&values).view(shape)
     }
 
     fn compare(count: i64) {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let store = nn::VarStore::new(Device::Cpu);
         let reference = ValueHead::new(&(store.root() / "head"), 16);
-        let mut variables: Vec<(String, Tensor)> = store.variables().into_iter().collect();
-        variables.sort_by(|a, b| a.0.cmp(&b.0));
-        // Biases too: fresh ones are zero, which would hide that they are used.
-        for (_, variable) in &mut variables {
-            let values = drawn(&mut rng, &variable.size()) * 0.2;
-            tch::no_grad(|| variable.copy_(&values));
-        }
+        let variables = draw_variables(&store, &mut rng);
         let states = drawn(&mut rng, &[count, 16]).set_requires_grad(true);
         let grad_output = drawn(&mut rng, &[count, 3]);
         let expected = reference.forward(&states);

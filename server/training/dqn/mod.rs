@@ -1,8 +1,9 @@
-//! Deep Q-learning on simulated focal-time scans (Mnih et al. 2015; double: van Hasselt et al.
-//! 2016), on windows of consecutive frames, so that each patch is encoded once for all the states
-//! that hold it.
+//! Deep Q-learning on simulated focal-time scans (Mnih et al. 2015; double: van Hasselt et al. 2016). It learns from
+//! windows of consecutive frames, so that each patch is encoded only once for all states that contain it.
 
 mod batch;
+#[cfg(test)]
+mod drawn;
 mod encoder;
 mod head;
 pub mod replay;
@@ -42,9 +43,10 @@ pub struct DqnTrainer {
     frames: u64,
 }
 
-/// An environment and the encodings of its latest frames, oldest first.
+/// An environment, and the encodings and scaled focal powers of its latest eight frames, oldest first.
 struct Actor {
     environment: Environment,
+    /// Frames since the scan's start.
     age: u16,
     frames_left: u16,
     history: Vec<f32>,
@@ -52,7 +54,7 @@ struct Actor {
 }
 
 impl DqnTrainer {
-    /// A training from nothing on `scenery`, its networks on `device`.
+    /// A training from random weights on `scenery`, with its networks on `device`.
     #[must_use]
     pub fn new(sight: Sight, recipe: DqnRecipe, scenery: Scenery, seed: u64, device: Device) -> Self {
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
@@ -88,7 +90,7 @@ impl DqnTrainer {
         self.online.store.device()
     }
 
-    /// Every actor sees a frame, acts, and advances to the next one.
+    /// Lets every actor see a frame, act, and advance to the next frame.
     fn play_a_frame(&mut self) {
         let sight = self.online.network.sight;
         let seen: Vec<Seen> = self
@@ -165,7 +167,7 @@ impl DqnTrainer {
         Batch::new(frames, transitions, length, self.device())
     }
 
-    /// The targets of the batch's states, whose present values are `values` (`[S, 3]`, row by row).
+    /// The targets for the batch's states. `values` (`[S, 3]`, row by row) are the online network's.
     fn targets(&self, batch: &Batch, values: &[f32]) -> Targets {
         match self.recipe.target {
             Target::Lookahead { restless, turning } => lookahead(batch, Bonus { restless, turning }),
@@ -207,7 +209,7 @@ impl Trainer for DqnTrainer {
     }
 
     fn update(&mut self) -> f64 {
-        // The first update waits until the warm-up has filled the memory.
+        // The first update waits until the warm-up has filled the replay memory.
         let goal = self.frames.max(self.recipe.warm_up) + self.recipe.frames_an_update as u64;
         while self.frames < goal {
             tch::no_grad(|| self.play_a_frame());

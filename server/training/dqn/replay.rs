@@ -1,5 +1,5 @@
-//! Replay memory: the latest frames of every actor, patches as bytes, from which windows of
-//! consecutive frames are drawn.
+//! Replay memory: the latest frames of every actor, with patches as bytes. Windows of consecutive frames are drawn from
+//! it.
 
 use rand::{Rng, RngExt};
 
@@ -10,37 +10,37 @@ use crate::training::run::checkpoint::{Checkpoint, CheckpointError};
 /// Bytes of a patch.
 const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
 
-/// What one frame leaves behind, besides what was seen.
+/// What is remembered of a frame, besides what was seen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Transition {
     /// Focal power the frame was seen at.
     pub focal_power: f32,
     /// Optimum at the next frame.
     pub next_optimum: f32,
-    /// The action taken.
+    /// Index of the action taken, below `ACTIONS`.
     pub action: u8,
     /// Frames since the scan's start.
     pub age: u16,
 }
 
-/// What was seen of a frame, in its compact form.
+/// What was seen of a frame, in compact form.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Seen {
-    /// A patch, as bytes.
+    /// A patch: 1024 gray levels, row by row.
     Patch(Box<[u8]>),
-    /// A scaled metric.
+    /// A scaled focus metric.
     Metric(f32),
 }
 
 impl Seen {
-    /// A patch in its compact form.
+    /// A patch in compact form.
     #[must_use]
     pub fn patch(patch: &Patch) -> Self {
         Self::Patch(patch.0.iter().map(|&gray| gray as u8).collect())
     }
 }
 
-/// What was seen of many frames, in its compact form: patches, 1024 bytes each, or scaled metrics.
+/// What was seen of many frames, in compact form: patches of 1024 bytes each, or scaled metrics. One list is empty.
 #[derive(Debug, Default)]
 pub struct Frames {
     /// All frames' patches.
@@ -59,7 +59,7 @@ impl Frames {
     }
 }
 
-/// Frames of many scans, each actor's in a ring of its own.
+/// Frames of many scans, in one ring for each actor.
 #[derive(Debug)]
 pub struct Replay {
     actors: Vec<Ring>,
@@ -71,7 +71,7 @@ struct Ring {
     transitions: Vec<Transition>,
     patches: Vec<u8>,
     metrics: Vec<f32>,
-    /// Where the next frame goes once the ring is full; the oldest frame.
+    /// Index of the oldest frame. Once the ring is full, the next frame replaces it.
     head: usize,
 }
 
@@ -83,8 +83,8 @@ pub struct Window {
 }
 
 impl Ring {
-    /// Makes room for `more` frames like those held: growing bit by bit would hold all of them twice
-    /// at times. Room that is never filled costs no memory.
+    /// Reserves room for `more` frames. Growing step by step would at times hold all frames twice. Room that is never
+    /// filled costs no memory.
     fn reserve(&mut self, more: usize) {
         self.transitions.reserve_exact(more);
         if self.metrics.is_empty() {
@@ -96,7 +96,7 @@ impl Ring {
 }
 
 impl Replay {
-    /// A memory of at most `frames` frames for `actors` actors.
+    /// A memory of at most `frames` frames in all, for `actors` actors.
     #[must_use]
     pub fn new(frames: usize, actors: usize) -> Self {
         Self { actors: (0..actors).map(|_| Ring::default()).collect(), capacity: (frames / actors.max(1)).max(1) }
@@ -114,7 +114,7 @@ impl Replay {
         self.len() == 0
     }
 
-    /// Adds a frame of `actor`, in place of its oldest when full.
+    /// Adds a frame of `actor`. Replaces its oldest frame if its ring is full.
     pub fn push(&mut self, actor: usize, seen: &Seen, transition: Transition) {
         let capacity = self.capacity;
         let ring = &mut self.actors[actor];
@@ -130,7 +130,7 @@ impl Replay {
             return;
         }
 
-        // The ring is full: the new frame takes the place of the oldest.
+        // The ring is full: the new frame replaces the oldest.
         let at = ring.head;
         ring.transitions[at] = transition;
         match seen {
@@ -140,8 +140,7 @@ impl Replay {
         ring.head = (at + 1) % capacity;
     }
 
-    /// Adds all frames to a checkpoint. Patches are borrowed, since a copy would take as much memory
-    /// again.
+    /// Adds all frames to a checkpoint. Patches are borrowed, since a copy would double the memory.
     pub fn save<'a>(&'a self, checkpoint: &mut Checkpoint<'a>) {
         for (index, ring) in self.actors.iter().enumerate() {
             let name = |part: &str| format!("replay.{index}.{part}");
@@ -161,10 +160,10 @@ impl Replay {
         }
     }
 
-    /// Restores what [`Replay::save`] added; patches are moved out of the checkpoint.
+    /// Restores what [`Replay::save`] added. Moves the patches out of the checkpoint.
     ///
     /// # Errors
-    /// When the checkpoint is damaged or of another training.
+    /// If the checkpoint is damaged or belongs to another training.
     pub fn restore(&mut self, checkpoint: &mut Checkpoint<'_>) -> Result<(), CheckpointError> {
         let capacity = self.capacity;
         for (index, ring) in self.actors.iter_mut().enumerate() {
@@ -174,8 +173,7 @@ impl Replay {
             let patches = checkpoint.take_bytes(&name("patches"))?;
             let metrics = checkpoint.floats(&name("metrics"))?;
 
-            // The oldest frame is the first where the ring had not wrapped, and in checkpoints
-            // older than this note.
+            // Older checkpoints lack this note: their oldest frame is the first.
             let head =
                 if checkpoint.notes.contains_key(&name("head")) { checkpoint.number(&name("head"))? } else { 0 };
             let actions = checkpoint.bytes(&name("action"))?;
@@ -208,14 +206,14 @@ impl Replay {
         Ok(())
     }
 
-    /// A window of `length` frames, uniformly drawn; `None` before a drawn actor holds as many.
+    /// Draws a window of `length` frames uniformly; `None` if the drawn actor holds fewer frames.
     pub fn draw(&self, length: usize, rng: &mut impl Rng) -> Option<Window> {
         let actor = rng.random_range(0..self.actors.len());
         let held = self.actors[actor].transitions.len();
         (held >= length).then(|| Window { actor, start: rng.random_range(0..=held - length) })
     }
 
-    /// Appends what was seen in `window`, and its transitions, to the given lists.
+    /// Appends the frames and transitions of `window` to the given lists.
     pub fn read(&self, window: Window, length: usize, frames: &mut Frames, transitions: &mut Vec<Transition>) {
         let ring = &self.actors[window.actor];
         let patch = ring.patches.len() / ring.transitions.len().max(1);
@@ -257,7 +255,7 @@ mod tests {
         assert_eq!(oldest, 27);
     }
 
-    /// A replay memory whose first ring has wrapped, and the folder of its checkpoint.
+    /// A replay memory whose first ring has wrapped, and the folder with its checkpoint.
     fn saved(seen: impl Fn(u16) -> Seen) -> (Replay, tempfile::TempDir) {
         let mut replay = Replay::new(20, 2);
         for time in 0..13u16 {
@@ -268,7 +266,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut checkpoint = Checkpoint::default();
         replay.save(&mut checkpoint);
-        // What a checkpoint borrows it does not copy.
+        // The checkpoint borrows the patches instead of copying them.
         assert_eq!(checkpoint.bytes("replay.0.patches").unwrap().as_ptr(), replay.actors[0].patches.as_ptr());
         checkpoint.write(&folder.path().join("a")).unwrap();
         (replay, folder)

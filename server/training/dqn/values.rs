@@ -1,5 +1,5 @@
-//! A value network as training runs it: on frames in their compact form, its head's gradient by hand,
-//! and on the processor its encoder's too.
+//! A value network as training runs it: on frames in their compact form. The gradient of its head is written by hand,
+//! and on the CPU that of its encoder too.
 
 use tch::{Device, Kind, Tensor, nn};
 
@@ -19,11 +19,12 @@ const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
 pub(super) struct Values {
     pub store: nn::VarStore,
     pub network: ValueNetwork,
+    /// The encoder with gradients by hand, on the CPU; `None` elsewhere, and for policies without an encoder.
     by_hand: Option<Encoder>,
 }
 
 impl Values {
-    /// A fresh network on `device`.
+    /// A network with random weights on `device`.
     pub fn new(sight: Sight, device: Device) -> Self {
         let store = nn::VarStore::new(device);
         let network = ValueNetwork::new(&store.root(), sight);
@@ -31,7 +32,7 @@ impl Values {
         Self { store, network, by_hand }
     }
 
-    /// Encodings `[N, width]` of frames, for libtorch to differentiate where they are not made by hand.
+    /// Encodings `[N, width]` of frames. Unless the encoder is by hand, libtorch records them for its own gradients.
     pub fn encode(&self, frames: &Frames) -> Tensor {
         if let Some(encoder) = &self.by_hand {
             let width = self.network.sight.width() as i64;
@@ -48,7 +49,7 @@ impl Values {
         self.network.encode(&frames)
     }
 
-    /// Values of all of the batch's states, from the encodings of its frames.
+    /// Runs the head on all states of the batch, from the encodings of its frames.
     pub fn pass(&self, batch: &Batch, encodings: &Tensor) -> Pass {
         let states = tch::no_grad(|| {
             let histories = encodings.index_select(0, &batch.history).view([batch.states.len() as i64, -1]);
@@ -57,13 +58,13 @@ impl Values {
         Pass::through(&self.network.head, &states)
     }
 
-    /// The gradient by all variables, which are `flat`, of a loss whose gradient by the values of
-    /// `pass` is `grad_output` (`[S, 3]`).
+    /// The gradient of a loss with respect to all variables (`flat`). `grad_output` (`[S, 3]`) is the loss's gradient
+    /// with respect to the values of `pass`.
     pub fn gradient(&self, flat: &Flat, batch: &Batch, encodings: &Tensor, pass: Pass, grad_output: &Tensor) -> Tensor {
         let gradient = flat.values.empty_like();
         let parts = parts(&gradient, &flat.variables);
 
-        // By name, the encoder's variables come before the head's, a bias and a weight a layer.
+        // In the order of names, the encoder's variables come before the head's. Each layer has a bias and a weight.
         let (encoder, head) = parts.split_at(parts.len() - 2 * self.network.head.layers.len());
         let by_states = pass.back(grad_output, head);
         if encoder.is_empty() {
@@ -78,7 +79,7 @@ impl Values {
             let found = by_hand.gradient(&batch.frames.patches, &floats(&by_encodings));
             gradient.narrow(0, 0, found.len() as i64).copy_(&Tensor::from_slice(&found));
         } else {
-            // A loss whose gradient by the encodings is the one found.
+            // A loss whose gradient with respect to the encodings is `by_encodings`.
             let loss = (encodings * by_encodings).sum(Kind::Float);
             let found = Tensor::run_backward(&[loss], &flat.variables[..encoder.len()], false, false);
             for (part, found) in encoder.iter().zip(&found) {
@@ -97,10 +98,11 @@ mod tests {
 
     use super::*;
     use crate::autofocus::networks::compute_on_this_thread;
+    use crate::training::dqn::drawn::{draw_variables, drawn};
     use crate::training::dqn::replay::Transition;
 
-    /// Windows of twelve frames of noise, of which every other begins a scan; in the others the first
-    /// states' histories begin before it.
+    /// Windows of twelve frames of noise. Every other window begins a scan; the others begin in the middle of one, so
+    /// the histories of their first frames are incomplete.
     fn batch(windows: u16, rng: &mut ChaCha8Rng) -> Batch {
         const WINDOW: u16 = 12;
         let mut frames = Frames::default();
@@ -114,12 +116,13 @@ mod tests {
     #[test]
     fn gradients_by_hand_are_those_that_libtorch_records() {
         compute_on_this_thread();
-        tch::manual_seed(3);
-        let batch = batch(2, &mut ChaCha8Rng::seed_from_u64(3));
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let batch = batch(2, &mut rng);
         assert!(batch.states.len() > 12, "the first window's states reach back as far as the scan goes");
         let mut values = Values::new(Sight::Patch, Device::Cpu);
+        draw_variables(&values.store, &mut rng);
         let flat = Flat::of(&values.store);
-        let grad_output = Tensor::randn([batch.states.len() as i64, 3], (Kind::Float, Device::Cpu));
+        let grad_output = drawn(&mut rng, &[batch.states.len() as i64, 3]);
 
         let histories = values.network.encode(&as_floats(&batch)).index_select(0, &batch.history);
         let found = values.network.values(&histories.view([batch.states.len() as i64, -1]), &batch.focal_powers);
@@ -143,9 +146,10 @@ mod tests {
         let gradient = |threads| {
             let work = || {
                 compute_on_this_thread();
-                let batch = batch(80, &mut ChaCha8Rng::seed_from_u64(3));
-                tch::manual_seed(3);
+                let mut rng = ChaCha8Rng::seed_from_u64(3);
+                let batch = batch(80, &mut rng);
                 let values = Values::new(Sight::Patch, Device::Cpu);
+                draw_variables(&values.store, &mut rng);
                 let flat = Flat::of(&values.store);
                 let encodings = values.encode(&batch.frames);
                 let pass = values.pass(&batch, &encodings);

@@ -1,4 +1,4 @@
-//! Recipes: every choice of a training, as TOML. Those that ship are in `policies/`.
+//! Recipes: the settings of a training, as TOML. Those that ship are in `policies/`.
 
 pub mod belief;
 mod check;
@@ -14,35 +14,37 @@ use belief::BeliefRecipe;
 pub use check::MAX_UPDATES;
 use dqn::DqnRecipe;
 
-/// Updates between two moments at which a training may stop. All scans begin anew at each, so that none need be saved.
+/// Updates of a leg. A training may stop only between two legs. Each leg begins with new scans, so that a checkpoint
+/// need not hold scans.
 pub const LEG: u64 = 100;
 
-/// Every choice of a training except its seed and its footage.
+/// All settings of a training except its seed and its footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// The policy it makes.
+    /// Name of the policy that is trained.
     pub policy: String,
-    /// Pictures drawn to train on, where no footage is given; validation draws as many others, 60 at most.
+    /// Pictures drawn to train on, if no footage is given. Validation draws as many others, at most 60.
     pub pictures: u64,
-    /// Scenes with relief drawn to train on beside them; validation draws as many others, 60 at most. 0: none.
+    /// Scenes with relief drawn to train on besides. Validation draws as many others, at most 60. 0: none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub reliefs: u64,
-    /// Share of the scans that go over scenes with relief.
+    /// Share of the scans that are over scenes with relief.
     #[serde(default, skip_serializing_if = "is_nothing")]
     pub relief_share: f64,
-    /// Share of the scans that go over a bench's own recordings, where some are given.
+    /// Share of the scans that are over a bench's own recordings, if some are given.
     #[serde(default = "half", skip_serializing_if = "is_half")]
     pub bench_share: f64,
-    /// Updates from one validation to the next; a checkpoint is written with each.
+    /// Updates between two validations, a multiple of [`LEG`]. A checkpoint is written with each.
     pub validate_every: u64,
-    /// Scans of the reference benchmark that the best weights are run on in the end, for their model card; 0: none.
+    /// Scans of the reference benchmark on which the best weights are evaluated at the end, for their model card. 0:
+    /// none.
     #[serde(default = "whole_benchmark")]
     pub benchmark: usize,
-    /// How, for the paper's networks.
+    /// How to train one of the paper's networks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dqn: Option<DqnRecipe>,
-    /// How, for the belief tracker.
+    /// How to train the belief tracker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub belief: Option<BeliefRecipe>,
 }
@@ -70,8 +72,8 @@ const fn whole_benchmark() -> usize {
     COUNT
 }
 
-/// The recipes that ship: ours under the policy's name, those that train it further with `-refined`,
-/// `-relief` or `-adapted` appended, the paper's with `-paper`.
+/// The recipes that ship. Ours have the policy's name; those that train its weights further end in `-refined`,
+/// `-relief` or `-adapted`. The paper's end in `-paper`.
 const SHIPPED: [(&str, &str); 11] = [
     ("mgm-learned", include_str!("../../../policies/mgm-learned.toml")),
     ("mlr-learned", include_str!("../../../policies/mlr-learned.toml")),
@@ -99,17 +101,17 @@ pub fn names() -> Vec<&'static str> {
 }
 
 impl Recipe {
-    /// The first key, as `section.key`, whose value differs in `other`, with both values.
+    /// The first key (as `section.key`) whose value differs in `other`, with this recipe's value and the other's.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<(String, String, String)> {
         let table = |recipe: &Self| toml::Table::try_from(recipe).unwrap_or_default();
         difference("", &table(self), &table(other))
     }
 
-    /// What the policy is made of.
+    /// The design of the recipe's policy.
     ///
     /// # Errors
-    /// When it is not a learned policy, or the recipe's section is another policy's.
+    /// If it is not a learned policy, or the recipe has the section of another kind of policy.
     pub fn design(&self) -> Result<Design, TrainError> {
         let unknown = || {
             TrainError::Recipe(format!(
@@ -125,11 +127,15 @@ impl Recipe {
             Design::Belief => self.belief.is_some(),
         };
 
-        if fits {
-            Ok(design)
-        } else {
-            Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", self.policy)))
-        }
+        if fits { Ok(design) } else { Err(self.has_the_wrong_section()) }
+    }
+
+    /// The error that the recipe lacks the section that its policy is trained by.
+    pub(super) fn has_the_wrong_section(&self) -> TrainError {
+        let policy = &self.policy;
+        TrainError::Recipe(format!(
+            "the recipe has the wrong section for '{policy}': [dqn] trains networks of values, [belief] the tracker"
+        ))
     }
 
     /// The same recipe for a training of `updates` updates.

@@ -1,4 +1,4 @@
-//! From a recipe to the trainer of its policy.
+//! Makes the trainer that a recipe describes.
 
 use tch::Device;
 
@@ -10,10 +10,10 @@ use crate::training::error::TrainError;
 use crate::training::recipe::Recipe;
 use crate::training::trainer::Trainer;
 
-/// A trainer from nothing, by `recipe`, of a policy of `design`; its network on `device`.
+/// A trainer, with random weights, of a policy of `design` as `recipe` says, with its networks on `device`.
 ///
 /// # Errors
-/// When the recipe holds no section for such a policy.
+/// If the recipe has no section for such a policy.
 pub fn trainer(
     design: Design,
     recipe: &Recipe,
@@ -24,6 +24,6 @@ pub fn trainer(
     Ok(match (design, &recipe.dqn, &recipe.belief) {
         (Design::Values(sight), Some(dqn), _) => Box::new(DqnTrainer::new(sight, dqn.clone(), scenery, seed, device)),
         (Design::Belief, _, Some(belief)) => Box::new(BeliefTrainer::new(belief.clone(), scenery, seed, device)),
-        _ => return Err(TrainError::Recipe(format!("the recipe's section does not fit '{}'", recipe.policy))),
+        _ => return Err(recipe.has_the_wrong_section()),
     })
 }

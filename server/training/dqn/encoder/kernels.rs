@@ -1,39 +1,39 @@
-//! The encoder's arithmetic, forward and backward, a patch at a time. Its eight filters lie side by side in one 256-bit
-//! register, and what a patch needs fits the first-level cache. libtorch, made for wide layers, cannot
-//! use that.
+//! The encoder's arithmetic, forward and backward, one patch at a time. The values of its eight filters fill one
+//! 256-bit register, and all data of a patch fit the first-level cache. libtorch, made for wide layers, cannot use
+//! that.
 #![allow(clippy::needless_range_loop, reason = "plain index loops of fixed length are what compiles to vector code")]
 
 use multiversion::multiversion;
 
 use crate::imaging::PATCH_SIDE;
 
-/// Filters of each layer, side by side.
+/// Filters of each layer. Their values are neighbours in memory.
 pub const FILTERS: usize = 8;
 /// Weights of a filter for one input channel: 3x3, row by row.
 pub const TAPS: usize = 9;
 /// Pixels of a patch.
 pub const PIXELS: usize = PATCH_SIDE * PATCH_SIDE;
-/// A value for each filter.
+/// One value for each filter.
 pub type Lanes = [f32; FILTERS];
-/// Weights of a layer after the first: by tap, then input channel, then filter.
+/// Weights of a layer after the first, indexed by tap, input channel, filter.
 pub type Taps = [[Lanes; FILTERS]; TAPS];
 
-/// What a layer puts out: by row, then column, then filter.
+/// A layer's output, indexed by row, column, filter.
 type Plane<const SIDE: usize> = [[Lanes; SIDE]; SIDE];
 type Gray = [[f32; PATCH_SIDE]; PATCH_SIDE];
 
-/// The weights of all four layers, or gradients by them.
+/// The weights of all four layers, or the gradients with respect to them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Weights {
-    /// The first layer's, by tap.
+    /// The first layer's weights, by tap.
     pub first: [Lanes; TAPS],
-    /// The other layers'.
+    /// The other layers' weights.
     pub later: [Taps; 3],
-    /// All layers'.
+    /// All layers' biases.
     pub biases: [Lanes; 4],
 }
 
-/// What each layer makes of a patch, rectified.
+/// The standardised patch and the rectified output of each layer but the last.
 #[derive(Default)]
 struct Layers {
     gray: Gray,
@@ -42,7 +42,7 @@ struct Layers {
     third: Plane<3>,
 }
 
-/// Encodings of `patches`.
+/// Encodes each of `patches` into the same place of `encodings`.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub fn encode(weights: &Weights, patches: &[[u8; PIXELS]], encodings: &mut [Lanes]) {
     let mut layers = Layers::default();
@@ -51,9 +51,8 @@ pub fn encode(weights: &Weights, patches: &[[u8; PIXELS]], encodings: &mut [Lane
     }
 }
 
-/// Adds to `gradients` the gradients by the weights, from `grad_output`, the gradients of a loss by
-/// the encodings of `patches`. Encodes each patch again: that costs less than to keep 13 kB of each
-/// for later.
+/// Adds to `gradients` a loss's gradients with respect to the weights. `grad_output` holds its gradients with respect
+/// to the encodings of `patches`. Encodes each patch again, which costs less than keeping 13 kB of each.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub fn add_gradients(weights: &Weights, patches: &[[u8; PIXELS]], grad_output: &[Lanes], gradients: &mut Weights) {
     let turned = weights.later.map(|taps| taps.map(transposed));
@@ -79,7 +78,7 @@ fn forward(weights: &Weights, patch: &[u8; PIXELS], layers: &mut Layers) -> Lane
     standardise(patch, &mut layers.gray);
 
     for (y, row) in layers.first.iter_mut().enumerate() {
-        // 15 sums at once would not fit the registers.
+        // In two parts: 15 sums at once would not fit the registers.
         convolve_gray::<0, 8>(&layers.gray, y, &weights.first, &weights.biases[0], row);
         convolve_gray::<8, 7>(&layers.gray, y, &weights.first, &weights.biases[0], row);
     }
@@ -94,7 +93,7 @@ fn forward(weights: &Weights, patch: &[u8; PIXELS], layers: &mut Layers) -> Lane
     encoding[0][0]
 }
 
-/// `sum += factor * lanes`, rounded once. Without the FMA instruction, which processors have had since 2013, slow.
+/// `sum += factor * lanes`, rounded once. Slow without the FMA instruction, which processors have had since 2013.
 #[inline(always)]
 fn add_product(sum: &mut Lanes, factor: f32, lanes: &Lanes) {
     for lane in 0..FILTERS {
@@ -121,7 +120,7 @@ fn transposed(square: [Lanes; FILTERS]) -> [Lanes; FILTERS] {
     std::array::from_fn(|row| std::array::from_fn(|column| square[column][row]))
 }
 
-/// Brings a patch to mean 0 and deviation 1, as `networks::Encoder::forward` does.
+/// Standardises a patch to mean 0 and about unit deviation, as `networks::Encoder::forward` does.
 #[inline(always)]
 fn standardise(patch: &[u8; PIXELS], gray: &mut Gray) {
     let mean = patch.iter().map(|&level| u32::from(level)).sum::<u32>() as f32 / PIXELS as f32;
@@ -143,7 +142,7 @@ fn standardise(patch: &[u8; PIXELS], gray: &mut Gray) {
     }
 }
 
-/// Row `y` of the first layer, rectified: `COUNT` columns from `FROM` on.
+/// Computes `COUNT` columns, from `FROM` on, of row `y` of the first layer's output, rectified.
 #[inline(always)]
 fn convolve_gray<const FROM: usize, const COUNT: usize>(
     gray: &Gray,
@@ -168,7 +167,7 @@ fn convolve_gray<const FROM: usize, const COUNT: usize>(
     }
 }
 
-/// A layer after the first, not rectified. A whole row's sums stay in registers.
+/// Computes the output of a layer after the first, not rectified. The sums of a whole row stay in registers.
 #[inline(always)]
 fn convolve<const IN: usize, const OUT: usize>(input: &Plane<IN>, taps: &Taps, bias: &Lanes, output: &mut Plane<OUT>) {
     for y in 0..OUT {
@@ -187,9 +186,11 @@ fn convolve<const IN: usize, const OUT: usize>(input: &Plane<IN>, taps: &Taps, b
     }
 }
 
-/// Backward through a layer, from `grad_output`, the gradients at its output: adds to the gradients
-/// by its weights and biases, and finds the gradients `below`, at what its (rectified) `input` was
-/// before it was rectified. `turned` are its weights by tap, then filter, then input channel.
+/// Propagates gradients back through a layer after the first.
+///
+/// `grad_output` holds the gradients with respect to its output, `input` its (rectified) input, and `turned` its
+/// weights, indexed by tap, filter, input channel. Adds the gradients with respect to its weights to `taps`, and those
+/// with respect to its biases to `bias`. Writes to `below` those with respect to its input before rectification.
 #[inline(always)]
 fn backward<const IN: usize, const OUT: usize>(
     input: &Plane<IN>,
@@ -225,14 +226,14 @@ fn backward<const IN: usize, const OUT: usize>(
 
     for (under, seen) in below.as_flattened_mut().iter_mut().zip(input.as_flattened()) {
         for lane in 0..FILTERS {
-            // Not a branch, which would be mispredicted half the time.
+            // A mask, because a branch would be mispredicted half the time.
             let mask = 0u32.wrapping_sub(u32::from(seen[lane] > 0.0));
             under[lane] = f32::from_bits(under[lane].to_bits() & mask);
         }
     }
 }
 
-/// The same for the first layer, below which there is nothing to learn.
+/// The same for the first layer, whose input needs no gradient.
 #[inline(always)]
 fn backward_first(gray: &Gray, grad_output: &Plane<15>, taps: &mut [Lanes; TAPS], bias: &mut Lanes) {
     let mut sums = *taps;

@@ -1,6 +1,5 @@
-//! The paper's CNN encoder for training on the processor, its gradients written by hand.
-//! `networks::Encoder`, which works on every device and in the live loop, is the reference that it is
-//! tested against.
+//! The paper's CNN encoder for training on the CPU, with gradients written by hand. Its tests compare it with
+//! `networks::Encoder`, the reference, which works on every device and in the live loop.
 
 mod kernels;
 #[cfg(test)]
@@ -11,15 +10,15 @@ use tch::{Device, Tensor, nn};
 
 use kernels::{FILTERS, Lanes, TAPS, Weights};
 
-/// Layers of the encoder, by their names in a store.
+/// Names of the encoder's layers in a store.
 const LAYERS: [&str; 4] = ["0", "2", "4", "6"];
-/// Patches that are encoded in one go, cores sharing the rest.
+/// Patches that a core encodes at a time.
 const ENCODED_AT_ONCE: usize = 16;
-/// Patches whose gradients are summed in one go. The sums are added in a fixed order: how many cores
-/// share them changes no digit.
+/// Patches whose gradients a core sums at a time. The sums are added in a fixed order, so the number of cores does not
+/// change a digit.
 const SUMMED_AT_ONCE: usize = 64;
 
-/// An encoder that computes with the variables that a store holds at the time.
+/// An encoder that uses the present values of a store's variables.
 #[derive(Debug)]
 pub struct Encoder {
     /// Bias and weight of each layer, shared with the store.
@@ -27,7 +26,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// The encoder whose variables lie under `path` in `store`; `None` where there is none, or not on the processor.
+    /// The encoder whose variables are under `path` in `store`; `None` if there is none, or it is not on the CPU.
     #[must_use]
     pub fn of(store: &nn::VarStore, path: &str) -> Option<Self> {
         if store.device() != Device::Cpu {
@@ -54,8 +53,8 @@ impl Encoder {
         encodings.into_flattened()
     }
 
-    /// The gradient by all variables, laid out one after another in the order of their names, of a
-    /// loss whose gradient by the encodings `[N, 8]` of patches `[N, 1024]` is `grad_output`.
+    /// The gradient of a loss with respect to all variables, one after another in the order of their names.
+    /// `grad_output` is the loss's gradient with respect to the encodings `[N, 8]` of `patches` (`[N, 1024]`).
     #[must_use]
     pub fn gradient(&self, patches: &[u8], grad_output: &[f32]) -> Vec<f32> {
         let weights = self.weights();
@@ -77,7 +76,7 @@ impl Encoder {
         let mut weights = Weights::default();
         for (layer, [bias, weight]) in self.variables.iter().enumerate() {
             bias.copy_data(&mut weights.biases[layer], FILTERS);
-            // Filter by filter, channel by channel, tap by tap.
+            // PyTorch's layout: filter by filter, channel by channel, tap by tap.
             let mut values = [0.0f32; FILTERS * FILTERS * TAPS];
             weight.copy_data(&mut values, weight.numel());
             let channels = weight.numel() / (FILTERS * TAPS);
@@ -95,7 +94,7 @@ fn added(mut sum: Vec<f32>, more: Vec<f32>) -> Vec<f32> {
     sum
 }
 
-/// In the order of the variables' names, each as `PyTorch` lays it out.
+/// All weights in the order of the variables' names, each in `PyTorch`'s layout.
 fn flat(weights: &Weights) -> Vec<f32> {
     let mut weights = weights.clone();
     let mut all = Vec::with_capacity(4 * FILTERS + (1 + 3 * FILTERS) * FILTERS * TAPS);
@@ -108,7 +107,7 @@ fn flat(weights: &Weights) -> Vec<f32> {
 }
 
 impl Weights {
-    /// The weight that `PyTorch` has at `index` in a layer of `channels` input channels.
+    /// The weight at `index` in `PyTorch`'s layout of a layer with `channels` input channels.
     fn slot(&mut self, layer: usize, index: usize, channels: usize) -> &mut f32 {
         let filter = index / (channels * TAPS);
         let channel = index / TAPS % channels;

@@ -1,4 +1,4 @@
-//! The encoder by hand against libtorch's, and against finite differences.
+//! Compares the encoder by hand with libtorch's, and its gradients with finite differences.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -6,8 +6,9 @@ use tch::{Device, Kind, Tensor, nn};
 
 use super::Encoder;
 use crate::autofocus::networks;
+use crate::training::dqn::drawn::draw_variables;
 
-/// Patches of noise, of a ramp under noise, and one that is flat.
+/// Patches with ramps of random slope under random noise; the first is flat.
 fn patches(count: usize, rng: &mut impl Rng) -> Vec<u8> {
     let mut levels = Vec::with_capacity(count * 1024);
     for patch in 0..count {
@@ -28,15 +29,11 @@ struct Both {
     ours: Encoder,
 }
 
-fn both(seed: i64) -> Both {
+fn both(seed: u64) -> Both {
     networks::compute_on_this_thread();
-    tch::manual_seed(seed);
     let store = nn::VarStore::new(Device::Cpu);
     let torch = networks::Encoder::new(&(store.root() / "encoder"));
-    // Fresh biases are zero, which would hide that they are used.
-    for mut variable in store.trainable_variables() {
-        let _ = tch::no_grad(|| variable.g_add_(&(Tensor::randn_like(&variable) * 0.1)));
-    }
+    draw_variables(&store, &mut ChaCha8Rng::seed_from_u64(seed));
     let ours = Encoder::of(&store, "encoder").unwrap();
     Both { store, torch, ours }
 }
@@ -45,7 +42,7 @@ fn as_tensor(patches: &[u8]) -> Tensor {
     Tensor::from_slice(patches).to_kind(Kind::Float).view([-1, 1024])
 }
 
-/// Largest difference over largest value.
+/// Largest difference, relative to the largest expected value.
 fn difference(found: &Tensor, expected: &Tensor) -> f64 {
     let scale = expected.abs().max().double_value(&[]);
     (found - expected.view_as(found)).abs().max().double_value(&[]) / scale
